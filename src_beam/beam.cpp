@@ -81,7 +81,7 @@ void Beam::step(double size, const Polynomial& c, const Loads& loads) {
 
 void Beam::require_coefficients(std::initializer_list<double> values) {
   for (const double value : values) {
-    if (!(value < largest)) throw std::invalid_argument("beam: the parameters leave the range of numbers");
+    if (!(value < largest_coefficient)) throw std::invalid_argument("beam: the parameters leave the range of numbers");
   }
 }
 

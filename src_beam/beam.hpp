@@ -217,9 +217,9 @@ class Beam {
   virtual void save_motion(double* numbers) const = 0;     ///< motion_size of them
   virtual void restore_motion(const double* numbers) = 0;  ///< likewise
 
-  /// While coefficients, inputs and the sum of squares stay below `largest` and step sizes [s] below `largest_size`, no
-  /// output can overflow. What is not is refused.
-  static constexpr double largest = 1e40, largest_size = 1e10;
+  /// While coefficients stay below `largest_coefficient`, inputs and the sum of squares below `largest`, and step sizes
+  /// [s] below `largest_size`, no output can overflow. What is not is refused.
+  static constexpr double largest_coefficient = 1e40, largest = 1e120, largest_size = 1e10;
   static void require_coefficients(std::initializer_list<double> values);  ///< @throws std::invalid_argument
 
   mutable Scalars now_{};

@@ -5,6 +5,8 @@ import pytest
 
 from springbeam import PointMass, load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
+from springbeam.pictures import panels
+from springbeam.studies.metrics import METRICS
 
 #: From the first impact to just before the foundation is struck.
 SOFT = with_changes(load_scene("soft"), time={"t_end": 0.05}, coupling={"degree": 2})
@@ -99,3 +101,26 @@ def test_a_body_of_the_callers_leaves_its_columns_out():
     run = simulate(scene, lower=PointMass(1.0))
     assert "a_y" not in run.columns
     assert {"a_tip", "clamp_force", "clamp_moment"} <= run.columns.keys()
+
+
+#: A beam that turns as its clamp does not let it: the clamp feels 50 times as much at the start as later.
+TURNS = with_changes(load_scene("steel-bumper"), time={"t_end": 2e-3})
+
+
+def test_what_a_turning_beam_feels_at_its_start_is_no_largest_value():
+    run = simulate(TURNS)
+    later, felt = run.time > 0.0, run.felt()
+    for name in ("clamp_force", "clamp_moment", "bending_stress"):
+        largest = np.abs(run[name][later]).max()
+        assert np.abs(run[name]).max() > 3.0 * largest
+        assert METRICS[f"max_{name}"].of(run) == largest
+        panel = next(panel for panel in panels.inside(run) if name in {curve.name for curve in panel.curves})
+        assert np.abs(panel.curves[0].values).max() == largest
+    assert np.array_equal(felt.time, run.time[later])
+    assert np.abs(felt.shear_force).max() < 0.1 * np.abs(run.shear_force).max()
+    assert [len(part) for part in (felt.shapes[0], felt.bending_moment)] == 2 * [np.sum(run.shapes[0] > 0.0)]
+
+
+def test_a_start_that_the_clamp_allows_counts():
+    run = simulate(with_changes(SOFT, beam={"initial_velocity_slope": 0.0}, loads=LOADS[2:3]))
+    assert run.felt() is run

@@ -176,6 +176,7 @@ def loads(trajectory: Trajectory) -> list[Panel]:
 
 def inside(trajectory: Trajectory) -> list[Panel]:
     """Return accelerations, what the clamp does to the beam, and the largest stress along it."""
+    trajectory = trajectory.felt()
     found = [_lines(trajectory, "accelerations", "Accelerations", ACCELERATIONS, "acceleration", "m/s²")]
     for column, (heading, quantity, unit, words) in _OF_THE_BEAM.items():
         look = {column: Look(BLUE, words)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from html import escape
 from importlib import import_module
@@ -219,6 +219,25 @@ class Trajectory:
         if self.shapes is None or self.bending_moment is None or self.shear_force is None:
             return np.empty((0, len(SHAPE_COLUMNS)))
         return np.column_stack([*self.shapes, self.bending_moment, self.shear_force])
+
+    def felt(self) -> Trajectory:
+        """Return the run without its start, where the beam leans or turns there as its clamp does not let it.
+
+        What clamp and sections feel at that instant grows with the number of elements and has gone by the next row.
+        """
+        beam, later = self.scene.beam, self.time > self.time[:1]
+        straight = beam is not None and (beam.initial_deflection_slope, beam.initial_velocity_slope) != (0.0, 0.0)
+        if not straight or not later.any():
+            return self
+        found = replace(self, columns={name: values[later] for name, values in self.columns.items()})
+        if self.shapes is not None:
+            times, shapes = self.shapes
+            first = int(np.searchsorted(times, self.time[0], side="right"))
+            found.shapes = times[first:], shapes[first:]
+            for name in ("bending_moment", "shear_force"):
+                values = getattr(self, name)
+                setattr(found, name, None if values is None else values[first:])
+        return found
 
     def at(self, times: Any) -> Trajectory:
         """Return the run at any ``times`` [s], shape (n,), with the same columns (`springbeam.results.dense`).

@@ -55,6 +55,8 @@ def _extreme(column: str, pick: Callable[[Extremes], float]) -> Callable[[Trajec
     def of(run: Trajectory) -> float | None:
         if column not in run.columns:
             return None
+        if column in TOLD:
+            run = run.felt()
         if run.steps is None or column not in MOTION:  # which is known at its rows only
             return pick(Extremes.of_rows(run.time, run[column]))
         return pick(extremes(run.scene, run.steps, column))
