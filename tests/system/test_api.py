@@ -90,6 +90,7 @@ def test_a_run_that_is_made_step_by_step_is_a_trajectory_on_the_way():
         halfway, state = sim.run, sim.state
         assert halfway.summary["status"] == "running"
         assert (halfway.time[-1], halfway.phase[-1]) == (state.time, state.phase.name)
+        assert halfway.summary["macro_steps"] == state.macro_steps == 40
         while sim.step():
             pass
         assert (sim.done, sim.step(), sim.run.summary["status"]) == (True, False, "done")
