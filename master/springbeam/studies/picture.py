@@ -184,10 +184,11 @@ def curves(points: Sequence[Point], title: str, x: str, y: str, size: tuple[floa
                           ([point.x for point in mine], [point.y for point in mine]))  # fmt: skip
             ax.plot(across, up, label=line, color=f"C{k % 10}", marker=_MARKERS[k % len(_MARKERS)], markersize=4.0,
                     linewidth=1.1, linestyle=("-", "--", ":")[k // 10 % 3])  # fmt: skip
-        ax.set(xscale="log", yscale="log", title=name if x else "", xlabel=x or name, ylabel=y)
+        ax.set(yscale="log", title=name if x else "", xlabel=x or name, ylabel=y)
+        logarithmic(ax.xaxis, np.array([point.x for point in points if point.panel == name and point.x] or [1.0]))
         ax.grid(alpha=0.3)
     if every:
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", fontsize="small", ncols=6)
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", fontsize="small", ncols=5)
     else:
         axes[0].text(0.5, 0.5, "nothing to draw", transform=axes[0].transAxes, ha="center")
     return figure
