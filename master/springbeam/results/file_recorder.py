@@ -1,6 +1,6 @@
 """A run streamed into the files of a directory.
 
-Records are appended to ``steps.bin`` as the run goes, some hundred at a time, after their events and shapes: a run that
+Records are appended to ``steps.bin`` as the run goes, a block at a time, after their events and shapes: a run that
 is killed loses no more than that. Rows, ``trajectory.csv``, are made from the records at the end.
 """
 

@@ -1,4 +1,4 @@
-"""The log of a run: its records, which are checked some hundred at a time and handed to the recorder."""
+"""The log of a run: its records, which are checked some hundred at a time, or each second, and handed on."""
 
 from __future__ import annotations
 
