@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import scipy.linalg
@@ -128,8 +127,7 @@ class LinearForm:
         self.extra_damping = p.damping - s.alpha_b * p.linear_stiffness
         self.oscillators = Oscillators(self.omega2, s.alpha_b * self.omega2)
         self.mobility = np.sum(self.inputs**2, axis=1)  #: acceleration per unit force r [1/kg]
-        self._weights = lru_cache(_CACHED_SIZES)(self.oscillators.weights)
-        self._sizes: dict[str, float] = {}  #: that recur but for rounding, by their first digits
+        self._weights: dict[str, StepWeights] = {}  #: by the first digits of sizes, which recur but for rounding
 
     def _split(self) -> tuple[float, tuple[float, float] | None]:
         """Return `linked`, and the (k, c) that it leaves of a linear law, ``None`` where the law is not linear."""
@@ -181,7 +179,13 @@ class LinearForm:
 
     def weights(self, size: float) -> StepWeights:
         """Return the weights of a step of ``size`` [s]; the last ones used are kept."""
-        return self._weights(self._sizes.setdefault(f"{size:.12e}", size))
+        digits = f"{size:.12e}"
+        if (known := self._weights.pop(digits, None)) is None:
+            known = self.oscillators.weights(size)
+            if len(self._weights) >= _CACHED_SIZES:
+                self._weights.pop(next(iter(self._weights)))
+        self._weights[digits] = known
+        return known
 
     def longest_step(self, xi: np.ndarray, xi_dot: np.ndarray, r: np.ndarray, X: np.ndarray) -> float:
         """Return the step [s] that resolves the free motion seen in displacements, contact forces and dissipation.
