@@ -40,34 +40,53 @@ inline void require_arrays(std::size_t n, std::initializer_list<std::pair<const 
 /// Takes a message: its status, its category and its text.
 using Log = std::function<void(Status, const char*, const std::string&)>;
 
+/// The functions that throw std::invalid_argument do so for arguments that are missing or wrong.
 class Component {
  public:
-  Component(Log log, bool log_events) : log_events(log_events), log_(std::move(log)) {}
+  Component(Log log, bool log_events) : log_(std::move(log)), log_events_(log_events) {}
 
   Instance instance;
-  bool log_events;
-  std::map<void*, std::unique_ptr<Snapshot>> states;
-  Snapshot spare;  ///< of the last save, whose memory the next one uses
+  bool event_mode_used = false, early_return_allowed = false;  ///< what the importer can do (FMI 3.0)
+  const char* function = "";                                   ///< of FMI, that is being called
 
-  /// Events, with Status::ok, are sent if debugging is on for them; warnings and failures always.
-  void log(Status status, const char* category, const std::string& message) const {
-    if (log_ && (status != Status::ok || log_events)) log_(status, category, message);
-  }
-  void note(const char* event) const { log(Status::ok, "logEvents", event); }
+  /// Sends a message. Events, with Status::ok, are sent if debugging is on for them; the rest always, with the
+  /// function's name. After an error the instance is in the phase `error`.
+  Status tell(Status status, const std::string& what);
   /// Enters a phase, which is told as `event`.
   void enter(Phase phase, const char* event);
+  const char* phase_text() const;
+
+  /// No category: all of them. A warning names each that does not exist.
+  void set_debugging(bool on, std::size_t n, const char* const categories[]);
+  void start();  ///< the end of initialization mode
+  void reset();
   /// A step of the instance. The model's warning is told, no more: the step is done, and some masters stop at any
   /// status but OK.
-  Model::Reached step(const char* function, double time, double size, bool to_event = false);
-  /// @throws std::invalid_argument if the state was not made by this instance, or is already freed
-  Snapshot& state(void* key);
-  void* keep(Snapshot snapshot);
-  const char* phase_text() const;
-  /// Reports and enters the phase `error`.
-  Status fail(const char* function, const char* why);
+  Model::Reached step(double time, double size, bool to_event = false);
+
+  /// Into the state that `*state` names, or a new one if it is NULL.
+  void get_state(void** state);
+  void set_state(void* state) { instance.restore(found(state)); }
+  void free_state(void** state);
+  void state_size(void* state, std::size_t* size);
+  void serialize(void* state, void* bytes, std::size_t size);
+  void deserialize(const void* bytes, std::size_t size, void** state);
+
+  /// Of variables of a type that there are none of.
+  void refuse_all(std::size_t n, const char* type) const;
+  void output_derivatives(const unsigned references[], std::size_t n, const int orders[], double values[]);
+  /// One unknown's derivative in the direction `seed` of the knowns, for each unknown.
+  void directional_derivative(const unsigned unknowns[], std::size_t n_unknowns, const unsigned knowns[],
+                              std::size_t n_knowns, const double seed[], double sensitivity[]);
 
  private:
+  Snapshot& found(void* state);
+  void* keep(Snapshot snapshot);
+
   const Log log_;
+  bool log_events_;
+  std::map<void*, std::unique_ptr<Snapshot>> states_;
+  Snapshot spare_;  ///< of the last save, whose memory the next one uses
 };
 
 /// Runs `body(component)`, which may throw, if the instance is in one of the `legal` phases.
@@ -76,16 +95,16 @@ Status guard(void* c, const char* function, unsigned legal, const Body& body) no
   if (!c) return Status::error;
   Component& component = *static_cast<Component*>(c);
   Phase& phase = component.instance.progress.phase;
+  component.function = function;
   try {
     try {
       if ((phase & legal) == 0) throw std::logic_error(std::string("not allowed ") + component.phase_text());
       body(component);
       return Status::ok;
     } catch (const Discarded& e) {
-      component.log(Status::discard, "logStatusDiscard", std::string(function) + ": " + e.what());
-      return Status::discard;
+      return component.tell(Status::discard, e.what());
     } catch (const std::exception& e) {
-      return component.fail(function, e.what());
+      return component.tell(Status::error, e.what());
     }
   } catch (...) {  // out of memory while reporting, or what is no std::exception
     phase = error;
@@ -93,26 +112,9 @@ Status guard(void* c, const char* function, unsigned legal, const Body& body) no
   }
 }
 
-// What both versions of FMI have, by the name that `function` has there.
-
-/// Whether `c` may stay: the instance has a name, and `identity` is the description's.
-Status instantiate(Component* c, const char* function, const char* name, const char* identity);
-/// No category: all of them. A warning names each that does not exist.
-Status set_debugging(void* c, const char* function, bool on, std::size_t n, const char* const categories[]);
-Status reset(void* c, const char* function);
-/// Of variables of a type that there are none of.
-Status none_of(void* c, const char* function, unsigned legal, std::size_t n, const char* type);
-/// Into the state that `*state` names, or a new one if it is NULL.
-Status get_state(void* c, const char* function, void** state);
-Status set_state(void* c, const char* function, void* state);
-Status free_state(void* c, const char* function, void** state);
-Status state_size(void* c, const char* function, void* state, std::size_t* size);
-Status serialize_state(void* c, const char* function, void* state, void* bytes, std::size_t size);
-Status deserialize_state(void* c, const char* function, const void* bytes, std::size_t size, void** state);
-Status output_derivatives(void* c, const char* function, const unsigned references[], std::size_t n, const int orders[],
-                          double values[]);
-/// One unknown's derivative in the direction `seed` of the knowns, for each unknown.
-Status directional_derivative(void* c, const char* function, const unsigned unknowns[], std::size_t n_unknowns,
-                              const unsigned knowns[], std::size_t n_knowns, const double seed[], double sensitivity[]);
+/// A new instance; NULL, with a message, if it is not for co-simulation, has no name, or `identity` is not the
+/// description's. @throws std::bad_alloc
+Component* instantiate(const char* function, const Log& log, bool log_events, bool co_simulation, const char* name,
+                       const char* identity);
 
 }  // namespace fmi

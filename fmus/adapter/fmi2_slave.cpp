@@ -2,9 +2,7 @@
 // section 4.2.4).
 #include <cstddef>
 #include <limits>
-#include <memory>
 #include <new>
-#include <stdexcept>
 #include <string>
 
 #include "component.hpp"
@@ -14,17 +12,16 @@ namespace {
 
 using fmi::any_phase;
 using fmi::Component;
-using fmi::Progress;
-using fmi::require;
 using fmi::require_arrays;
 using fmi::Status;
 using fmi::Type;
 
 fmi2Status to2(Status status) { return static_cast<fmi2Status>(status); }
 
-template <class Body>
-fmi2Status call(fmi2Component c, const char* function, unsigned legal, const Body& body) {
-  return to2(fmi::guard(c, function, legal, body));
+/// `body` may be a member of Component, then with its arguments.
+template <class Body, class... Arguments>
+fmi2Status call(fmi2Component c, const char* function, unsigned legal, const Body& body, Arguments... arguments) {
+  return to2(fmi::guard(c, function, legal, [&](Component& k) { std::invoke(body, k, arguments...); }));
 }
 
 template <class Value>
@@ -47,14 +44,13 @@ fmi2Status set(fmi2Component c, const char* function, const fmi2ValueReference v
   });
 }
 
-/// Strictly the status functions belong to a step in progress or failed; asking after a completed one does no harm.
+/// Most of what could be asked is about a step that is pending, and none ever is.
 template <class Value, class Get>
-fmi2Status get_status(fmi2Component c, const char* function, bool known, const char* why_not, Value* value,
-                      const Get& status_of) {
+fmi2Status get_status(fmi2Component c, const char* function, bool known, Value* value, const Get& status_of) {
   return call(c, function, fmi::stepped, [&](Component& k) {
-    require(value, "value");
-    if (!known) throw fmi::Discarded(why_not);
-    *value = status_of(k.instance.progress);
+    fmi::require(value, "value");
+    if (!known) throw fmi::Discarded("only fmi2LastSuccessfulTime and fmi2Terminated are known: no step is pending");
+    *value = status_of(k);
   });
 }
 
@@ -74,33 +70,23 @@ const char* fmi2GetVersion(void) { return fmi2Version; }
 
 /// `functions` may be NULL, and gone after the call.
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID, fmi2String,
-                              const fmi2CallbackFunctions* functions, fmi2Boolean, fmi2Boolean loggingOn) {
-  std::unique_ptr<Component> component;
-  try {
-    fmi::Log log;
-    if (functions && functions->logger)
-      log = [callbacks = *functions, name = std::string(instanceName ? instanceName : "?")](
-                Status status, const char* category, const std::string& message) {
-        callbacks.logger(callbacks.componentEnvironment, name.c_str(), to2(status), category,
-                         as_format(message).c_str());
-      };
-    component = std::make_unique<Component>(log, loggingOn != fmi2False);
-    if (fmuType != fmi2CoSimulation) {
-      component->fail(__func__, "only co-simulation is provided");
-      return nullptr;
-    }
-  } catch (const std::bad_alloc&) {
-    return nullptr;
-  }
-  const Status status = fmi::instantiate(component.get(), __func__, instanceName, fmuGUID);
-  return status == Status::ok ? component.release() : nullptr;
+                              const fmi2CallbackFunctions* functions, fmi2Boolean, fmi2Boolean loggingOn) try {
+  fmi::Log log;
+  if (functions && functions->logger)
+    log = [callbacks = *functions, name = std::string(instanceName ? instanceName : "?")](
+              Status status, const char* category, const std::string& message) {
+      callbacks.logger(callbacks.componentEnvironment, name.c_str(), to2(status), category, as_format(message).c_str());
+    };
+  return fmi::instantiate(__func__, log, loggingOn != fmi2False, fmuType == fmi2CoSimulation, instanceName, fmuGUID);
+} catch (const std::bad_alloc&) {
+  return nullptr;
 }
 
 void fmi2FreeInstance(fmi2Component c) { delete static_cast<Component*>(c); }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
-  return to2(fmi::set_debugging(c, __func__, loggingOn != fmi2False, nCategories, categories));
+  return call(c, __func__, any_phase, &Component::set_debugging, loggingOn != fmi2False, nCategories, categories);
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
@@ -112,22 +98,18 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
-  return call(c, __func__, fmi::instantiated,
-              [](Component& k) { k.enter(fmi::initialization, "entered initialization mode"); });
+  return call(c, __func__, fmi::instantiated, &Component::enter, fmi::initialization, "entered initialization mode");
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-  return call(c, __func__, fmi::initialization, [](Component& k) {
-    k.instance.ensure_built();
-    k.enter(fmi::step_complete, "initialized");
-  });
+  return call(c, __func__, fmi::initialization, &Component::start);
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-  return call(c, __func__, fmi::step_complete, [](Component& k) { k.enter(fmi::terminated, "terminated"); });
+  return call(c, __func__, fmi::step_complete, &Component::enter, fmi::terminated, "terminated");
 }
 
-fmi2Status fmi2Reset(fmi2Component c) { return to2(fmi::reset(c, __func__)); }
+fmi2Status fmi2Reset(fmi2Component c) { return call(c, __func__, any_phase, &Component::reset); }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {
   return get(c, __func__, vr, nvr, value, Type::real);
@@ -139,7 +121,7 @@ fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
   return get(c, __func__, vr, nvr, value, Type::boolean);
 }
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference[], size_t nvr, fmi2String[]) {
-  return to2(fmi::none_of(c, __func__, any_phase, nvr, "String"));
+  return call(c, __func__, any_phase, &Component::refuse_all, nvr, "String");
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
@@ -152,33 +134,34 @@ fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
   return set(c, __func__, vr, nvr, value, Type::boolean);
 }
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference[], size_t nvr, const fmi2String[]) {
-  return to2(fmi::none_of(c, __func__, fmi::settable, nvr, "String"));
+  return call(c, __func__, fmi::settable, &Component::refuse_all, nvr, "String");
 }
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate* FMUstate) {
-  return to2(fmi::get_state(c, __func__, FMUstate));
+  return call(c, __func__, any_phase, &Component::get_state, FMUstate);
 }
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
-  return to2(fmi::set_state(c, __func__, FMUstate));
+  return call(c, __func__, any_phase, &Component::set_state, FMUstate);
 }
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate* FMUstate) {
-  return to2(fmi::free_state(c, __func__, FMUstate));
+  return call(c, __func__, any_phase, &Component::free_state, FMUstate);
 }
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t* size) {
-  return to2(fmi::state_size(c, __func__, FMUstate, size));
+  return call(c, __func__, any_phase, &Component::state_size, FMUstate, size);
 }
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size) {
-  return to2(fmi::serialize_state(c, __func__, FMUstate, serializedState, size));
+  return call(c, __func__, any_phase, &Component::serialize, FMUstate, serializedState, size);
 }
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
                                    fmi2FMUstate* FMUstate) {
-  return to2(fmi::deserialize_state(c, __func__, serializedState, size, FMUstate));
+  return call(c, __func__, any_phase, &Component::deserialize, serializedState, size, FMUstate);
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
                                         const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
-  return to2(fmi::directional_derivative(c, __func__, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown));
+  return call(c, __func__, fmi::after_instantiation, &Component::directional_derivative, vUnknown_ref, nUnknown,
+              vKnown_ref, nKnown, dvKnown, dvUnknown);
 }
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
@@ -191,45 +174,39 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[]) {
-  return to2(fmi::output_derivatives(c, __func__, vr, nvr, order, value));
+  return call(c, __func__, fmi::stepped, &Component::output_derivatives, vr, nvr, order, value);
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
                       fmi2Boolean) {
-  const fmi2Status status = call(c, __func__, fmi::step_complete, [&](Component& k) {
-    k.step("fmi2DoStep", currentCommunicationPoint, communicationStepSize);
-  });
-  if (c) static_cast<Component*>(c)->instance.progress.last_status = status;
-  return status;
+  return call(c, __func__, fmi::step_complete,
+              [&](Component& k) { k.step(currentCommunicationPoint, communicationStepSize); });
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) {
   return call(c, __func__, 0, [](Component&) {});  // no step is ever in progress
 }
 
-fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status* value) {
-  return get_status(c, __func__, s == fmi2DoStepStatus, "only fmi2DoStepStatus is a status", value,
-                    [](const Progress& p) { return static_cast<fmi2Status>(p.last_status); });
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind, fmi2Status* value) {
+  return get_status(c, __func__, false, value, [](const Component&) { return fmi2OK; });
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real* value) {
-  return get_status(c, __func__, s == fmi2LastSuccessfulTime, "only fmi2LastSuccessfulTime is a Real", value,
-                    [](const Progress& p) { return p.time; });
+  return get_status(c, __func__, s == fmi2LastSuccessfulTime, value,
+                    [](const Component& k) { return k.instance.progress.time; });
 }
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind, fmi2Integer* value) {
-  return get_status(c, __func__, false, "no status is an Integer", value, [](const Progress&) { return 0; });
+  return get_status(c, __func__, false, value, [](const Component&) { return 0; });
 }
 
 // The slave never ends a simulation by itself.
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean* value) {
-  return get_status(c, __func__, s == fmi2Terminated, "only fmi2Terminated is a Boolean", value,
-                    [](const Progress&) { return fmi2False; });
+  return get_status(c, __func__, s == fmi2Terminated, value, [](const Component&) { return fmi2False; });
 }
 
-fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String* value) {
-  return get_status(c, __func__, s == fmi2PendingStatus, "only fmi2PendingStatus is a String", value,
-                    [](const Progress&) { return "no step is pending"; });
+fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind, fmi2String* value) {
+  return get_status(c, __func__, false, value, [](const Component&) { return ""; });
 }
 
 }  // extern "C"

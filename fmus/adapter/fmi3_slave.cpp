@@ -2,10 +2,10 @@
 // sections 2.3 and 4.2).
 #include <cstddef>
 #include <limits>
-#include <memory>
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 #include "component.hpp"
 #include "fmi3Functions.h"
@@ -15,24 +15,27 @@ namespace {
 
 using fmi::any_phase;
 using fmi::Component;
-using fmi::meant_by;
-using fmi::require;
-using fmi::require_arrays;
-using fmi::settable;
 using fmi::Status;
 using fmi::Type;
 
-/// A Component that knows what the importer can do.
-struct Slave : Component {
-  using Component::Component;
-  bool event_mode_used = false, early_return_allowed = false;
-};
-
 fmi3Status to3(Status status) { return static_cast<fmi3Status>(status); }
 
-template <class Body>
-fmi3Status call(fmi3Instance c, const char* function, unsigned legal, const Body& body) {
-  return to3(fmi::guard(c, function, legal, [&](Component& k) { body(static_cast<Slave&>(k)); }));
+/// `body` may be a member of Component, then with its arguments.
+template <class Body, class... Arguments>
+fmi3Status call(fmi3Instance c, const char* function, unsigned legal, const Body& body, Arguments... arguments) {
+  return to3(fmi::guard(c, function, legal, [&](Component& k) { std::invoke(body, k, arguments...); }));
+}
+
+fmi3Instance instantiate(const char* function, bool co_simulation, fmi3String name, fmi3String token, bool log_events,
+                         fmi3InstanceEnvironment environment, fmi3LogMessageCallback send) try {
+  fmi::Log log;
+  if (send)
+    log = [=](Status status, const char* category, const std::string& message) {
+      send(environment, to3(status), category, message.c_str());
+    };
+  return fmi::instantiate(function, log, log_events, co_simulation, name, token);
+} catch (const std::bad_alloc&) {
+  return nullptr;
 }
 
 /// How many values a variable has.
@@ -43,7 +46,7 @@ std::size_t size_of(unsigned reference) {
 
 /// @throws std::invalid_argument unless there are `n_values` values in all, or if an element stands for an array
 void require_sizes(const fmi3ValueReference vr[], size_t n, const void* values, size_t n_values) {
-  require_arrays(n, {{vr, "the array of value references"}, {values, "the array of values"}});
+  fmi::require_arrays(n, {{vr, "the array of value references"}, {values, "the array of values"}});
   std::size_t sum = 0;
   for (size_t i = 0; i < n; ++i) {
     if (size_of(vr[i]) == 0)
@@ -56,34 +59,44 @@ void require_sizes(const fmi3ValueReference vr[], size_t n, const void* values, 
                                 std::to_string(sum));
 }
 
-double get_one(Component& k, unsigned reference, Type type) {
-  const auto [index, order] = meant_by(reference);
-  if (index == fmi::time_index() && type == Type::real) return k.instance.progress.time;
-  return order > 0 && type == Type::real ? k.instance.input_derivative(index, order) : k.instance.get(reference, type);
+/// What variables hold that functions for C's type `Value` reach.
+template <class Value>
+constexpr bool is_real = std::is_same_v<Value, fmi3Float64>;
+template <class Value>
+constexpr Type type_of = is_real<Value>                       ? Type::real
+                         : std::is_same_v<Value, fmi3Boolean> ? Type::boolean
+                                                              : Type::integer;
+
+template <class Value>
+Value get_one(Component& k, unsigned reference) {
+  const auto [index, order] = fmi::meant_by(reference);
+  const double value = is_real<Value> && index == fmi::time_index() ? k.instance.progress.time
+                       : is_real<Value> && order > 0                ? k.instance.input_derivative(index, order)
+                                                                    : k.instance.get(reference, type_of<Value>);
+  return static_cast<Value>(value);
 }
 
 template <class Value>
 fmi3Status get(fmi3Instance c, const char* function, const fmi3ValueReference vr[], size_t n, Value values[],
-               size_t n_values, Type type) {
-  return call(c, function, any_phase, [&](Slave& k) {
+               size_t n_values) {
+  return call(c, function, any_phase, [&](Component& k) {
     require_sizes(vr, n, values, n_values);
-    for (size_t i = 0, at = 0; i < n; ++i)
-      for (unsigned element = 0; element < size_of(vr[i]); ++element)
-        values[at++] = static_cast<Value>(get_one(k, vr[i] + element, type));
+    for (size_t i = 0; i < n; ++i)
+      for (unsigned element = 0; element < size_of(vr[i]); ++element) *values++ = get_one<Value>(k, vr[i] + element);
   });
 }
 
 template <class Value>
 fmi3Status set(fmi3Instance c, const char* function, const fmi3ValueReference vr[], size_t n, const Value values[],
-               size_t n_values, Type type) {
-  return call(c, function, settable, [&](Slave& k) {
+               size_t n_values) {
+  return call(c, function, fmi::settable, [&](Component& k) {
     require_sizes(vr, n, values, n_values);
     for (size_t i = 0; i < n; ++i) {  // no array can be set
-      const auto [index, order] = meant_by(vr[i]);
-      if (order > 0 && type == Type::real)
+      const auto [index, order] = fmi::meant_by(vr[i]);
+      if (is_real<Value> && order > 0)
         k.instance.set_derivative(index, order, static_cast<double>(values[i]));
       else
-        k.instance.set(vr[i], type, static_cast<double>(values[i]));
+        k.instance.set(vr[i], type_of<Value>, static_cast<double>(values[i]));
     }
   });
 }
@@ -99,53 +112,38 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3Boolean earlyReturnAllowed, const fmi3ValueReference[], size_t,
                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback) {
-  std::unique_ptr<Slave> slave;
-  try {
-    fmi::Log log;
-    if (logMessage)
-      log = [=](Status status, const char* category, const std::string& message) {
-        logMessage(environment, to3(status), category, message.c_str());
-      };
-    slave = std::make_unique<Slave>(log, loggingOn);
-  } catch (const std::bad_alloc&) {
-    return nullptr;
+  auto* const c = instantiate(__func__, true, instanceName, instantiationToken, loggingOn, environment, logMessage);
+  if (c) {
+    static_cast<Component*>(c)->event_mode_used = eventModeUsed;
+    static_cast<Component*>(c)->early_return_allowed = earlyReturnAllowed;
   }
-  slave->event_mode_used = eventModeUsed;
-  slave->early_return_allowed = earlyReturnAllowed;
-  if (fmi::instantiate(slave.get(), __func__, instanceName, instantiationToken) != Status::ok) return nullptr;
-  return static_cast<Component*>(slave.release());
+  return c;
 }
 
-fmi3Instance fmi3InstantiateModelExchange(fmi3String, fmi3String, fmi3String, fmi3Boolean, fmi3Boolean,
+fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String, fmi3Boolean, fmi3Boolean,
                                           fmi3InstanceEnvironment environment, fmi3LogMessageCallback logMessage) {
-  if (logMessage)
-    logMessage(environment, fmi3Error, "logStatusError",
-               "fmi3InstantiateModelExchange: only co-simulation is provided");
-  return nullptr;
+  return instantiate(__func__, false, name, token, false, environment, logMessage);
 }
 
-fmi3Instance fmi3InstantiateScheduledExecution(fmi3String, fmi3String, fmi3String, fmi3Boolean, fmi3Boolean,
+fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String, fmi3Boolean, fmi3Boolean,
                                                fmi3InstanceEnvironment environment, fmi3LogMessageCallback logMessage,
                                                fmi3ClockUpdateCallback, fmi3LockPreemptionCallback,
                                                fmi3UnlockPreemptionCallback) {
-  if (logMessage)
-    logMessage(environment, fmi3Error, "logStatusError",
-               "fmi3InstantiateScheduledExecution: only co-simulation is provided");
-  return nullptr;
+  return instantiate(__func__, false, name, token, false, environment, logMessage);
 }
 
-void fmi3FreeInstance(fmi3Instance c) { delete static_cast<Slave*>(static_cast<Component*>(c)); }
+void fmi3FreeInstance(fmi3Instance c) { delete static_cast<Component*>(c); }
 
 fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[]) {
-  return to3(fmi::set_debugging(c, __func__, loggingOn, nCategories, categories));
+  return call(c, __func__, any_phase, &Component::set_debugging, loggingOn, nCategories, categories);
 }
 
 // Life cycle
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
-  return call(c, __func__, fmi::instantiated, [&](Slave& k) {
+  return call(c, __func__, fmi::instantiated, [&](Component& k) {
     k.instance.setup(startTime, stopTimeDefined ? stopTime : std::numeric_limits<double>::infinity(),
                      toleranceDefined ? tolerance : 0.0);
     k.enter(fmi::initialization, "entered initialization mode");
@@ -153,28 +151,25 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefi
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
-  return call(c, __func__, fmi::initialization, [](Slave& k) {
-    k.instance.ensure_built();
-    k.enter(k.event_mode_used ? fmi::event_mode : fmi::step_complete, "initialized");
-  });
+  return call(c, __func__, fmi::initialization, &Component::start);
 }
 
 fmi3Status fmi3EnterEventMode(fmi3Instance c) {
-  return call(c, __func__, fmi::step_complete, [](Slave& k) {
+  return call(c, __func__, fmi::step_complete, [](Component& k) {
     if (!k.event_mode_used) throw std::logic_error("not allowed: it was instantiated with eventModeUsed = false");
     k.enter(fmi::event_mode, "entered event mode");
   });
 }
 
 fmi3Status fmi3EnterStepMode(fmi3Instance c) {
-  return call(c, __func__, fmi::event_mode, [](Slave& k) { k.enter(fmi::step_complete, "entered step mode"); });
+  return call(c, __func__, fmi::event_mode, &Component::enter, fmi::step_complete, "entered step mode");
 }
 
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean* discreteStatesNeedUpdate,
                                     fmi3Boolean* terminateSimulation, fmi3Boolean* nominalsOfContinuousStatesChanged,
                                     fmi3Boolean* valuesOfContinuousStatesChanged, fmi3Boolean* nextEventTimeDefined,
                                     fmi3Float64* nextEventTime) {
-  return call(c, __func__, fmi::event_mode, [&](Slave& k) {
+  return call(c, __func__, fmi::event_mode, [&](Component& k) {
     k.instance.update();
     for (fmi3Boolean* told : {discreteStatesNeedUpdate, terminateSimulation, nominalsOfContinuousStatesChanged,
                               valuesOfContinuousStatesChanged, nextEventTimeDefined})
@@ -184,23 +179,22 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean* discreteStatesN
 }
 
 fmi3Status fmi3Terminate(fmi3Instance c) {
-  return call(c, __func__, fmi::running, [](Slave& k) { k.enter(fmi::terminated, "terminated"); });
+  return call(c, __func__, fmi::running, &Component::enter, fmi::terminated, "terminated");
 }
 
-fmi3Status fmi3Reset(fmi3Instance c) { return to3(fmi::reset(c, __func__)); }
+fmi3Status fmi3Reset(fmi3Instance c) { return call(c, __func__, any_phase, &Component::reset); }
 
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
                       fmi3Boolean, fmi3Boolean* eventHandlingNeeded, fmi3Boolean* terminateSimulation,
                       fmi3Boolean* earlyReturn, fmi3Float64* lastSuccessfulTime) {
-  return call(c, __func__, fmi::step_complete, [&](Slave& k) {
-    require(eventHandlingNeeded, "eventHandlingNeeded");
-    require(terminateSimulation, "terminateSimulation");
-    require(earlyReturn, "earlyReturn");
-    require(lastSuccessfulTime, "lastSuccessfulTime");
+  return call(c, __func__, fmi::step_complete, [&](Component& k) {
+    fmi::require_arrays(1, {{eventHandlingNeeded, "eventHandlingNeeded"},
+                            {terminateSimulation, "terminateSimulation"},
+                            {earlyReturn, "earlyReturn"},
+                            {lastSuccessfulTime, "lastSuccessfulTime"}});
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = k.instance.progress.time;
-    const auto [size, event] =
-        k.step("fmi3DoStep", currentCommunicationPoint, communicationStepSize, k.early_return_allowed);
+    const auto [size, event] = k.step(currentCommunicationPoint, communicationStepSize, k.early_return_allowed);
     *lastSuccessfulTime = k.instance.progress.time;
     *earlyReturn = size != communicationStepSize;
     *eventHandlingNeeded = event && k.event_mode_used;
@@ -208,136 +202,122 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint, fmi
   });
 }
 
-// Values
+// Values: of the types that variables have, and of those that none has.
 
-fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Float64 values[], size_t m) {
-  return get(c, __func__, vr, n, values, m, Type::real);
-}
-fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Int32 values[], size_t m) {
-  return get(c, __func__, vr, n, values, m, Type::integer);
-}
-fmi3Status fmi3GetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Boolean values[], size_t m) {
-  return get(c, __func__, vr, n, values, m, Type::boolean);
-}
-fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 values[],
-                          size_t m) {
-  return set(c, __func__, vr, n, values, m, Type::real);
-}
-fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Int32 values[], size_t m) {
-  return set(c, __func__, vr, n, values, m, Type::integer);
-}
-fmi3Status fmi3SetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Boolean values[],
-                          size_t m) {
-  return set(c, __func__, vr, n, values, m, Type::boolean);
-}
-
-#define SPRINGBEAM_NONE_OF(type)                                                                               \
-  fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference[], size_t n, fmi3##type[], size_t) {       \
-    return to3(fmi::none_of(c, __func__, any_phase, n, #type));                                                \
-  }                                                                                                            \
-  fmi3Status fmi3Set##type(fmi3Instance c, const fmi3ValueReference[], size_t n, const fmi3##type[], size_t) { \
-    return to3(fmi::none_of(c, __func__, settable, n, #type));                                                 \
+#define SPRINGBEAM_VALUES(type)                                                                                      \
+  fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3##type values[], size_t m) { \
+    return get(c, __func__, vr, n, values, m);                                                                       \
+  }                                                                                                                  \
+  fmi3Status fmi3Set##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3##type values[],       \
+                           size_t m) {                                                                               \
+    return set(c, __func__, vr, n, values, m);                                                                       \
   }
-SPRINGBEAM_NONE_OF(Float32)
-SPRINGBEAM_NONE_OF(Int8)
-SPRINGBEAM_NONE_OF(UInt8)
-SPRINGBEAM_NONE_OF(Int16)
-SPRINGBEAM_NONE_OF(UInt16)
-SPRINGBEAM_NONE_OF(UInt32)
-SPRINGBEAM_NONE_OF(Int64)
-SPRINGBEAM_NONE_OF(UInt64)
-SPRINGBEAM_NONE_OF(String)
-#undef SPRINGBEAM_NONE_OF
+SPRINGBEAM_VALUES(Float64)
+SPRINGBEAM_VALUES(Int32)
+SPRINGBEAM_VALUES(Boolean)
+#undef SPRINGBEAM_VALUES
 
-fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference[], size_t n, size_t[], fmi3Binary[], size_t) {
-  return to3(fmi::none_of(c, __func__, any_phase, n, "Binary"));
-}
-fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference[], size_t n, const size_t[], const fmi3Binary[],
-                         size_t) {
-  return to3(fmi::none_of(c, __func__, settable, n, "Binary"));
-}
-fmi3Status fmi3GetClock(fmi3Instance c, const fmi3ValueReference[], size_t n, fmi3Clock[]) {
-  return to3(fmi::none_of(c, __func__, any_phase, n, "Clock"));
-}
-fmi3Status fmi3SetClock(fmi3Instance c, const fmi3ValueReference[], size_t n, const fmi3Clock[]) {
-  return to3(fmi::none_of(c, __func__, settable, n, "Clock"));
-}
+#define SPRINGBEAM_NONE_OF(type, get_parameters, set_parameters)                                                     \
+  fmi3Status fmi3Get##type get_parameters { return call(c, __func__, any_phase, &Component::refuse_all, n, #type); } \
+  fmi3Status fmi3Set##type set_parameters { return call(c, __func__, fmi::settable, &Component::refuse_all, n, #type); }
+#define SPRINGBEAM_NO_NUMBERS(type)                                                                      \
+  SPRINGBEAM_NONE_OF(type, (fmi3Instance c, const fmi3ValueReference[], size_t n, fmi3##type[], size_t), \
+                     (fmi3Instance c, const fmi3ValueReference[], size_t n, const fmi3##type[], size_t))
+SPRINGBEAM_NO_NUMBERS(Float32)
+SPRINGBEAM_NO_NUMBERS(Int8)
+SPRINGBEAM_NO_NUMBERS(UInt8)
+SPRINGBEAM_NO_NUMBERS(Int16)
+SPRINGBEAM_NO_NUMBERS(UInt16)
+SPRINGBEAM_NO_NUMBERS(UInt32)
+SPRINGBEAM_NO_NUMBERS(Int64)
+SPRINGBEAM_NO_NUMBERS(UInt64)
+SPRINGBEAM_NO_NUMBERS(String)
+SPRINGBEAM_NONE_OF(Binary, (fmi3Instance c, const fmi3ValueReference[], size_t n, size_t[], fmi3Binary[], size_t),
+                   (fmi3Instance c, const fmi3ValueReference[], size_t n, const size_t[], const fmi3Binary[], size_t))
+SPRINGBEAM_NONE_OF(Clock, (fmi3Instance c, const fmi3ValueReference[], size_t n, fmi3Clock[]),
+                   (fmi3Instance c, const fmi3ValueReference[], size_t n, const fmi3Clock[]))
+#undef SPRINGBEAM_NO_NUMBERS
+#undef SPRINGBEAM_NONE_OF
 
 // States
 
-fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState* state) { return to3(fmi::get_state(c, __func__, state)); }
-fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) { return to3(fmi::set_state(c, __func__, state)); }
-fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState* state) { return to3(fmi::free_state(c, __func__, state)); }
+fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState* state) {
+  return call(c, __func__, any_phase, &Component::get_state, state);
+}
+fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
+  return call(c, __func__, any_phase, &Component::set_state, state);
+}
+fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState* state) {
+  return call(c, __func__, any_phase, &Component::free_state, state);
+}
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t* size) {
-  return to3(fmi::state_size(c, __func__, state, size));
+  return call(c, __func__, any_phase, &Component::state_size, state, size);
 }
 fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size) {
-  return to3(fmi::serialize_state(c, __func__, state, bytes, size));
+  return call(c, __func__, any_phase, &Component::serialize, state, bytes, size);
 }
 fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState* state) {
-  return to3(fmi::deserialize_state(c, __func__, bytes, size, state));
+  return call(c, __func__, any_phase, &Component::deserialize, bytes, size, state);
 }
 
 // Derivatives
 
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Int32 orders[],
                                     fmi3Float64 values[], size_t m) {
-  const fmi3Status sizes = call(c, __func__, fmi::stepped, [&](Slave&) { require_sizes(vr, n, values, m); });
-  return sizes == fmi3OK ? to3(fmi::output_derivatives(c, __func__, vr, n, orders, values)) : sizes;
+  return call(c, __func__, fmi::stepped, [&](Component& k) {
+    require_sizes(vr, n, values, m);
+    k.output_derivatives(vr, n, orders, values);
+  });
 }
 
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t nUnknowns,
                                         const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                         size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity) {
-  const fmi3Status sizes = call(c, __func__, fmi::after_instantiation, [&](Slave&) {
+  return call(c, __func__, fmi::after_instantiation, [&](Component& k) {
     require_sizes(unknowns, nUnknowns, sensitivity, nSensitivity);
     require_sizes(knowns, nKnowns, seed, nSeed);
+    k.directional_derivative(unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
   });
-  return sizes == fmi3OK
-             ? to3(fmi::directional_derivative(c, __func__, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity))
-             : sizes;
 }
 
 // What is not provided: the description says so. FMPy also looks for the functions of the other two interfaces.
 
-#define SPRINGBEAM_NOT_PROVIDED(name, parameters)                                                   \
-  fmi3Status name parameters {                                                                      \
-    return call(c, __func__, any_phase, [](Slave&) { throw std::logic_error("is not provided"); }); \
+#define SPRINGBEAM_NOT_PROVIDED(name, ...)                                                              \
+  fmi3Status fmi3##name(__VA_ARGS__) {                                                                  \
+    return call(c, __func__, any_phase, [](Component&) { throw std::logic_error("is not provided"); }); \
   }
-SPRINGBEAM_NOT_PROVIDED(fmi3GetNumberOfVariableDependencies, (fmi3Instance c, fmi3ValueReference, size_t*))
-SPRINGBEAM_NOT_PROVIDED(fmi3GetVariableDependencies, (fmi3Instance c, fmi3ValueReference, size_t[],
-                                                      fmi3ValueReference[], size_t[], fmi3DependencyKind[], size_t))
-SPRINGBEAM_NOT_PROVIDED(fmi3GetAdjointDerivative,
-                        (fmi3Instance c, const fmi3ValueReference[], size_t, const fmi3ValueReference[], size_t,
-                         const fmi3Float64[], size_t, fmi3Float64[], size_t))
-SPRINGBEAM_NOT_PROVIDED(fmi3GetIntervalDecimal,
-                        (fmi3Instance c, const fmi3ValueReference[], size_t, fmi3Float64[], fmi3IntervalQualifier[]))
-SPRINGBEAM_NOT_PROVIDED(fmi3GetIntervalFraction, (fmi3Instance c, const fmi3ValueReference[], size_t, fmi3UInt64[],
-                                                  fmi3UInt64[], fmi3IntervalQualifier[]))
-SPRINGBEAM_NOT_PROVIDED(fmi3GetShiftDecimal, (fmi3Instance c, const fmi3ValueReference[], size_t, fmi3Float64[]))
-SPRINGBEAM_NOT_PROVIDED(fmi3GetShiftFraction,
-                        (fmi3Instance c, const fmi3ValueReference[], size_t, fmi3UInt64[], fmi3UInt64[]))
-SPRINGBEAM_NOT_PROVIDED(fmi3SetIntervalDecimal,
-                        (fmi3Instance c, const fmi3ValueReference[], size_t, const fmi3Float64[]))
-SPRINGBEAM_NOT_PROVIDED(fmi3SetIntervalFraction,
-                        (fmi3Instance c, const fmi3ValueReference[], size_t, const fmi3UInt64[], const fmi3UInt64[]))
-SPRINGBEAM_NOT_PROVIDED(fmi3SetShiftDecimal, (fmi3Instance c, const fmi3ValueReference[], size_t, const fmi3Float64[]))
-SPRINGBEAM_NOT_PROVIDED(fmi3SetShiftFraction,
-                        (fmi3Instance c, const fmi3ValueReference[], size_t, const fmi3UInt64[], const fmi3UInt64[]))
-SPRINGBEAM_NOT_PROVIDED(fmi3EvaluateDiscreteStates, (fmi3Instance c))
-SPRINGBEAM_NOT_PROVIDED(fmi3EnterConfigurationMode, (fmi3Instance c))
-SPRINGBEAM_NOT_PROVIDED(fmi3ExitConfigurationMode, (fmi3Instance c))
-SPRINGBEAM_NOT_PROVIDED(fmi3EnterContinuousTimeMode, (fmi3Instance c))
-SPRINGBEAM_NOT_PROVIDED(fmi3CompletedIntegratorStep, (fmi3Instance c, fmi3Boolean, fmi3Boolean*, fmi3Boolean*))
-SPRINGBEAM_NOT_PROVIDED(fmi3SetTime, (fmi3Instance c, fmi3Float64))
-SPRINGBEAM_NOT_PROVIDED(fmi3SetContinuousStates, (fmi3Instance c, const fmi3Float64[], size_t))
-SPRINGBEAM_NOT_PROVIDED(fmi3GetContinuousStateDerivatives, (fmi3Instance c, fmi3Float64[], size_t))
-SPRINGBEAM_NOT_PROVIDED(fmi3GetEventIndicators, (fmi3Instance c, fmi3Float64[], size_t))
-SPRINGBEAM_NOT_PROVIDED(fmi3GetContinuousStates, (fmi3Instance c, fmi3Float64[], size_t))
-SPRINGBEAM_NOT_PROVIDED(fmi3GetNominalsOfContinuousStates, (fmi3Instance c, fmi3Float64[], size_t))
-SPRINGBEAM_NOT_PROVIDED(fmi3GetNumberOfEventIndicators, (fmi3Instance c, size_t*))
-SPRINGBEAM_NOT_PROVIDED(fmi3GetNumberOfContinuousStates, (fmi3Instance c, size_t*))
-SPRINGBEAM_NOT_PROVIDED(fmi3ActivateModelPartition, (fmi3Instance c, fmi3ValueReference, fmi3Float64))
+SPRINGBEAM_NOT_PROVIDED(GetNumberOfVariableDependencies, fmi3Instance c, fmi3ValueReference, size_t*)
+SPRINGBEAM_NOT_PROVIDED(GetVariableDependencies, fmi3Instance c, fmi3ValueReference, size_t[], fmi3ValueReference[],
+                        size_t[], fmi3DependencyKind[], size_t)
+SPRINGBEAM_NOT_PROVIDED(GetAdjointDerivative, fmi3Instance c, const fmi3ValueReference[], size_t,
+                        const fmi3ValueReference[], size_t, const fmi3Float64[], size_t, fmi3Float64[], size_t)
+SPRINGBEAM_NOT_PROVIDED(GetIntervalDecimal, fmi3Instance c, const fmi3ValueReference[], size_t, fmi3Float64[],
+                        fmi3IntervalQualifier[])
+SPRINGBEAM_NOT_PROVIDED(GetIntervalFraction, fmi3Instance c, const fmi3ValueReference[], size_t, fmi3UInt64[],
+                        fmi3UInt64[], fmi3IntervalQualifier[])
+SPRINGBEAM_NOT_PROVIDED(GetShiftDecimal, fmi3Instance c, const fmi3ValueReference[], size_t, fmi3Float64[])
+SPRINGBEAM_NOT_PROVIDED(GetShiftFraction, fmi3Instance c, const fmi3ValueReference[], size_t, fmi3UInt64[],
+                        fmi3UInt64[])
+SPRINGBEAM_NOT_PROVIDED(SetIntervalDecimal, fmi3Instance c, const fmi3ValueReference[], size_t, const fmi3Float64[])
+SPRINGBEAM_NOT_PROVIDED(SetIntervalFraction, fmi3Instance c, const fmi3ValueReference[], size_t, const fmi3UInt64[],
+                        const fmi3UInt64[])
+SPRINGBEAM_NOT_PROVIDED(SetShiftDecimal, fmi3Instance c, const fmi3ValueReference[], size_t, const fmi3Float64[])
+SPRINGBEAM_NOT_PROVIDED(SetShiftFraction, fmi3Instance c, const fmi3ValueReference[], size_t, const fmi3UInt64[],
+                        const fmi3UInt64[])
+SPRINGBEAM_NOT_PROVIDED(EvaluateDiscreteStates, fmi3Instance c)
+SPRINGBEAM_NOT_PROVIDED(EnterConfigurationMode, fmi3Instance c)
+SPRINGBEAM_NOT_PROVIDED(ExitConfigurationMode, fmi3Instance c)
+SPRINGBEAM_NOT_PROVIDED(EnterContinuousTimeMode, fmi3Instance c)
+SPRINGBEAM_NOT_PROVIDED(CompletedIntegratorStep, fmi3Instance c, fmi3Boolean, fmi3Boolean*, fmi3Boolean*)
+SPRINGBEAM_NOT_PROVIDED(SetTime, fmi3Instance c, fmi3Float64)
+SPRINGBEAM_NOT_PROVIDED(SetContinuousStates, fmi3Instance c, const fmi3Float64[], size_t)
+SPRINGBEAM_NOT_PROVIDED(GetContinuousStateDerivatives, fmi3Instance c, fmi3Float64[], size_t)
+SPRINGBEAM_NOT_PROVIDED(GetEventIndicators, fmi3Instance c, fmi3Float64[], size_t)
+SPRINGBEAM_NOT_PROVIDED(GetContinuousStates, fmi3Instance c, fmi3Float64[], size_t)
+SPRINGBEAM_NOT_PROVIDED(GetNominalsOfContinuousStates, fmi3Instance c, fmi3Float64[], size_t)
+SPRINGBEAM_NOT_PROVIDED(GetNumberOfEventIndicators, fmi3Instance c, size_t*)
+SPRINGBEAM_NOT_PROVIDED(GetNumberOfContinuousStates, fmi3Instance c, size_t*)
+SPRINGBEAM_NOT_PROVIDED(ActivateModelPartition, fmi3Instance c, fmi3ValueReference, fmi3Float64)
 #undef SPRINGBEAM_NOT_PROVIDED
 
 }  // extern "C"

@@ -14,37 +14,32 @@ namespace {
 
 const char* name(Type type) { return type_names[static_cast<int>(type)]; }
 
-double finite(const Variable& v, double value) {
-  if (!std::isfinite(value)) {
-    throw std::invalid_argument("'" + v.name + "' = " + number(value) + " is not finite: the inputs are too large");
-  }
+[[noreturn]] void refuse(const Variable& v, double value, const std::string& why) {
+  throw std::invalid_argument("'" + v.name + "' = " + number(value) + why);
+}
+
+double finite(const Variable& v, double value, const char* why = " is not finite") {
+  if (!std::isfinite(value)) refuse(v, value, why);
   return value;
 }
 
+constexpr const char* too_large = " is not finite: the inputs are too large";
+
 void require_allowed(const Variable& v, double value) {
-  if (!std::isfinite(value)) throw std::invalid_argument("'" + v.name + "' = " + number(value) + " is not finite");
-  if (value <= 0.0 && v.min == std::numeric_limits<double>::min()) {
-    throw std::invalid_argument("'" + v.name + "' = " + number(value) + " is not > 0");
-  }
-  if (value < v.min || value > v.max) {
-    throw std::invalid_argument("'" + v.name + "' = " + number(value) + " is not in [" + number(v.min) + ", " +
-                                number(v.max) + "]");
-  }
+  finite(v, value);
+  if (value <= 0.0 && v.min == std::numeric_limits<double>::min()) refuse(v, value, " is not > 0");
+  if (value < v.min || value > v.max) refuse(v, value, " is not in [" + number(v.min) + ", " + number(v.max) + "]");
 }
 
 /// Of a state that came from outside.
 void require_allowed(const Variable& v, const Polynomial& p) {
   require_allowed(v, p[0]);
   const bool whole = p[0] == std::floor(p[0]) && std::abs(p[0]) <= std::numeric_limits<int>::max();
-  if ((v.type == Type::integer && !whole) || (v.type == Type::boolean && p[0] != 0.0 && p[0] != 1.0)) {
-    throw std::invalid_argument("'" + v.name + "' = " + number(p[0]) + " is not of its type, " + name(v.type));
-  }
-  const auto possible = [&v](double derivative) {
-    return std::isnan(derivative) || (v.continuous_input() && std::isfinite(derivative));
-  };
-  if (!possible(p[1]) || !possible(p[2])) {
-    throw std::invalid_argument("'" + v.name + "' has impossible derivatives");
-  }
+  if ((v.type == Type::integer && !whole) || (v.type == Type::boolean && p[0] != 0.0 && p[0] != 1.0))
+    refuse(v, p[0], std::string(" is not of its type, ") + name(v.type));
+  for (const double derivative : {p[1], p[2]})
+    if (!std::isnan(derivative) && !(v.continuous_input() && std::isfinite(derivative)))
+      refuse(v, derivative, " is no derivative that it can have");
 }
 
 bool is_setting(const Variable& v) { return v.causality == Causality::parameter || v.exact; }
@@ -67,6 +62,7 @@ Instance::Instance() : table_(table()), place_(table_.variables.size()) {
 void Instance::reset() {
   model_ = make_model();
   progress = {};
+  built_ = false;
   values_.clear();
   for (const Variable* v : settable_) values_.push_back({v->start, unset, unset});
 }
@@ -79,29 +75,24 @@ void Instance::setup(double start, double stop, double tolerance) {
   progress.time = start;
   progress.stop_time = stop;
   const double usable = tolerance > 0.0 && tolerance < 1.0 ? tolerance : 0.0;
-  if (usable != progress.tolerance) progress.built = false;
+  if (usable != progress.tolerance) built_ = false;
   progress.tolerance = usable;
 }
 
 void Instance::ensure_built() {
-  if (progress.built) return;
+  if (built_) return;
   for (std::size_t i = 0; i < n_settings_; ++i) settable_[i]->set(*model_, values_[i]);
   model_->build(progress.tolerance);
-  for (const Variable& v : table_.variables) {
-    const double value = v.get ? v.get(*model_) : 0.0;
-    if (!std::isfinite(value)) {
-      throw std::invalid_argument("the parameters leave the range of floating-point numbers: '" + v.name +
-                                  "' would be " + number(value));
-    }
-  }
-  progress.built = true;
+  for (const Variable& v : table_.variables)
+    if (v.get) finite(v, v.get(*model_), ": the parameters leave the range of floating-point numbers");
+  built_ = true;
   for (std::size_t i = n_settings_; i < settable_.size(); ++i) settable_[i]->set(*model_, values_[i]);
   observe();
 }
 
 void Instance::changed(std::size_t place) {
-  if (place < n_settings_) progress.built = false;
-  if (!progress.built) return;
+  if (place < n_settings_) built_ = false;
+  if (!built_) return;
   settable_[place]->set(*model_, values_[place]);
   observe();
 }
@@ -126,39 +117,37 @@ double Instance::get(unsigned reference, Type type) {
     throw std::invalid_argument("'" + v.name + "' is not known before initialization mode");
   }
   ensure_built();
-  return finite(v, v.get(*model_));
+  return finite(v, v.get(*model_), too_large);
+}
+
+const Variable& Instance::continuous_input(unsigned reference, const char* what) const {
+  const Variable& v = variable(reference, Type::real, what);
+  if (!v.continuous_input()) throw std::invalid_argument("'" + v.name + "' is not an input that takes derivatives");
+  return v;
 }
 
 void Instance::set(unsigned reference, Type type, double value) {
   const Variable& v = variable(reference, type, "set");
-  if (v.get && !v.exact) {
-    throw std::invalid_argument("'" + v.name + "' is calculated and cannot be set");
-  }
-  if (is_setting(v) && (progress.phase & ~(instantiated | initialization)) != 0) {
+  if (v.get && !v.exact) throw std::invalid_argument("'" + v.name + "' is calculated and cannot be set");
+  if (is_setting(v) && (progress.phase & ~(instantiated | initialization)) != 0)
     throw std::invalid_argument("'" + v.name + "' can only be set before the end of initialization mode");
-  }
   require_allowed(v, value);
   values_[place_[reference]][0] = value;
   changed(place_[reference]);
 }
 
 void Instance::set_derivative(unsigned reference, int order, double value) {
-  const Variable& v = variable(reference, Type::real, "set a derivative of");
-  if (!v.continuous_input()) throw std::invalid_argument("'" + v.name + "' is not an input that takes derivatives");
+  const Variable& v = continuous_input(reference, "set a derivative of");
   if (order < 1 || order > max_input_derivative_order) {
     throw std::invalid_argument("derivative order " + std::to_string(order) + " of '" + v.name +
                                 "': orders 1 and 2 are possible");
   }
-  if (!std::isfinite(value)) {
-    throw std::invalid_argument("derivative of '" + v.name + "' = " + number(value) + " is not finite");
-  }
-  values_[place_[reference]][static_cast<std::size_t>(order)] = value;
+  values_[place_[reference]][static_cast<std::size_t>(order)] = finite(v, value, " is not finite: a derivative of it");
   changed(place_[reference]);
 }
 
 double Instance::input_derivative(unsigned reference, int order) const {
-  const Variable& v = variable(reference, Type::real, "get a derivative of");
-  if (!v.continuous_input()) throw std::invalid_argument("'" + v.name + "' is not an input that takes derivatives");
+  continuous_input(reference, "get a derivative of");
   const double value = values_[place_[reference]].at(static_cast<std::size_t>(order));
   return std::isnan(value) ? 0.0 : value;
 }
@@ -171,7 +160,7 @@ double Instance::output_derivative(unsigned reference, int order) {
                                 "' is not available: outputs have that of order 1");
   }
   ensure_built();
-  return finite(v, v.derivative(*model_));
+  return finite(v, v.derivative(*model_), too_large);
 }
 
 double Instance::partial_derivative(unsigned unknown, unsigned known) {
@@ -186,7 +175,7 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
   for (const Dependency& d : of.dependencies) {
     if (d.input != by.name || d.order != order) continue;
     const double partial = d.partial(*model_);
-    return std::isnan(partial) ? difference(of, known) : finite(of, partial);
+    return std::isnan(partial) ? difference(of, known) : finite(of, partial, too_large);
   }
   const auto& at_start = of.initial_dependencies;
   const bool follows = starting && order == 0 && std::find(at_start.begin(), at_start.end(), by.name) != at_start.end();
@@ -218,7 +207,7 @@ double Instance::difference(const Variable& of, unsigned known) {
   double above = of.get(*model_), below = above;
   const double high = beside(x + change, above), low = beside(x - change, below);
   put(x);
-  return finite(of, (above - below) / (high - low));
+  return finite(of, (above - below) / (high - low), too_large);
 }
 
 Model::Reached Instance::step(double time, double size, bool to_event) {
@@ -274,21 +263,21 @@ void Instance::save(Snapshot& s) const {
   s.values = values_;
   s.foreign = false;
   s.numerics.clear();
-  if (progress.built) model_->save(s.numerics);
+  if (built_) model_->save(s.numerics);
 }
 
 void Instance::restore(Snapshot& s) {
   if (s.foreign)
     for (std::size_t i = 0; i < settable_.size(); ++i) require_allowed(*settable_[i], s.values[i]);
-  progress.built = progress.built && s.progress.built && progress.tolerance == s.progress.tolerance;
+  built_ = built_ && !s.numerics.empty() && progress.tolerance == s.progress.tolerance;
   progress.tolerance = s.progress.tolerance;
   for (std::size_t i = 0; i < settable_.size(); ++i) {
     if (std::memcmp(&values_[i], &s.values[i], sizeof values_[i]) == 0) continue;  // which NaN do not equal
     values_[i] = s.values[i];
-    progress.built = progress.built && i >= n_settings_;
-    if (progress.built) settable_[i]->set(*model_, values_[i]);
+    built_ = built_ && i >= n_settings_;
+    if (built_) settable_[i]->set(*model_, values_[i]);
   }
-  if (s.progress.built) {
+  if (!s.numerics.empty()) {
     ensure_built();
     if (s.foreign) model_->require_state(s.numerics);
     model_->restore(s.numerics);

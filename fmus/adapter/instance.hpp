@@ -51,6 +51,7 @@ class Instance {
 
  private:
   const Variable& variable(unsigned reference, Type type, const char* what) const;
+  const Variable& continuous_input(unsigned reference, const char* what) const;
   void observe() { model_->observe((progress.phase & (instantiated | initialization)) != 0); }
   void settle(bool stepped);
   double difference(const Variable& of, unsigned known);  ///< the derivative by differences
@@ -58,6 +59,7 @@ class Instance {
 
   const Table& table_;
   std::unique_ptr<Model> model_;
+  bool built_ = false;                     ///< it is, with the present settings
   std::vector<const Variable*> settable_;  ///< what is set before the start, then the inputs
   std::size_t n_settings_ = 0;             ///< the former
   std::vector<std::size_t> place_;         ///< of every variable, among these

@@ -1,10 +1,11 @@
-// A saved FMU state, and its serialised form: a header (GUID, checksum), then doubles. No pointers; readable by
-// any instance of the same FMU in any process.
+// A saved FMU state, and its serialised form: the GUID, a checksum, then doubles. No pointers; readable by any instance
+// of the same FMU in any process.
 #pragma once
 
 #include <cstddef>
 #include <limits>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "model.hpp"
@@ -25,10 +26,8 @@ enum Phase : unsigned {
 /// How far an instance is in its life.
 struct Progress {
   Phase phase = instantiated;
-  int last_status = 0;  ///< of the last step
   double time = 0.0, stop_time = std::numeric_limits<double>::infinity();
   double tolerance = 0.0;  ///< relative, asked for by the importer; 0 = none
-  bool built = false;      ///< the model is, with the present settings
 };
 
 struct Snapshot {
@@ -38,10 +37,9 @@ struct Snapshot {
   std::vector<double> numerics;    ///< of the model; empty if not built
 };
 
-std::size_t serialized_size(const Snapshot& snapshot);
-void serialize(const Snapshot& snapshot, const std::string& guid, char* bytes);
+std::string serialized(const Snapshot& snapshot);
 
-/// @throws std::invalid_argument saying why the bytes are not a state of this FMU
-Snapshot deserialize(const char* bytes, std::size_t size, const std::string& guid, std::size_t n_values);
+/// @throws std::invalid_argument saying why the bytes are not a state of this FMU, with values of `n_values` variables
+Snapshot deserialized(std::string_view bytes, std::size_t n_values);
 
 }  // namespace fmi

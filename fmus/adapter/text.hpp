@@ -2,9 +2,9 @@
 #pragma once
 
 #include <charconv>
-#include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace fmi {
 
@@ -15,8 +15,8 @@ inline std::string number(double value) {
 }
 
 /// FNV-1a.
-inline std::uint64_t hash(const char* bytes, std::size_t size, std::uint64_t seed = 0xcbf29ce484222325ULL) {
-  for (std::size_t i = 0; i < size; ++i) seed = (seed ^ static_cast<unsigned char>(bytes[i])) * 0x100000001b3ULL;
+inline std::uint64_t hash(std::string_view bytes, std::uint64_t seed = 0xcbf29ce484222325ULL) {
+  for (const char byte : bytes) seed = (seed ^ static_cast<unsigned char>(byte)) * 0x100000001b3ULL;
   return seed;
 }
 

@@ -75,13 +75,17 @@ def test_debug_messages_only_when_asked_for(case):
     assert len(chatty.messages) == 3
 
 
+NO_CATEGORY = "there is no log category 'logEverything'"
+
+
 def test_declared_log_categories_are_accepted(case):
     k = case.instance()
     root = ET.parse(case.folder / "modelDescription.xml").getroot()
     names = [c.get("name", "").encode() for c in root.iter("Category")]
     assert len(names) == 5
     assert k.call("SetDebugLogging", 1, len(names), (ct.c_char_p * len(names))(*names)) == OK
-    assert k.call("SetDebugLogging", 1, 1, (ct.c_char_p * 1)(b"logEverything")) == WARNING
+    assert k.call("SetDebugLogging", 1, 1, (ct.c_char_p * 1)(b"logEverything")) == OK
+    assert k.messages[-1] == (WARNING, "logStatusWarning", f"{case.spelt('SetDebugLogging')}: " + NO_CATEGORY)
 
 
 def test_types_platform_and_version(case, version):

@@ -25,7 +25,6 @@ struct Adapter {
   fmi3Instance c = nullptr;
   Experiment experiment;
   std::map<void*, Experiment> saved;
-  fmi2Status last = fmi2OK;
   double reached = 0.0;
 };
 
@@ -49,7 +48,7 @@ fmi2Status to2(fmi3Status status) { return static_cast<fmi2Status>(status); }
 fmi2Status refuse(const Adapter* a) { return to2(fmi3EnterConfigurationMode(a->c)); }
 
 bool may_be_initialized(const Adapter* a) {
-  // The phase is the first number of a state (snapshot.cpp), after its header.
+  // The phase is the first number of a state, after the GUID and a checksum (snapshot.cpp).
   fmi3FMUState state = nullptr;
   std::size_t size = 0;
   double phase = 0.0;
@@ -57,7 +56,7 @@ bool may_be_initialized(const Adapter* a) {
   std::vector<fmi3Byte> bytes(size);
   fmi3SerializeFMUState(a->c, state, bytes.data(), size);
   fmi3FreeFMUState(a->c, &state);
-  std::copy_n(bytes.begin() + 48, sizeof phase, reinterpret_cast<fmi3Byte*>(&phase));
+  std::copy_n(bytes.begin() + fmi::guid().size() + 8, sizeof phase, reinterpret_cast<fmi3Byte*>(&phase));
   return phase == fmi::instantiated;
 }
 
@@ -156,7 +155,6 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
   Adapter* const a = adapter(c, __func__);
   const fmi3Status status = fmi3ExitInitializationMode(a->c);
-  a->last = fmi2OK;
   return to2(status == fmi3OK ? handle_event(a) : status);
 }
 fmi2Status fmi2Terminate(fmi2Component c) { return to2(fmi3Terminate(adapter(c, __func__)->c)); }
@@ -269,12 +267,11 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
     a->reached = began;
   }
   if (a->c) fmi3FreeFMUState(a->c, &before);
-  return a->last = to2(status);
+  return to2(status);
 }
 fmi2Status fmi2CancelStep(fmi2Component c) { return refuse(adapter(c, __func__)); }
-fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status* value) {
-  Adapter* const a = adapter(c, __func__);
-  return tell(a, s == fmi2DoStepStatus, value, a->last);
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind, fmi2Status* value) {
+  return tell(adapter(c, __func__), false, value, fmi2OK);
 }
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real* value) {
   Adapter* const a = adapter(c, __func__);
@@ -286,8 +283,8 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind, fmi2Integ
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean* value) {
   return tell(adapter(c, __func__), s == fmi2Terminated, value, fmi2False);
 }
-fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String* value) {
-  return tell(adapter(c, __func__), s == fmi2PendingStatus, value, static_cast<fmi2String>("no step is pending"));
+fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind, fmi2String* value) {
+  return tell(adapter(c, __func__), false, value, static_cast<fmi2String>(""));
 }
 
 }  // extern "C"

@@ -918,9 +918,9 @@ class Episode {
     k.states.push_back(made);
   }
 
-  /// Header of snapshot.cpp: GUID (40), checksum; then doubles.
+  /// Header of snapshot.cpp: GUID, checksum; then doubles.
   void forge(std::vector<char>& blob) {
-    constexpr std::size_t header = 48, checksum_at = 40;
+    const std::size_t checksum_at = guid().size(), header = checksum_at + sizeof(std::uint64_t);
     if (blob.size() <= header) return;
     std::size_t n = (blob.size() - header) / sizeof(double);
     if (random_.chance(0.2)) {
@@ -930,10 +930,10 @@ class Episode {
     const std::size_t changes = 1 + random_.below(4);
     for (std::size_t i = 0; n > 0 && i < changes; ++i) {
       const double value = random_.chance(0.3) ? static_cast<double>(random_.any_int()) : random_.anything();
-      const std::size_t at = random_.chance(0.4) ? random_.below(std::min<std::size_t>(n, 7)) : random_.below(n);
+      const std::size_t at = random_.chance(0.4) ? random_.below(std::min<std::size_t>(n, 4)) : random_.below(n);
       std::memcpy(&blob[header + at * sizeof value], &value, sizeof value);
     }
-    const std::uint64_t hash = fmi::hash(&blob[header], blob.size() - header);
+    const std::uint64_t hash = fmi::hash({&blob[header], blob.size() - header});
     std::memcpy(&blob[checksum_at], &hash, sizeof hash);
   }
 
@@ -945,11 +945,7 @@ class Episode {
       case 0: {
         fmi2Status value = fmi2OK;
         fmi2Status* to = absurd() ? nullptr : &value;
-        k.call("fmi2GetStatus", stepped,
-               !to                        ? error_status
-               : kind == fmi2DoStepStatus ? ok
-                                          : discard,
-               "", [&] { return fmi2GetStatus(k.c, kind, to); });
+        k.call("fmi2GetStatus", stepped, to ? discard : error_status, "", [&] { return fmi2GetStatus(k.c, kind, to); });
         return;
       }
       case 1: {
@@ -971,8 +967,7 @@ class Episode {
       }
       default: {
         fmi2String value = nullptr;
-        k.call("fmi2GetStringStatus", stepped, kind == fmi2PendingStatus ? ok : discard, "",
-               [&] { return fmi2GetStringStatus(k.c, kind, &value); });
+        k.call("fmi2GetStringStatus", stepped, discard, "", [&] { return fmi2GetStringStatus(k.c, kind, &value); });
         return;
       }
     }
@@ -981,16 +976,13 @@ class Episode {
   void debug_logging(Instance& k) {
     static const std::vector<const char*> names{"logAll", "logEvents", "logStatusError", "%n%s", "", "colour"};
     std::vector<fmi2String> chosen;
-    bool known = true, null = false;
-    for (std::size_t i = 0; i < random_.below(4); ++i) {
-      chosen.push_back(random_.pick(names));
-      known = known && std::strncmp(chosen.back(), "log", 3) == 0;
-    }
+    bool null = false;
+    for (std::size_t i = 0; i < random_.below(4); ++i) chosen.push_back(random_.pick(names));
     if (!chosen.empty() && absurd()) chosen.back() = nullptr, null = true;
     const bool on = random_.chance(0.2);
     const bool before = k.logging;
     k.logging = true;  // with categories that are not there it may say so and succeed
-    const unsigned expected = null ? error_status : known ? ok : warning;
+    const unsigned expected = null ? error_status : ok;
     const fmi2Status status = k.call("fmi2SetDebugLogging", any_phase, expected, "",
                                      [&] { return fmi2SetDebugLogging(k.c, on, chosen.size(), chosen.data()); });
     k.logging = status == fmi2Error ? before : on;
