@@ -45,6 +45,8 @@ def _gauss(points: int) -> list[tuple[float, float]]:
     return list(zip(nodes.tolist(), weights.tolist(), strict=True))
 
 
+#: Rule for a p̃ of degree 1 that changes so little that ΔΦ/Δp would lose digits: exact to rounding.
+_OF_LITTLE = _gauss(3)
 #: Rules for a p̃ of degree 1, 2, 3 that keeps its size, and for one that keeps off zero.
 _FEW, _MANY = [_gauss(4), _gauss(5), _gauss(6)], _gauss(8)
 #: The rule for a piece between zeros, from 0 to 1. It is graded towards both ends, 3t² − 2t³ of the length: a power of
@@ -76,11 +78,19 @@ class Projection:
 
         Raises OverflowError where no double holds it.
         """
-        if self._is_quotient and _changes(start, x[0]):
-            return [(self.law.potential(x[0]) - self.law.potential(start)) / (x[0] - start)]
+        law = self.law.force
+        if self._is_quotient:
+            end = x[0]
+            if _changes(start, end):
+                mean = (self.law.potential(end) - self.law.potential(start)) / (end - start)
+            else:
+                middle, half = 0.5 * (start + end), 0.5 * (end - start)
+                mean = 0.5 * sum([weight * law(middle + s * half) for s, weight in _OF_LITTLE])
+            if not isfinite(mean):
+                raise OverflowError
+            return [mean]
         path = b0, b1, b2, b3 = _path(start, x)
         rule = self._quadrature(path, start, x[0])
-        law = self.law.force
         m0 = m1 = m2 = 0.0
         for s, weight in rule:
             m = weight * law(b0 + s * (b1 + s * (b2 + s * b3)))
