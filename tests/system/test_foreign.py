@@ -5,7 +5,7 @@ import os
 import signal
 import threading
 from itertools import product
-from pathlib import Path
+from multiprocessing.connection import Connection
 from time import sleep
 
 import numpy as np
@@ -281,8 +281,8 @@ def test_an_fmu_that_lies_is_found_before_the_run(fmu, lie):
         "velocity": "velocity 'v' is not the rate",
         "integral": "integral 'ix' is not that",
         "integral_2": "integral_2 'ix2' is not that",
-        "slopes": "canInterpolateInputs = true, but",
-        "crash": "crashed (SIGSEGV) in a step of the check before the run",
+        "slopes": "canInterpolateInputs = true, but a force that grows over a step is not followed",
+        "crash": "crashed (SIGSEGV) in its step at t = 0.04 s of the check before the run",
         "nan": "not finite",
         "energy": "energies named do not account",
         "early": "fmi3DoStep returned early, which it was not allowed to",
@@ -306,29 +306,57 @@ def test_a_function_that_is_needed_and_missing_is_named(fmu, version, lacks):
 
 @pytest.fixture
 def hanging(monkeypatch):
-    """Tell whether an FMU hangs, which it says itself; while it does, the clock of the process is an hour ahead."""
-    asked, ask, clock = [], isolated.FmuProcess.ask, isolated.monotonic
+    """Tell whether an FMU hangs, which it says itself; patience is then at its end, and an hour has passed."""
+    asked, ask, clock, poll = [], isolated.FmuProcess.ask, isolated.monotonic, Connection.poll
 
     def noted(self, *arguments):
-        asked.append(Path(self._folder.name) / "errors")
+        asked.append(self._errors)
         return ask(self, *arguments)
 
     def hangs():
         return any("hanging" in path.read_text() for path in asked[-1:] if path.exists())
 
+    def polled(self, patience):
+        while not poll(self, 0.05):
+            if hangs() and patience < 3600.0:
+                return False
+        return True
+
     monkeypatch.setattr(isolated.FmuProcess, "ask", noted)
     monkeypatch.setattr(isolated, "monotonic", lambda: clock() + 3600.0 * hangs())
+    monkeypatch.setattr(Connection, "poll", polled)
     return hangs
 
 
 @pytest.mark.usefixtures("hanging")
 def test_an_fmu_that_hangs_is_given_up(fmu):
-    with pytest.raises(FmuError, match="has not returned within 20 s from a step of the check before the run"):
+    said = r"has not returned within 20 s from its step at t = 0\.\d+ s of the check before the run"
+    with pytest.raises(FmuError, match=said):
         simulate(pair(fmu(), spring={"parameters": {"lie": oscillator.LIES["hang"]}}))
 
 
+def test_the_process_of_an_fmu_that_hangs_ends_with_the_master(fmu, hanging):
+    """That it is gone is what the process sees: nobody holds its standard input open."""
+    spec = pair(fmu(), spring={"parameters": {"lie": oscillator.LIES["late hang"]}}).lower
+    body = isolated.IsolatedBody(spec, False, 0.0, None)
+    process = body._process._process
+
+    def gone():
+        while not hanging():
+            sleep(0.01)
+        process.stdin.close()
+
+    ending = threading.Thread(target=gone)
+    body.PATIENCE = HANGS + 3600.0
+    ending.start()
+    with pytest.raises(FmuError, match=r"crashed \(exit code 1.*\) in its step at t = 1\.5 s"):
+        body.advance(1.5, 0.1, (0.0, 0.0, 0.0))
+    ending.join()
+    body.close()
+
+
 def test_ctrl_c_names_an_fmu_that_does_not_return(fmu, monkeypatch, hanging):
-    monkeypatch.setattr(isolated, "CALL_PATIENCE", HANGS + 3600.0)  # it is not given up before
+    monkeypatch.setattr(isolated.IsolatedBody, "PATIENCE", HANGS + 3600.0)  # it is not given up before
 
     def interrupting():
         while not hanging():

@@ -14,7 +14,8 @@ from .archive import fmu_directory, own_fmu
 from .elements import ELEMENTS
 from .fmu_bodies import FmuBeam, FmuSpring
 from .foreign import Findings
-from .isolated import IsolatedBody, examined
+from .isolated import IsolatedBody
+from .probe import examined
 from .protocol import Body, FmuError
 from .quasi_static import QuasiStaticBeam
 

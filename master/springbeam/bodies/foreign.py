@@ -9,10 +9,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -33,10 +33,25 @@ class Findings:
     """What `springbeam.bodies.probe` has found out about an FMU."""
 
     abilities: Abilities
-    mass: float  #: that a force meets at first [kg]
-    velocity: float  #: at the start [m/s]
-    H: float  #: a macro step, for trial steps [s]
+    mass: float = 1.0  #: that a force meets at first [kg]
+    velocity: float = 0.0  #: at the start [m/s]
+    H: float = 0.0  #: a macro step, for trial steps [s]
     faults: tuple[str, ...] = ()  #: what it says, or a scene says of it, and is not so
+
+
+def _promised(spec: ForeignFmu, says: Any) -> Abilities:
+    """Return what an FMU can do if all is true that it ``says`` and that its table names."""
+    state = bool(says.canGetAndSetFMUstate)
+    return Abilities(
+        state=state,
+        serialized=state and bool(says.canSerializeFMUstate),
+        any_size=bool(says.canHandleVariableCommunicationStepSize),
+        velocity=spec.velocity is not None,
+        integrals=0 if spec.integral is None else 1 if spec.integral_2 is None else 2,
+        slopes=2 if says.canInterpolateInputs else 0,
+        impulse=spec.impulse is not None,
+        energies=None not in (spec.kinetic_energy, spec.potential_energy),
+    )
 
 
 class ForeignState(NamedTuple):
@@ -61,7 +76,7 @@ class ForeignBody(FmuBody, EndLoaded):
     start_time
         [s].
     found
-        What was found out about it.
+        What was found out about it; by default that it can do what it says.
     """
 
     state: ForeignState
@@ -69,21 +84,20 @@ class ForeignBody(FmuBody, EndLoaded):
     #: Loads act on the end, and no input of the FMU is for them.
     expect_loads, set_loads = EndLoaded.expect_loads, EndLoaded.set_loads
 
-    def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings) -> None:
-        self._spec, self._found = spec, found
+    def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings | None) -> None:
+        fmu = Fmu(None, Path(spec.fmu), spec.parameters, start_time)
+        self._spec, self._found = spec, found or Findings(_promised(spec, fmu.says))
+        self.abilities = self._found.abilities
         names, energies = spec.named(spec.MOTION), spec.named(spec.ENERGIES)
         self._MOTION = tuple(name for name in names if name is not None)
         self._at = [None if name is None else self._MOTION.index(name) for name in names]
-        self._ENERGIES = tuple(name for name in energies if name is not None) if found.abilities.energies else ()
+        self._ENERGIES = tuple(name for name in energies if name is not None) if self.abilities.energies else ()
         self._IMPULSE = () if spec.impulse is None else (spec.impulse,)
-        self._FORCES, self._SLOPES = (spec.force,), found.abilities.slopes
+        self._FORCES, self._SLOPES = (spec.force,), self.abilities.slopes
         self._upward = 1.0 if upper else -1.0
         self.state = ForeignState(Motion(0.0, 0.0, 0.0, 0.0), time=start_time)
         self._size = 0.0  #: of the step that is being made [s]
         self._held: dict[float, float] = {}  #: holding forces [N] by displacement [m]
-        fmu = Fmu(None, Path(spec.fmu), spec.parameters, start_time)
-        state = found.abilities.state and bool(fmu.says.canGetAndSetFMUstate)
-        self.abilities = replace(found.abilities, state=state)
         super().__init__(fmu)
 
     def _prepare(self, fmu: Fmu) -> None:
@@ -105,8 +119,8 @@ class ForeignBody(FmuBody, EndLoaded):
         """Return motion, the work received, energies, doStep calls, and how often the state was set back."""
         return self.state.motion, self.state.received, self.energies(), self.steps, self.rewinds
 
-    def start_as_fast_as(self, velocity: float) -> None:
-        """Start with the ``velocity`` [m/s] of what it is tied to, where its own is not told but measured."""
+    def join(self, velocity: float) -> None:
+        """Let the end have the ``velocity`` [m/s] of what it is tied to, where its own is not told but measured."""
         if not self.abilities.velocity:
             self.state = self.state._replace(motion=self.state.motion._replace(velocity=velocity))
 

@@ -10,7 +10,6 @@ from math import inf
 
 from ..scene import Scene, SceneError
 from .abilities import Abilities, refusals
-from .isolated import IsolatedBody
 from .protocol import Body
 
 #: Velocities closer than this share are one where an end takes no impulse: told, and measured from displacements.
@@ -95,5 +94,4 @@ def _refuse_speeds(scene: Scene, upper: Body, lower: Body) -> None:
                 f"an impulse, which the body in [{table}] does not take; give it one (impulse of an FMU, apply_impulse "
                 'of a body of your own), let both start with one velocity, or use "link"'
             )
-        if isinstance(body, IsolatedBody):
-            body.start_as_fast_as(other.motion().velocity)
+        body.join(other.motion().velocity)

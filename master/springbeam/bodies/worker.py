@@ -3,61 +3,47 @@
 from __future__ import annotations
 
 import os
-import pickle
-import signal
 import sys
 import tempfile
 import threading
-from time import sleep
+from multiprocessing.connection import Connection
 from typing import Any
 
+from ..scene import SceneError
 from .foreign import ForeignBody
-from .isolated import FAILURES
-from .probe import Bench, examine
+from .protocol import BodyFailed, StepRefused
 
 
 def main() -> None:
-    """Answer requests from standard input on standard output; see `springbeam.bodies.isolated.FmuProcess.ask`."""
-    tempfile.tempdir, parent = sys.argv[1], int(sys.argv[2])
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what the FMU prints is no answer
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the master's
-    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-
-    def answer(*values: Any) -> None:
-        answers.write(pickle.dumps(values))
-        answers.flush()
-
-    body: ForeignBody | None = None
+    """Answer requests; see `springbeam.bodies.isolated.FmuProcess.ask`."""
+    tempfile.tempdir = sys.argv[1]
+    ends: list[Any] = [Connection(int(end)) for end in sys.argv[2:]]
+    requests, answers = ends
+    threading.Thread(target=_end_with_the_master, daemon=True).start()
+    body: Any = None
 
     def call(name: str, *arguments: Any) -> Any:
         nonlocal body
-        if name == "examine":
-            spec, upper, start_time, H = arguments
-            return examine(Bench(spec, upper, start_time, H, lambda stage: answer("stage", stage, None)))
-        if name == "make":
-            body = ForeignBody(*arguments)
-            return body.mass
-        assert body is not None
-        return getattr(body, name)(*arguments)
+        if name != "make":
+            return getattr(body, name)(*arguments)
+        body = ForeignBody(*arguments)
+        return body.mass, body.abilities
 
     while True:
+        value = None
         try:
-            calls = pickle.load(sys.stdin.buffer)
+            for asked in requests.recv():
+                value = call(*asked)
         except EOFError:
             return
-        try:
-            values = [call(*asked) for asked in calls]
-        except FAILURES as failure:
-            answer("failed", failure, None)
-        else:
-            answer("done", values[-1] if values else None, None if body is None else body.told())
+        except (BodyFailed, StepRefused, SceneError) as failure:
+            value = failure
+        answers.send((value, None if body is None else body.told()))
 
 
-def _end_with(parent: int) -> None:
-    """End when the master does, also while the FMU does not return."""
-    while os.getppid() == parent:
-        sleep(1.0)
+def _end_with_the_master() -> None:
+    """End when the master does, which keeps standard input open; also while the FMU does not return."""
+    sys.stdin.read()
     os._exit(1)
 
 
