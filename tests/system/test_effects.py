@@ -5,7 +5,7 @@ import pytest
 
 from springbeam import SceneError, load_scene, simulate, with_changes
 from springbeam.scene import suspicions
-from springbeam.scene.effects import effects
+from springbeam.scene.suspicions import EFFECTS
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 
@@ -101,13 +101,13 @@ def test_a_key_is_told_where_it_changes_nothing(name, place):
 
 def test_every_row_of_the_table_is_looked_at():
     """But the law itself and the scheme, which other keys come with."""
-    listed = {place for effect in effects() for place in effect.keys}
+    listed = {rule.text[1:].partition("}")[0] for rule in EFFECTS}
     assert listed - VALUES.keys() == {"contact.law", "coupling.scheme"}
 
 
 def test_a_load_that_begins_after_the_run_is_told():
     late = with_changes(SOFT, loads=[{"on": "tip", "signal": "step", "start": 0.03}])
-    assert suspicions(late) == ["[loads.0] start = 0.03: plays no part here; the run ends at 0.03 s"]
+    assert suspicions(late) == ["[loads.0] start = 0.03: plays no part here; the run ends at [time] t_end = 0.03"]
     assert np.array_equal(simulate(late).y, simulate(SOFT).y)
 
 

@@ -1,8 +1,8 @@
 """What is simulated: scene files, their keys, and what follows from them before anything is built or loaded.
 
 Imports nothing else of the package. Floors, from below: ``tables`` (the keys), ``loads`` (those of ``[[loads]]``, and
-each load as a function of time) → ``statics`` → ``scene`` (all tables) → ``linearised`` (energies and frequencies)
-→ ``suspicions`` (warnings), ``rules`` (errors), ``messages`` → ``reading`` (files, overrides; start here) →
+each load as a function of time) → ``statics`` → ``scene`` (all tables) → ``linearised`` (energies and frequencies),
+``messages`` → ``suspicions`` (warnings) → ``rules`` (errors) → ``reading`` (files, overrides; start here) →
 ``resolution``, ``automatic``. ``shipped/`` has the scenes that come with the package.
 """
 

@@ -6,7 +6,9 @@ at rest. What a softening spring holds, and from which energy on it escapes, is 
 
 from __future__ import annotations
 
-from math import acos, cos, inf, pi, sqrt
+from math import inf, sqrt
+
+import numpy as np
 
 from .scene import Scene
 from .statics import initial_kinetic_energy, shear_stiffness, tip_compliance
@@ -88,6 +90,11 @@ def spring_energy(spring: Spring) -> float:
     return 0.5 * spring.mass * spring.initial_velocity**2 + _potential(spring, spring.equilibrium)
 
 
+def hilltop(spring: Spring) -> float:
+    """Return how far from 0 an unloaded softening spring is at the top of its potential, √(k1/|k2|) [m]."""
+    return sqrt(spring.linear_stiffness / -spring.cubic_stiffness)
+
+
 def largest_load(spring: Spring) -> float:
     """Return the largest load under which a softening spring has an equilibrium, 2/3 k1 √(k1/3|k2|) [N]."""
     return 2.0 / 3.0 * spring.linear_stiffness * sqrt(spring.linear_stiffness / (-3.0 * spring.cubic_stiffness))
@@ -96,15 +103,13 @@ def largest_load(spring: Spring) -> float:
 def well_depth(scene: Scene) -> float:
     """Return the potential [J] at the lower rim of a softening spring's well; a rim below the foundation is none.
 
-    −∞ where the load leaves no well. The rims are the outer roots of k1 y + k2 y³ = f_s: y = 2a cos θ with
-    a² = k1/3|k2| and cos 3θ = −f_s/(2|k2|a³) (Viète).
+    −∞ where a side has neither. The rims are the outer roots of k1 y + k2 y³ = f_s, that is of 4 x³ − 3 x + f_s/F = 0
+    with y = 2 x √(k1/3|k2|) and the `largest_load` F; beyond F only one side has a rim.
     """
     spring = scene.spring
     assert spring is not None
-    a = sqrt(spring.linear_stiffness / (-3.0 * spring.cubic_stiffness))
-    if not abs(spring.external_force) < largest_load(spring):
-        return -inf
-    theta = acos(-spring.external_force / largest_load(spring)) / 3.0
-    low, high = 2.0 * a * cos(theta + 2.0 / 3.0 * pi), 2.0 * a * cos(theta)
-    barred = scene.stop is not None and scene.stop.position > low
-    return min(_potential(spring, y) for y in ((high,) if barred else (low, high)))
+    x = np.roots([4.0, 0.0, -3.0, spring.external_force / largest_load(spring)])
+    rims = 2.0 / sqrt(3.0) * hilltop(spring) * x.real[(x.imag == 0.0) & (np.abs(x.real) > 0.5)]
+    barred = scene.stop is not None and all(scene.stop.position > y for y in rims if y < 0.0)
+    sides = [rims[rims > 0.0], *([] if barred else [rims[rims < 0.0]])]
+    return min(_potential(spring, float(side[0])) if len(side) else -inf for side in sides)

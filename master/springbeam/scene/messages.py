@@ -6,9 +6,9 @@ import datetime
 import difflib
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import UnionType
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
@@ -49,9 +49,35 @@ def at(scene: Scene, place: str) -> str:
     return f"[{table}] {key} = {toml_of(getattr(content, key))}"
 
 
-def filled(scene: Scene, text: str) -> str:
-    """Return ``text`` with keys and their values in place of ``{table.key}``."""
-    return re.sub(r"\{(\w+\.\w+)\}", lambda found: at(scene, found[1]), text)
+def filled(scene: Scene, text: str, **numbers: Any) -> str:
+    """Return ``text`` with keys and their values in place of ``{table.key}``, and ``numbers`` of ``{name:format}``."""
+    return re.sub(
+        r"\{([\w.]+):?([^}]*)\}",
+        lambda found: at(scene, found[1]) if "." in found[1] else format(numbers[found[1]], found[2]),
+        text,
+    )
+
+
+class Rule(NamedTuple):
+    """When something is told of a scene, and what; `filled` explains ``text``.
+
+    ``when`` and ``numbers`` get the scene. Of a rule for loads they get scene and load, and ``{load.key}`` is its key.
+    """
+
+    when: Callable[..., object]
+    text: str
+    numbers: Callable[..., Mapping[str, Any]] = lambda *of: {}
+
+
+def told(scene: Scene, rules: Iterable[Rule], of_loads: Sequence[Rule] = ()) -> Iterator[str]:
+    """Yield what ``rules`` tell of ``scene``, and ``of_loads`` of each of its loads."""
+    for rule in rules:
+        if rule.when(scene):
+            yield filled(scene, rule.text, **rule.numbers(scene))
+    for number, load in enumerate(scene.loads):
+        for rule in of_loads:
+            if rule.when(scene, load):
+                yield filled(scene, rule.text.replace("{load.", f"{{loads.{number}."), **rule.numbers(scene, load))
 
 
 def _alternatives(annotation: Any) -> tuple[Any, ...]:

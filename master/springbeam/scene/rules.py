@@ -1,235 +1,546 @@
-"""Rules for several keys together: scenes that cannot be run although each value is allowed.
-
-Most are lines of the table `combinations.FORBIDDEN`. Those that need numbers are functions here, which yield the lines
-to show; ``at("table.key")`` writes a key with its value.
-"""
+"""Scenes that cannot be run although each value is allowed: which keys and values do not go together."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping
+from itertools import product
+from typing import Any
 
-from .combinations import FORBIDDEN
-from .linearised import largest_load, spring_energy, well_depth
+from .laws import laws_that
+from .linearised import hilltop, largest_load, spring_energy, well_depth
 from .loads import MOST_POINTS
-from .messages import at, filled
-from .partners import ForeignFmu, PointMass, RigidWall
+from .messages import Rule, at, told
+from .partners import RigidWall
 from .scene import Scene
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
 from .suspicions import suspicions
-from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Spring
+from .tables import (
+    ALL_MODES_UP_TO,
+    DEFAULT_STEP,
+    MOST_ELEMENTS,
+    MOST_MODE_VALUES,
+    MOST_MODES,
+    ORDINARY_SCHEMES,
+    TOLERANCE_KEYS,
+    Beam,
+    Contact,
+    Spring,
+)
 
 #: More are a mistyped macro step: two weeks at a microsecond a step.
 MOST_MACRO_STEPS = 1e12
-
-#: Returns ``[table] key = value`` for ``"table.key"``.
-At = Callable[[str], str]
 
 
 def impossible(scene: Scene) -> list[str]:
     """Return why ``scene`` cannot be run, as lines ``[table] key = value: reason and remedy``; empty if it can."""
     try:
-        found = [filled(scene, text) for broken, text in FORBIDDEN if broken(scene)]
-        found += [line for check in _CHECKS for line in check(scene, partial(at, scene))]
-        if not found:
-            beam = scene.beam
-            if beam is not None and not 0.0 < min(quantities := _beam_quantities(beam)) <= max(quantities) < math.inf:
-                raise OverflowError
+        found = list(told(scene, FORBIDDEN, FORBIDDEN_LOADS))
+        if not found and (scene.beam is None or _is_finite(scene.beam)):
             suspicions(scene)  # what is certain to overflow once the scene runs overflows here
+            return []
     except ArithmeticError:
-        found = ["no double holds what follows from these values; check their units: " + _extreme(scene)]
-    return found
+        found = []
+    return found or [f"no double holds what follows from these values; check their units: {_most_extreme(scene)}"]
 
 
-def _extreme(scene: Scene) -> str:
-    """Return the value furthest from 1, with its place."""
-    sizes = {
-        place: abs(math.log10(abs(value)))
-        for place, value in scene.flat().items()
-        if "." in place and isinstance(value, (int, float)) and value != 0.0
-    }
-    return at(scene, max(sizes, key=lambda place: sizes[place]))
-
-
-def _beam_quantities(beam: Beam) -> tuple[float, ...]:
-    """Return ρA, ρI, EI, KAG, the squares of their wave speeds, and 1/k of the tip: what the equations are made of."""
+def _is_finite(beam: Beam) -> bool:
+    """Return whether doubles hold what the equations are made of: EI, KAG, ρA, ρI, squares of wave speeds, 1/k."""
     stiffness = (bending_stiffness(beam), shear_stiffness(beam))
     inertia = (beam.density * beam.area, beam.density * beam.second_moment_of_area)
-    speeds = tuple(k / m if m > 0.0 else math.inf for k, m in zip(stiffness, reversed(inertia), strict=True))
-    return (*stiffness, *inertia, *speeds, tip_compliance(beam))
+    speeds = (k / m for k, m in zip(stiffness, reversed(inertia), strict=True))
+    return all(0.0 < x < math.inf for x in (*stiffness, *inertia, *speeds, tip_compliance(beam)))
 
 
-def _partners_fit(scene: Scene, at: At) -> Iterator[str]:
-    """Yield what only our own bodies can do."""
-    contact = scene.contact
-    for table, body in scene.partners.items():
-        foreign = isinstance(body, ForeignFmu)
-        name = at(f"{table}.fmu" if foreign else f"{table}.element")
-        if contact.algorithm:
-            yield f"{name}: {at('contact.law')} is Algorithm 1, which needs our own bodies; take another law"
-        if scene.coupling.feedback != "two_way":
-            yield f'{name}: {at("coupling.feedback")} bounds what it neglects for our own bodies only; use "two_way"'
-        if scene.massless and contact.facts.strikes:
-            yield (
-                f"{name}: {at('contact.law')} needs our own spring below {at('beam.fidelity')}; "
-                'use law = "tie", or fidelity = "dynamic"'
-            )
-        end = "spring" if table == "spring" else "tip"
-        for number, load in enumerate(scene.loads):
-            on = at(f"loads.{number}.on")
-            if load.on == "beam" and table == "beam":
-                yield f'{on}: acts along our own beam; on = "tip" acts on the end of another body in [beam]'
-            elif load.on == "base" and foreign:
-                yield f'{on}: which masses are in the FMU of [{table}] is not known; give a force, on = "{end}"'
-            elif load.on == end and isinstance(body, RigidWall):
-                yield f"{on}: {name} moves under no load; take the load out"
+def _most_extreme(scene: Scene) -> str:
+    """Return the value furthest from 1, with its place."""
+    values = {place: x for place, x in scene.flat().items() if "." in place and isinstance(x, (int, float)) and x}
+    return at(scene, max(values, key=lambda place: abs(math.log10(abs(values[place])))))
 
 
-def _spring_holds(scene: Scene, at: At) -> Iterator[str]:
-    if (spring := scene.spring) is None:
-        return
-    k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
-    if (k2 < 0.0 and k1 <= 0.0) or (k1 < 0.0 and k2 <= 0.0):
-        yield (
-            f"{at('spring.linear_stiffness')}: with cubic_stiffness = {k2} the spring pushes away from y = 0 "
-            "everywhere; one of them must be greater than 0"
+def _one_way(scene: Scene) -> bool:
+    """Return whether one of our own bodies drives the other."""
+    return scene.coupling.feedback != "two_way" and scene.beam is not None and scene.spring is not None
+
+
+def _wall_below(scene: Scene) -> bool:
+    return isinstance(scene.lower, RigidWall)
+
+
+def _averages(scene: Scene) -> bool:
+    """Return whether our beam's integrator sees only the mean of a force over a step that the scene asks for."""
+    return scene.accuracy is None and scene.beam is not None and scene.beam.integrator == "generalized_alpha"
+
+
+def _let_go(scene: Scene) -> bool:
+    """Return whether our beam has no inertia and is let go at the start."""
+    return scene.beam is not None and scene.massless and scene.beam.approach == "elastic"
+
+
+def _of_others(when: Callable[[Scene], bool], text: str) -> Iterator[Rule]:
+    """Yield a rule for each body that is not our own, which ``{body}`` in its text names."""
+    for table, key in product(("beam", "spring"), ("fmu", "element")):
+        yield Rule(
+            lambda s, table=table, key=key: hasattr(s.under(table), key) and when(s),
+            text.replace("{body}", f"{{{table}.{key}}}"),
         )
-    elif k2 < 0.0 and abs(spring.equilibrium) >= (hilltop := math.sqrt(k1 / -k2)):
-        yield (
-            f"{at('spring.equilibrium')}: the softening spring escapes from beyond "
-            f"|y| = √(linear_stiffness/|cubic_stiffness|) = {hilltop:.6g} m; it must start inside"
+
+
+def _ends(scene: Scene) -> Mapping[str, Any]:
+    """Return where both ends are at the start, and what the tip meets, for the texts of rules."""
+    heights = {"tip": scene.tip_at_start, "top": scene.top_at_start, "target": scene.tip_target}
+    return {name: at(scene, height.key) for name, height in heights.items() if height is not None} | {
+        "height": heights["tip"].value if heights["tip"] else None,
+        "below": -(scene.initial_clearance or 0.0),
+        "t_c": scene.contact_time,
+    }
+
+
+def _alone_in_a_well(scene: Scene) -> bool:
+    """Return whether our spring softens, starts inside its hilltops, and has no beam of ours above it."""
+    spring = scene.spring
+    return (
+        spring is not None
+        and spring.softens
+        and abs(spring.equilibrium) < hilltop(spring)
+        and not (scene.static or scene.beam)
+    )
+
+
+def _waits(scene: Scene) -> bool:
+    """Return whether an undeformed tip arrives after the start; until then nothing is integrated."""
+    return 0.0 < (scene.contact_time or 0.0) < math.inf
+
+
+def _neglected(scene: Scene) -> float:
+    """Return the share of the penetration that a one-way coupling neglects at most.
+
+    A contact of depth p has V = 2 λ p, whatever p.
+    """
+    return 4.0 * scene.contact.stiffness / (scene.driver_stiffness or math.inf)
+
+
+def _given_step(scene: Scene) -> bool:
+    """Return whether the macro step is the scene's own, and not left to an accuracy or to tolerances."""
+    return scene.accuracy is None and scene.coupling.macro_step is not None
+
+
+def _points(scene: Scene) -> list[float]:
+    """Return where point forces act, as fractions of the beam's length."""
+    return sorted({load.at for load in scene.loads if load.at is not None})
+
+
+def _tolerance(scene: Scene) -> Mapping[str, str]:
+    """Return the first tolerance that the scene gives, for the texts of rules."""
+    given = (key for key in TOLERANCE_KEYS if getattr(scene.coupling, key) is not None)
+    return {"tolerance": at(scene, f"coupling.{next(given)}")}
+
+
+def _mesh(scene: Scene) -> Mapping[str, Any]:
+    """Return what the mesh of our beam has and allows, for the texts of rules."""
+    beam = scene.beam
+    assert beam is not None
+    degree = f" of element_degree = {beam.element_degree}" if beam.element_degree > 1 else ""
+    most = min(MOST_MODES, beam.unknowns // 2, MOST_MODE_VALUES // beam.unknowns)
+    return {
+        "mesh": f"n_elements = {beam.n_elements}{degree}",
+        "unknowns": beam.unknowns,
+        "most": most,
+        "fewer": min(64, most),
+        "degree": beam.element_degree,
+    }
+
+
+#: What makes a scene impossible.
+FORBIDDEN: tuple[Rule, ...] = (
+    # Bodies
+    Rule(lambda s: s.upper is None and s.lower is None, "no body: a scene needs [beam], [spring] or both"),
+    Rule(
+        lambda s: isinstance(s.upper, RigidWall) and (s.lower is None or _wall_below(s)),
+        "{beam.element}: nothing moves in this scene; give it a body in [spring]",
+    ),
+    Rule(
+        lambda s: _wall_below(s) and s.upper is None,
+        "{spring.element}: nothing moves in this scene; give it a body in [beam]",
+    ),
+    Rule(lambda s: _wall_below(s) and s.upper is not None and s.stop is not None, "{spring.element}: leave [stop] out"),
+    Rule(
+        lambda s: _wall_below(s) and s.contact.facts.strikes and s.contact.impact == "tip",
+        "{contact.impact}: gives the lower body the velocity of the tip, and {spring.element} cannot move; "
+        'use impact = "inelastic"',
+    ),
+    # A start at rest
+    Rule(
+        lambda s: s.static and s.beam is not None and s.beam.approach == "undeformed",
+        '{time.initial_state}: bends the beam from the start; use approach = "elastic" with it, not {beam.approach}',
+    ),
+    Rule(
+        lambda s: s.static and s.contact.algorithm,
+        "{time.initial_state}: {contact.law} starts as the paper says; leave initial_state out",
+    ),
+    *(
+        Rule(
+            lambda s, table=table: s.static and not isinstance(s.under(table), Beam | Spring | RigidWall | None),
+            f"{{time.initial_state}}: where the body in [{table}] rests is known of our own beam and spring and of a "
+            "rigid_wall only; leave initial_state out",
         )
-    elif k2 < 0.0 and not scene.static:
-        free = scene.beam is None and (spring.external_force > 0.0 or scene.stop is None)
-        if free and abs(spring.external_force) >= (largest := largest_load(spring)):
-            yield (
-                f"{at('spring.external_force')}: the softening spring can hold less than "
-                f"2/3 linear_stiffness √(linear_stiffness/3|cubic_stiffness|) = {largest:.6g} N"
-            )
-            return
+        for table in ("beam", "spring")
+    ),
+    *(
+        Rule(
+            lambda s, table=table, key=key: s.static and getattr(s.under(table), key, 0.0) != 0.0,
+            f"{{{table}.{key}}}: {{time.initial_state}} is at rest where the loads hold it; leave {key} out",
+        )
+        for table, key in (
+            ("beam", "initial_deflection_slope"),
+            ("beam", "initial_velocity_slope"),
+            ("spring", "initial_velocity"),
+        )
+    ),
+    # Laws
+    *(
+        Rule(
+            lambda s, key=key: key in s.contact.facts.needs and key not in s.contact.model_fields_set,
+            f"[contact] {key}: missing; {{contact.law}} needs it",
+        )
+        for key in Contact.model_fields
+    ),
+    Rule(
+        lambda s: s.contact.damping > 0.0 and "damping" not in s.contact.facts.takes,
+        f"{{contact.damping}}: {{contact.law}} has none; use 0.0, {laws_that(lambda law: 'damping' in law.takes)}",
+    ),
+    *(
+        Rule(
+            lambda s, table=table: s.contact.lasting and s.under(table) is None and not s.elastic_stop,
+            f"{{contact.law}}: joins a [beam] and a [spring]; this scene has no [{table}]",
+        )
+        for table in ("beam", "spring")
+    ),
+    Rule(
+        lambda s: s.contact.lasting and s.contact.soft and s.contact.stiffness == s.contact.damping == 0.0,
+        "{contact.stiffness}: {contact.law} needs a stiffness or a damping greater than 0",
+    ),
+    Rule(
+        lambda s: s.contact.lasting and s.contact.rigid and s.contact.impact != "inelastic",
+        '{contact.impact}: {contact.law} gives both ends one velocity; use "inelastic"',
+    ),
+    *(
+        Rule(
+            lambda s, table=table: s.contact.algorithm and s.under(table) is None,
+            f"{{contact.law}}: Algorithm 1 needs a [{table}]",
+        )
+        for table in ("beam", "spring", "stop")
+    ),
+    Rule(
+        lambda s: s.contact.algorithm and s.beam is not None and s.beam.damped_numerically,
+        "{beam.rho_inf}: {contact.law} is the midpoint rule, rho_inf = 1",
+    ),
+    Rule(
+        lambda s: s.contact.facts.opens and s.contact.stiffness == 0.0,
+        "{contact.stiffness}: with {contact.law} nothing would hold the bodies apart; it must be greater than 0",
+    ),
+    Rule(
+        lambda s: s.elastic_stop and s.stop is not None and s.stop.restitution != 1.0,
+        "{stop.restitution}: {contact.law} makes the stop elastic; leave restitution out, and give its loss by "
+        "[contact] damping",
+    ),
+    # Schemes
+    Rule(
+        lambda s: s.coupling.scheme == "hermite" and s.coupling.degree == 0,
+        "{coupling.degree}: {coupling.scheme} needs degree 1 or 2",
+    ),
+    Rule(
+        lambda s: s.coupling.scheme == "auto" and s.coupling.degree > 0,
+        "{coupling.degree}: {coupling.scheme} picks the degree; leave it out",
+    ),
+    Rule(
+        lambda s: s.coupling.scheme in ORDINARY_SCHEMES and s.coupling.degree > 1,
+        "{coupling.degree}: {coupling.scheme} extrapolates with degree 0 or 1",
+    ),
+    Rule(
+        lambda s: s.coupling.scheme in ORDINARY_SCHEMES and not s.contact.soft,
+        f"{{coupling.scheme}}: needs [contact] law = {laws_that(lambda law: law.soft)}; "
+        'use scheme = "energy" or "hermite" with {contact.law}',
+    ),
+    Rule(
+        lambda s: s.coupling.scheme == "hermite" and s.contact.soft,
+        '{coupling.scheme}: needs a rigid law; with {contact.law} use scheme = "energy", "gauss_seidel" or "jacobi"',
+    ),
+    Rule(
+        lambda s: s.coupling.scheme == "hermite" and s.contact.impact == "rest" and s.contact.facts.strikes and s.joins,
+        "{coupling.scheme}: gives both ends one velocity, but {contact.impact} leaves two; "
+        'use scheme = "energy" or impact = "inelastic"',
+    ),
+    Rule(
+        lambda s: _averages(s) and s.coupling.scheme == "hermite",
+        '{coupling.scheme}: {beam.integrator} sees only the mean of the contact force; use "modal", or '
+        'scheme = "energy"',
+    ),
+    Rule(
+        lambda s: _averages(s) and s.coupling.scheme != "hermite" and s.coupling.degree > 0,
+        '{coupling.degree}: {beam.integrator} sees only the mean of the contact force; use "modal", or degree = 0',
+    ),
+    # A beam without inertia
+    Rule(
+        lambda s: s.massless and s.lower is None,
+        '{beam.fidelity}: a beam without inertia needs a [spring]; use fidelity = "dynamic"',
+    ),
+    Rule(
+        lambda s: s.massless and s.contact.soft and s.contact.lasting and s.coupling.feedback != "beam_drives",
+        "{beam.fidelity}: the tip between the beam and {contact.law} would have no inertia; use "
+        'law = "tie" or fidelity = "dynamic"',
+    ),
+    Rule(
+        lambda s: s.massless and s.contact.facts.opens and s.coupling.feedback != "beam_drives",
+        "{beam.fidelity}: the tip between the beam and {contact.law} would have no inertia; use "
+        'law = "transmission", fidelity = "dynamic", or neglect the force on the beam: [coupling] '
+        'feedback = "beam_drives"',
+    ),
+    Rule(
+        lambda s: s.massless and s.contact.algorithm,
+        '{beam.fidelity}: {contact.law} integrates the beam by (62); use fidelity = "dynamic"',
+    ),
+    Rule(
+        lambda s: s.massless and s.contact.facts.strikes and s.contact.impact == "tip",
+        "{beam.fidelity}: {contact.impact} gives the spring the velocity of the tip, which without inertia has none "
+        'of its own; use impact = "inelastic"',
+    ),
+    Rule(
+        lambda s: s.massless and s.coupling.scheme == "hermite",
+        "{beam.fidelity}: {coupling.scheme} sets the velocity of the tip, which without inertia is the spring's; "
+        'use scheme = "energy"',
+    ),
+    Rule(
+        lambda s: _let_go(s) and s.beam is not None and s.beam.initial_velocity_slope != 0.0,
+        '{beam.initial_velocity_slope}: without inertia, and approach = "elastic", nothing carries a velocity; '
+        'use 0.0, or fidelity = "dynamic"',
+    ),
+    Rule(
+        lambda s: (
+            _let_go(s) and s.beam is not None and s.beam.alpha_b == 0.0 and s.beam.initial_deflection_slope != 0.0
+        ),
+        "{beam.initial_deflection_slope}: without inertia and damping the beam starts in its static deflection; "
+        'use 0.0, approach = "undeformed", or alpha_b > 0',
+    ),
+    # One-way coupling
+    Rule(
+        lambda s: s.coupling.feedback != "two_way" and not s.joins,
+        '{coupling.feedback}: there is one body only; use "two_way"',
+    ),
+    Rule(
+        lambda s: _one_way(s) and (not s.contact.facts.opens or s.coupling.scheme not in ("energy", "auto")),
+        f"{{coupling.feedback}}: needs [contact] law = {laws_that(lambda law: law.opens)} and [coupling] "
+        'scheme = "energy"; use "two_way" otherwise',
+    ),
+    Rule(
+        lambda s: _one_way(s) and s.contact.damping > 0.0,
+        '{coupling.feedback}: its error is unknown for a damped contact; use [contact] damping = 0.0 or "two_way"',
+    ),
+    Rule(
+        lambda s: (
+            _one_way(s)
+            and s.coupling.feedback == "spring_drives"
+            and s.spring is not None
+            and (s.spring.cubic_stiffness != 0.0 or s.spring.linear_stiffness <= 0.0)
+        ),
+        "{coupling.feedback}: its error is known only for a linear spring; linear_stiffness must be greater than 0 "
+        'and cubic_stiffness 0.0, or use "two_way"',
+    ),
+    # The mesh
+    Rule(
+        lambda s: s.beam and s.beam.n_elements * s.beam.element_degree > MOST_ELEMENTS,
+        f"{{beam.n_elements}}: times element_degree = {{degree}} it must be at most {MOST_ELEMENTS}",
+        _mesh,
+    ),
+    Rule(
+        lambda s: s.beam and s.beam.n_modes > s.beam.unknowns,
+        "{beam.n_modes}: {mesh} has only {unknowns} modes; use 0 for all of them",
+        _mesh,
+    ),
+    Rule(
+        lambda s: (
+            s.beam
+            and s.beam.integrator == "modal"
+            and s.beam.unknowns > ALL_MODES_UP_TO
+            and not 1 <= s.beam.n_modes <= _mesh(s)["most"]
+        ),
+        "{beam.n_modes}: of the {unknowns} modes of {mesh} at most {most} are found, all only up to "
+        f"{ALL_MODES_UP_TO}; use n_modes = {{fewer}}, fewer elements, or "
+        'integrator = "generalized_alpha"',
+        _mesh,
+    ),
+    # Heights
+    Rule(
+        lambda s: s.stop and s.top_at_start and s.stop.position >= s.top_at_start.value,
+        "{stop.position}: the foundation must lie below {top}",
+        _ends,
+    ),
+    Rule(
+        lambda s: (
+            s.contact.lasting
+            and s.contact.rigid
+            and s.tip_at_start
+            and s.top_at_start
+            and not math.isclose(s.tip_at_start.value, s.top_at_start.value, rel_tol=1e-12)
+        ),
+        "{tip}: the tip starts at {height:.6g} m, but {contact.law} holds it at {top}; let them start at one height, "
+        'or use "link"',
+        _ends,
+    ),
+    Rule(
+        lambda s: (s.initial_clearance or 0.0) < 0.0,
+        "{tip}: the tip starts {below:.6g} m below {target}; it must start there or above",
+        _ends,
+    ),
+    Rule(
+        lambda s: s.contact_time == math.inf and s.initial_clearance >= 0.0,
+        "{beam.initial_velocity_slope}: the undeformed tip never reaches {target}; "
+        'use a (more) negative initial_velocity_slope, or approach = "elastic"',
+        _ends,
+    ),
+    Rule(
+        lambda s: s.time.t_end < (s.contact_time or 0.0) < math.inf,
+        "{beam.initial_velocity_slope}: the undeformed tip reaches {target} not before t = {t_c:.6g} s, after "
+        '{time.t_end}; use a (more) negative initial_velocity_slope, or approach = "elastic"',
+        _ends,
+    ),
+    *(
+        Rule(
+            lambda s, key=key: _waits(s) and "spring" not in s.foreign and getattr(s.lower, key, 0.0) != 0.0,
+            f"{{spring.{key}}}: {{beam.approach}} holds everything until the tip arrives at t = {{t_c:.6g}} s; start "
+            'at rest, or use approach = "elastic"',
+            _ends,
+        )
+        for key in ("initial_velocity", "velocity")
+    ),
+    # A softening spring
+    Rule(
+        lambda s: s.spring and min(k := (s.spring.linear_stiffness, s.spring.cubic_stiffness)) < 0.0 >= max(k),
+        "{spring.linear_stiffness}: with {spring.cubic_stiffness} the spring pushes away from y = 0 everywhere; one of "
+        "them must be greater than 0",
+    ),
+    Rule(
+        lambda s: s.spring and s.spring.softens and abs(s.spring.equilibrium) >= hilltop(s.spring),
+        "{spring.equilibrium}: the softening spring escapes from beyond |y| = √(linear_stiffness/|cubic_stiffness|) = "
+        "{hilltop:.6g} m; it must start inside",
+        lambda s: {"hilltop": hilltop(s.spring)},
+    ),
+    Rule(
+        lambda s: _alone_in_a_well(s) and well_depth(s) == -math.inf,
+        "{spring.external_force}: the softening spring can hold less than "
+        "2/3 linear_stiffness √(linear_stiffness/3|cubic_stiffness|) = {largest:.6g} N",
+        lambda s: {"largest": largest_load(s.spring)},
+    ),
+    Rule(
         # Nothing takes energy away or pushes back: what is above the rim of the well runs over it.
-        elastic = scene.stop is None or scene.stop.restitution == 1.0
-        energy, depth = spring_energy(spring), well_depth(scene)
-        if scene.beam is None and spring.damping == 0.0 and elastic and energy > depth:
-            yield (
-                f"{at('spring.cubic_stiffness')}: the softening spring starts with {energy:.6g} J and escapes from a "
-                f"well {depth:.6g} J deep; use a smaller initial_velocity or external_force, an equilibrium nearer to "
-                "0, or a larger linear_stiffness"
-            )
+        lambda s: (
+            _alone_in_a_well(s)
+            and s.spring.damping == 0.0
+            and (s.stop is None or s.stop.restitution == 1.0)
+            and spring_energy(s.spring) > well_depth(s) > -math.inf
+        ),
+        "{spring.cubic_stiffness}: the softening spring starts with {energy:.6g} J and escapes from a well {depth:.6g} "
+        "J deep; use a smaller initial_velocity or external_force, an equilibrium nearer to 0, or a larger "
+        "linear_stiffness",
+        lambda s: {"energy": spring_energy(s.spring), "depth": well_depth(s)},
+    ),
+    # Bodies that are not our own
+    *_of_others(
+        lambda s: s.contact.algorithm,
+        "{body}: {contact.law} is Algorithm 1, which needs our own bodies; take another law",
+    ),
+    *_of_others(
+        lambda s: s.coupling.feedback != "two_way",
+        '{body}: {coupling.feedback} bounds what it neglects for our own bodies only; use "two_way"',
+    ),
+    *_of_others(
+        lambda s: s.massless and s.contact.facts.strikes,
+        '{body}: {contact.law} needs our own spring below {beam.fidelity}; use law = "tie", or fidelity = "dynamic"',
+    ),
+    # Steps; an accuracy picks scheme, degree and steps that go together
+    Rule(
+        lambda s: s.accuracy is None and s.coupling.adaptive and s.contact.algorithm,
+        "{tolerance}: {contact.law} is Algorithm 1, which has one macro_step",
+        _tolerance,
+    ),
+    Rule(
+        lambda s: s.accuracy is None and s.coupling.adaptive and s.coupling.scheme in ORDINARY_SCHEMES,
+        "{tolerance}: {coupling.scheme} never repeats a step; give macro_step instead",
+        _tolerance,
+    ),
+    Rule(
+        lambda s: _given_step(s) and s.time.t_end < s.coupling.H,
+        "{coupling.macro_step}{default}: must be at most {time.t_end}; give a smaller one, or an accuracy, which picks "
+        "one",
+        lambda s: {"default": ", the default" if s.coupling.H == DEFAULT_STEP else ""},
+    ),
+    Rule(
+        lambda s: _given_step(s) and s.time.t_end / s.coupling.H > MOST_MACRO_STEPS,
+        "{coupling.macro_step}: {time.t_end} would take {steps:.1e} macro steps; at most "
+        f"{MOST_MACRO_STEPS:.0e} are allowed",
+        lambda s: {"steps": s.time.t_end / s.coupling.H},
+    ),
+    Rule(
+        lambda s: (
+            s.contact.exponent == 1.0
+            and "exponent" in s.contact.facts.takes
+            and _neglected(s) > s.coupling.feedback_tolerance
+        ),
+        "{coupling.feedback}: neglects up to 4·stiffness/(stiffness of the driving end) = {share:.2g} of the "
+        'penetration; allowed is {coupling.feedback_tolerance}. Use "two_way", or allow more',
+        lambda s: {"share": _neglected(s)},
+    ),
+    # Loads
+    Rule(
+        lambda s: len(_points(s)) > MOST_POINTS,
+        "[[loads]]: point forces at {number} places, {places}; the beam takes them at "
+        f"{MOST_POINTS} at most. Put some at one place, or give them a shape",
+        lambda s: {"number": len(_points(s)), "places": ", ".join(f"{x:g}" for x in _points(s))},
+    ),
+)
 
-
-def _tip_arrives(scene: Scene, at: At) -> Iterator[str]:
-    tip, target, clearance, t_c = scene.tip_at_start, scene.tip_target, scene.initial_clearance, scene.contact_time
-    if tip is None or target is None or clearance is None:
-        return
-    if clearance < 0.0:
-        yield f"{at(tip.key)}: the tip starts {-clearance:.6g} m below {at(target.key)}; it must start there or above"
-    elif t_c is not None and t_c > scene.time.t_end:
-        when = f"not before t = {t_c:.6g} s, after {at('time.t_end')}" if math.isfinite(t_c) else "never"
-        yield (
-            f"{at('beam.initial_velocity_slope')}: the undeformed tip reaches {at(target.key)} {when}; "
-            'use a (more) negative initial_velocity_slope, or approach = "elastic"'
+#: What makes a scene impossible with one of its loads.
+FORBIDDEN_LOADS: tuple[Rule, ...] = (
+    *(
+        Rule(
+            lambda s, load, table=table, on=on: load.on in on and s.under(table) is None,
+            f"{{load.on}}: acts on a [{table}], and this scene has none",
         )
-
-
-def _nothing_moves_before(scene: Scene, at: At) -> Iterator[str]:
-    """Yield what would move while an undeformed tip approaches, for nothing is integrated until it arrives."""
-    t_c, lower = scene.contact_time, scene.lower
-    if t_c is None or not 0.0 < t_c < math.inf:
-        return
-    approach, remedy = at("beam.approach"), 'or use approach = "elastic"'
-    for key in ("initial_velocity", "velocity"):
-        if isinstance(lower, Spring | PointMass) and getattr(lower, key, 0.0) != 0.0:
-            yield (
-                f"{at(f'spring.{key}')}: {approach} holds everything until the tip arrives at t = {t_c:.6g} s; start "
-                f"at rest, {remedy}"
-            )
-    for number, load in enumerate(scene.loads):
-        acts = load.on != "spring" or lower is not None
-        if acts and load.peak > 0.0 and load.begins < t_c:
-            yield (
-                f"{at(f'loads.{number}.signal')}: acts before the tip arrives at t = {t_c:.6g} s, and {approach} holds "
-                f"everything until then; give a start from there on, {remedy}"
-            )
-
-
-def _heights_fit(scene: Scene, at: At) -> Iterator[str]:
-    contact, tip, top, stop = scene.contact, scene.tip_at_start, scene.top_at_start, scene.stop
-    if stop is not None and top is not None and stop.position >= top.value:
-        yield f"{at('stop.position')}: the foundation must lie below {at(top.key)}"
-    if not (contact.lasting and contact.rigid) or tip is None or top is None:
-        return
-    if not math.isclose(tip.value, top.value, rel_tol=1e-12):
-        yield (
-            f'{at(tip.key)}: the tip starts at {tip.value:.6g} m, but law = "{contact.law}" holds it at {at(top.key)}; '
-            'let them start at one height, or use "link"'
+        for table, on in (("beam", ("beam", "tip")), ("spring", ("spring",)))
+    ),
+    Rule(
+        lambda s, load: s.massless and load.on != "spring",
+        '{load.on}: {beam.fidelity} takes no loads that vary; use fidelity = "dynamic", or distributed_load for a '
+        "constant",
+    ),
+    Rule(
+        lambda s, load: s.contact.algorithm,
+        "{load.on}: {contact.law} is Algorithm 1, which knows constant loads only; take another law",
+    ),
+    Rule(
+        lambda s, load: (
+            _waits(s) and (load.on != "spring" or s.lower) and load.peak > 0.0 and load.begins < s.contact_time
+        ),
+        "{load.signal}: acts before the tip arrives at t = {t_c:.6g} s, and {beam.approach} holds everything until "
+        'then; give a start from there on, or use approach = "elastic"',
+        lambda s, load: {"t_c": s.contact_time},
+    ),
+    Rule(
+        lambda s, load: load.on == "beam" and "beam" in s.partners,
+        '{load.on}: acts along our own beam; on = "tip" acts on the end of another body in [beam]',
+    ),
+    *(
+        Rule(
+            lambda s, load, table=table: load.on == "base" and table in s.foreign,
+            f'{{load.on}}: which masses are in the FMU of [{table}] is not known; give a force, on = "{end}"',
         )
-
-
-def _feedback_negligible(scene: Scene, at: At) -> Iterator[str]:
-    contact, coupling = scene.contact, scene.coupling
-    # A contact of depth p has V = 2 λ p, whatever p.
-    share = 4.0 * contact.stiffness / (scene.driver_stiffness or math.inf)
-    if contact.exponent == 1.0 and "exponent" in contact.facts.takes and share > coupling.feedback_tolerance:
-        yield (
-            f"{at('coupling.feedback')}: neglects up to 4·stiffness/(stiffness of the driving end) = {share:.2g} of "
-            f"the penetration; allowed is feedback_tolerance = {coupling.feedback_tolerance:g}. "
-            'Use "two_way", or allow more'
+        for table, end in (("beam", "tip"), ("spring", "spring"))
+    ),
+    *(
+        Rule(
+            lambda s, load, table=table, end=end: load.on == end and isinstance(s.under(table), RigidWall),
+            f"{{load.on}}: {{{table}.element}} moves under no load; take the load out",
         )
-
-
-def _coupling_resolves(scene: Scene, at: At) -> Iterator[str]:
-    coupling, H, t_end = scene.coupling, scene.coupling.macro_step, scene.time.t_end
-    if scene.accuracy is not None:
-        return  # it picks scheme, degree and steps that go together
-    if H is None:
-        tolerance = next(at(f"coupling.{key}") for key in TOLERANCE_KEYS if getattr(coupling, key) is not None)
-        if scene.contact.algorithm:
-            yield f"{tolerance}: {at('contact.law')} is Algorithm 1, which has one macro_step"
-        if coupling.scheme in ORDINARY_SCHEMES:
-            yield f'{tolerance}: scheme = "{coupling.scheme}" never repeats a step; give macro_step instead'
-    elif t_end < H:
-        default = ", the default" if H == DEFAULT_STEP else ""
-        yield (
-            f"{at('coupling.macro_step')}{default}: must be at most {at('time.t_end')}; give a smaller one, or an "
-            "accuracy, which picks one"
-        )
-    elif t_end / H > MOST_MACRO_STEPS:
-        yield (
-            f"{at('coupling.macro_step')}: {at('time.t_end')} would take {t_end / H:.1e} macro steps; at most "
-            f"{MOST_MACRO_STEPS:.0e} are allowed"
-        )
-
-
-def _loads_act(scene: Scene, at: At) -> Iterator[str]:
-    points = {load.at for load in scene.loads if load.at is not None}
-    if len(points) > MOST_POINTS:
-        yield (
-            f"[[loads]]: point forces at {len(points)} places, {', '.join(f'{x:g}' for x in sorted(points))}; the "
-            f"beam takes them at {MOST_POINTS} at most. Put some at one place, or give them a shape"
-        )
-    for number, load in enumerate(scene.loads):
-        on = at(f"loads.{number}.on")
-        for table, acts in (("beam", load.on in ("beam", "tip")), ("spring", load.on == "spring")):
-            if acts and scene.under(table) is None:
-                yield f"{on}: acts on a [{table}], and this scene has none"
-        if scene.massless and load.on != "spring":
-            yield (
-                f'{on}: {at("beam.fidelity")} takes no loads that vary; use fidelity = "dynamic", or distributed_load '
-                "for a constant"
-            )
-        if scene.contact.algorithm:
-            yield f"{on}: {at('contact.law')} is Algorithm 1, which knows constant loads only; take another law"
-
-
-_CHECKS = (
-    _heights_fit,
-    _partners_fit,
-    _spring_holds,
-    _tip_arrives,
-    _nothing_moves_before,
-    _feedback_negligible,
-    _coupling_resolves,
-    _loads_act,
+        for table, end in (("beam", "tip"), ("spring", "spring"))
+    ),
 )

@@ -239,26 +239,6 @@ class Beam(Table):
         """Number of modes that take part: all of the mesh if the scene names none, or the integrator has no modes."""
         return self.n_modes if self.n_modes and self.integrator == "modal" else self.unknowns
 
-    @model_validator(mode="after")
-    def _modes_exist(self) -> Beam:
-        unknowns, degree = self.unknowns, self.element_degree
-        mesh = f"n_elements = {self.n_elements}" + (f" of element_degree = {degree}" if degree > 1 else "")
-        if self.n_elements * degree > MOST_ELEMENTS:
-            raise ValueError(
-                f"n_elements = {self.n_elements}: times element_degree = {degree} it must be at most {MOST_ELEMENTS}"
-            )
-        if self.n_modes > unknowns:
-            raise ValueError(f"n_modes = {self.n_modes}: {mesh} has only {unknowns} modes; use 0 for all of them")
-        if self.integrator == "modal" and unknowns > ALL_MODES_UP_TO:
-            most = min(MOST_MODES, unknowns // 2, MOST_MODE_VALUES // unknowns)
-            if not 1 <= self.n_modes <= most:
-                raise ValueError(
-                    f"n_modes = {self.n_modes}: of the {unknowns} modes of {mesh} at most {most} are found, all only "
-                    f"up to {ALL_MODES_UP_TO}; use n_modes = {min(64, most)}, fewer elements, or "
-                    'integrator = "generalized_alpha"'
-                )
-        return self
-
 
 class Spring(Table):
     """Duffing spring m ÿ + α_s ẏ + k1 y + k2 y³ = −C + N + f_s (Ahn & Tate, (6)).
@@ -278,6 +258,11 @@ class Spring(Table):
     initial_velocity: float = key("m/s", "velocity of the top at the start, upward", 0.0)
     relative_tolerance: float = key("–", "relative tolerance of IDA, which integrates it", 1e-12, gt=0.0, le=1e-2)
     absolute_tolerance: float = key("m, m/s", "absolute tolerance of IDA, of y and z", 1e-30, gt=0.0, le=1e-2)
+
+    @property
+    def softens(self) -> bool:
+        """Whether it gives way: it pushes back near 0, and less and less further out."""
+        return self.cubic_stiffness < 0.0 < self.linear_stiffness
 
 
 class Stop(Table):
