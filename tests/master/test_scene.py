@@ -53,6 +53,8 @@ GOOD = {
     "free mass on a stop": changed(beam=None, spring={"linear_stiffness": 0.0, "cubic_stiffness": 0.0}),
     "double well": changed(beam=None, spring={"linear_stiffness": -1.0, "cubic_stiffness": 1.0}),
     "just inside the hilltop": changed(beam=None, spring={"equilibrium": 3.872}),
+    # The load leaves no equilibrium, but the stop holds it from below, and a hill is above.
+    "softening, pressed on the stop": changed(beam=None, spring={"external_force": -5.0}),
     "touching at rest": changed(beam={"initial_velocity_slope": 0.0}),
     "elastic, at rest above": changed(
         beam={"initial_deflection_slope": 0.5, "initial_velocity_slope": 0.0, "approach": "elastic"}

@@ -81,7 +81,7 @@ BYTES = {
     "nested tables": (b"a = " + b"{a = " * 50_000, "nested too deeply; …"),
     "a value nested deeply": (
         GOOD.encode() + b"damping = " + b"[" * 150 + b"]" * 150,
-        "[spring] damping = [[…]]: must be a finite number at least 0",
+        "[spring] damping = [[…: must be a finite number at least 0",
     ),
     "a dotted key of many parts": (GOOD.encode() + b".".join([b"a"] * 300) + b" = 1", "[spring] a: unknown key; …"),
     "a long key": (GOOD.encode() + b"k" * 5000 + b" = 1", f"[spring] {'k' * 59}…: unknown key; allowed: …"),

@@ -6,7 +6,7 @@ The forces themselves are in `springbeam.contact.laws`, and again, independently
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 
@@ -85,11 +85,6 @@ LAWS: dict[str, LawFacts] = {
 }
 
 
-def choices(names: Iterable[str]) -> str:
-    """Return names as an error offers them: ``"a" or "b"``."""
-    return " or ".join(f'"{name}"' for name in names)
-
-
 def laws_that(are: Callable[[LawFacts], bool]) -> str:
-    """Return the names of the laws for which ``are`` holds, as an error offers them."""
-    return choices(name for name, law in LAWS.items() if are(law))
+    """Return the names of the laws for which ``are`` holds, as an error offers them: ``"a" or "b"``."""
+    return " or ".join(f'"{name}"' for name, law in LAWS.items() if are(law))

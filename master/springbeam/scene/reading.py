@@ -112,7 +112,7 @@ def scene_from_dict(data: dict[str, Any], source: str = "scene") -> Scene:
         scene = Scene.model_validate(data)
         lines = impossible(scene)
     except ValidationError as error:
-        lines = list(dict.fromkeys(line for e in error.errors() for line in explain(e)))
+        lines = list(dict.fromkeys(map(explain, error.errors())))
     if lines:
         raise SceneError("\n".join(f"{source}: {line}" for line in lines))
     return scene

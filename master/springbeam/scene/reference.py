@@ -1,21 +1,40 @@
-"""All keys of a scene: in words, as a JSON Schema, and a file to start from, made of `springbeam.scene.tables`."""
+"""All keys of a scene: in words, as a JSON Schema, and a file to start from, made of `springbeam.scene.tables`.
+
+What is said of a key, in errors as in tables, is read from the JSON Schema of its declaration.
+"""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import tomli_w
-from pydantic.fields import FieldInfo
 
 from .loads import Load
-from .messages import allowed, extra
 from .partners import PARTNERS
 from .scene import TABLES, Scene
 from .tables import Table
 
 #: Tables by their names, "" is what stands outside of them, and by theirs the bodies that are not our own.
 MODELS: dict[str, type[Table]] = {"": Scene, **TABLES, "loads": Load, **PARTNERS}
+#: Values by their types in the JSON Schema, in words.
+_NOUNS = {
+    "number": "a finite number",
+    "integer": "a whole number",
+    "boolean": "true or false",
+    "string": "a text in quotes",
+    "array": "a list of 1 to 4 finite numbers",
+    "object": "a table, as { k = 3.0e4 }",
+}
+_BOUNDS = {
+    "exclusiveMinimum": "greater than",
+    "minimum": "at least",
+    "maximum": "at most",
+    "exclusiveMaximum": "less than",
+}
 
 
 class Key(NamedTuple):
@@ -29,13 +48,46 @@ class Key(NamedTuple):
     meaning: str
 
 
+@lru_cache(maxsize=1)
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of a scene file (draft 2020-12), for editors and other programs.
+
+    It has each key alone: meaning, type and range. What several keys decide together, as which of them a table needs,
+    is left to `springbeam.scene.rules`.
+    """
+    found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scene.model_json_schema()}
+    for described in (found, *found["$defs"].values()):
+        described.pop("required", None)
+        for key in described["properties"].values():
+            # What says nothing about a file is left out: TOML has no null, and names are titles enough.
+            key |= next((way for way in key.pop("anyOf", ()) if way.get("type") != "null"), {})
+            for name, empty in (("title", key.get("title")), ("default", None), ("otherwise", "")):
+                if name in key and (key[name] == empty or isinstance(key[name], dict)):
+                    del key[name]
+    return found
+
+
+def keys_of(model: type[Table]) -> dict[str, dict[str, Any]]:
+    """Return what the JSON Schema says of each key of a table."""
+    properties: dict[str, dict[str, Any]] = schema()["$defs"].get(model.__name__, schema())["properties"]
+    return properties
+
+
+def allowed(key: Mapping[str, Any]) -> str:
+    """Return in words what a key of `keys_of` may be."""
+    if choices := key.get("enum") or [key[name] for name in ("const",) if name in key]:
+        return " or ".join(json.dumps(choice, ensure_ascii=False) for choice in choices)
+    bounds = " and ".join(f"{words} {key[name]:.15g}" for name, words in _BOUNDS.items() if name in key)
+    return f"{_NOUNS[key['type']]} {bounds}".strip()
+
+
 def listed(table: str | None = None) -> list[Key]:
     """Return the keys of one table, or all."""
     return [
-        Key(name, key, extra(field, "unit"), allowed(field), _default(model, key, field), field.description or "")
+        Key(name, key, said["unit"], allowed(said), _default(model, key, said), said["description"])
         for name, model in MODELS.items()
-        for key, field in model.model_fields.items()
-        if table in (None, name) and (field.alias or key) not in MODELS
+        for key, said in keys_of(model).items()
+        if table in (None, name) and key not in MODELS
     ]
 
 
@@ -48,7 +100,7 @@ def heading(table: str) -> str:
 
 def unit_of(table: str, key: str) -> str:
     """Return the unit of a key of a table, or of a load by its number ("loads.0"); "–" if it has none."""
-    return str(extra(MODELS[table.partition(".")[0]].model_fields[key], "unit"))
+    return str(keys_of(MODELS[table.partition(".")[0]])[key]["unit"])
 
 
 def about(table: str) -> str:
@@ -56,38 +108,14 @@ def about(table: str) -> str:
     return " ".join((MODELS[table].__doc__ or "").split()).replace("``", "`")
 
 
-def _default(model: type[Table], name: str, field: FieldInfo) -> str:
-    if otherwise := extra(field, "otherwise"):
-        return str(otherwise)
-    for ways in model.WAYS:
-        if any(name in group for group in ways.groups) and model.model_fields[ways.groups[0][0]].is_required():
-            return f"needed: the {ways.thing} one way"
-    if field.is_required():
+def _default(model: type[Table], name: str, key: Mapping[str, Any]) -> str:
+    one_way = [ways.thing for ways in model.WAYS if ways.taken((name,)) and ways.needed(model)]
+    if "otherwise" in key or one_way:
+        return str(key.get("otherwise") or f"needed: the {one_way[0]} one way")
+    if model.model_fields[name].is_required():
         return "needed" + (", or dimensionless" if name in model.SCALES else "")
-    default = field.default
-    return "none" if default in (None, "") else str(default).lower() if isinstance(default, bool) else f"{default}"
-
-
-def schema() -> dict[str, Any]:
-    """Return the JSON Schema of a scene file (draft 2020-12), for editors and other programs.
-
-    It has each key alone: meaning, type and range. What several keys decide together, as which of them a table needs,
-    is left to `springbeam.scene.rules`.
-    """
-    found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scene.model_json_schema()}
-    for described in (found, *found["$defs"].values()):
-        described.pop("required", None)
-        for key in described["properties"].values():
-            _plain(key)
-    return found
-
-
-def _plain(key: dict[str, Any]) -> None:
-    """Take out what says nothing about a file: TOML has no null, and names are titles enough."""
-    key |= next((way for way in key.pop("anyOf", ()) if way.get("type") != "null"), {})
-    for name, empty in (("title", key.get("title")), ("default", None), ("otherwise", "")):
-        if name in key and (key[name] == empty or isinstance(key[name], dict)):
-            del key[name]
+    default = key.get("default")
+    return "none" if default in (None, "") else str(default).lower()
 
 
 def beginning(title: str) -> str:
@@ -107,8 +135,7 @@ def beginning(title: str) -> str:
         if line.startswith("["):
             table, comment = name, f"  # {about(name).partition('. ')[0].rstrip('.')}."
         elif line:
-            field = TABLES[table].model_fields[name]
-            unit = extra(field, "unit")
-            comment = " " * (32 - len(line)) + f"# {field.description}" + ("" if unit == "–" else f" [{unit}]")
+            key = keys_of(TABLES[table])[name]
+            comment = " " * (32 - len(line)) + f"# {key['description']}" + f" [{key['unit']}]" * (key["unit"] != "–")
         lines.append(line + comment)
     return "\n".join(lines) + "\n"

@@ -406,7 +406,7 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     *(
         Rule(
-            lambda s, key=key: _waits(s) and "spring" not in s.foreign and getattr(s.lower, key, 0.0) != 0.0,
+            lambda s, key=key: _waits(s) and getattr(s.lower, key, 0.0) != 0.0,
             f"{{spring.{key}}}: {{beam.approach}} holds everything until the tip arrives at t = {{t_c:.6g}} s; start "
             'at rest, or use approach = "elastic"',
             _ends,

@@ -20,9 +20,10 @@ from pydantic import (
     model_serializer,
     model_validator,
 )
+from pydantic_core import PydanticCustomError
 from typing_extensions import Self
 
-from .laws import LAWS, LawFacts, choices
+from .laws import LAWS, LawFacts
 
 #: Up to this many unknowns all modes may be kept; the full eigenproblem grows with the cube.
 ALL_MODES_UP_TO = 1000
@@ -66,6 +67,10 @@ class Ways(NamedTuple):
 
     def __str__(self) -> str:
         return ", or ".join(" and ".join(group) for group in self.groups)
+
+    def needed(self, model: type[Table]) -> bool:
+        """Return whether a table must have one of them."""
+        return model.model_fields[self.groups[0][0]].is_required()
 
     def taken(self, content: Any) -> list[tuple[str, ...]]:
         """Return the groups of which ``content`` (a mapping, or a set of keys) has a key."""
@@ -298,7 +303,7 @@ class Contact(Table):
     @classmethod
     def _law_exists(cls, law: str) -> str:
         if law not in LAWS:
-            raise ValueError(f'law = "{law}": must be {choices(LAWS)}')
+            raise PydanticCustomError("no_such_law", "no such law")
         return law
 
     @property
