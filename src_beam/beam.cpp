@@ -173,18 +173,10 @@ void Beam::save(std::vector<double>& state) const {
   std::memcpy(state.data() + motion_size_, &now_, sizeof now_);
 }
 
-void Beam::require_state(const std::vector<double>& state) const {
-  const std::size_t size = motion_size_ + sizeof now_ / sizeof(double);
-  if (state.size() != size) {
-    throw std::invalid_argument("beam: a saved state of " + std::to_string(state.size()) +
-                                " numbers does not belong to this beam, whose states have " + std::to_string(size));
-  }
-  for (const double value : state) {
-    if (!std::isfinite(value)) throw std::invalid_argument("beam: a saved state holds " + number(value));
-  }
-}
-
 void Beam::restore(const std::vector<double>& state) {
+  if (state.size() != motion_size_ + sizeof now_ / sizeof(double))
+    throw std::invalid_argument("beam: a saved state of " + std::to_string(state.size()) +
+                                " numbers does not belong to this beam");
   restore_motion(state.data());
   std::memcpy(&now_, state.data() + motion_size_, sizeof now_);
 }

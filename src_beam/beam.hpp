@@ -194,9 +194,7 @@ class Beam {
 
   /// The whole dynamic state as a flat vector of fixed length (for one parameter set).
   void save(std::vector<double>& state) const;
-  /// @throws std::invalid_argument if this is no state of such a beam: its length does not fit or it is not finite
-  void require_state(const std::vector<double>& state) const;
-  /// @pre require_state(state) passes
+  /// A state that a beam with the same parameters has saved. @throws std::invalid_argument if its length does not fit
   void restore(const std::vector<double>& state);
 
  protected:

@@ -6,7 +6,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "flat.hpp"
 #include "text.hpp"
 
 namespace spring {
@@ -23,13 +22,14 @@ HeldContact::HeldContact(const Compliance& law, double mass, double size, const 
 void HeldContact::begin(const TipMessage& seen, bool initial, double y, const Top& top) {
   if (initial) now_.given = seen;
   const auto nothing = [](const TipMessage& m) { return m.displacement == 0.0 && m.velocity == 0.0; };
-  untold_ = nothing(seen) && !nothing(now_.given);
-  now_.first = untold_ ? now_.given : seen;
+  const bool silent = nothing(seen) && !nothing(now_.given);
+  missed_[untold] = silent ? 1 : 0;
+  now_.first = silent ? now_.given : seen;
   now_.tip = now_.first.displacement;
   now_.depth = y - now_.tip;
   now_.said_next = free_of_first();
   now_.force = 0.0;  // where the search starts: the force follows what is seen, not what was seen before it
-  send(untold_ ? 0.0 : solve(now_.depth, free_of_first(), top), free_of_first());
+  send(silent ? 0.0 : solve(now_.depth, free_of_first(), top), free_of_first());
 }
 
 void HeldContact::advance(const TipMessage& seen, double y, const Top& top) {
@@ -55,7 +55,7 @@ void HeldContact::compare(const TipMessage& seen) {
   reach_ = std::max({reach_, size_ * std::abs(seen.velocity), r1 * now_.force});
   const auto off = [&seen](double tip) { return std::abs(seen.displacement - tip); };
   const double miss = off(now_.tip);
-  if (now_.steps < 2.0) untold_ = untold_ || miss > whole * reach_;
+  if (now_.steps < 2.0 && miss > whole * reach_) missed_[untold] = 1;
   if (now_.steps < 3.0 || miss <= rounding * reach_) return;  // the first step's mean velocity was a guess
   if (off(now_.said + r2 * now_.last + r1 * now_.force) < 0.01 * miss) {
     ++missed_[late];
@@ -64,7 +64,6 @@ void HeldContact::compare(const TipMessage& seen) {
   } else if (miss > noticeable * reach_) {
     ++missed_[elsewhere];
   }
-  farthest_ = std::max(farthest_, miss);
 }
 
 /// C with C = mean(start, end(C)), end(C) = top(C) − free − r₁C: Newton's method between brackets, with the top's
@@ -113,31 +112,18 @@ void HeldContact::send(double force, double free) {
 
 HeldContact::Mean HeldContact::mean(double start, double end) const {
   const double way = end - start, factor = law_.damping_factor(way / size_);
-  double force = 0.0, by_start = 0.0, by_end = 0.0;
+  double force = 0.0, by_end = 0.0;
   // Where the difference quotient is rounding, the middle is as good.
   if (std::abs(way) <= 1e-6 * (std::abs(end) + std::abs(start))) {
     const double middle = (start + end) / 2;
     force = law_.elastic(middle);
-    if (middle > 0.0) by_start = by_end = law_.slopes(middle, 0.0).force_by_depth / 2;
+    if (middle > 0.0) by_end = law_.slopes(middle, 0.0).force_by_depth / 2;
   } else {
     force = (law_.energy(end) - law_.energy(start)) / way;
-    by_start = (force - law_.elastic(start)) / way;
     by_end = (law_.elastic(end) - force) / way;
   }
   const double damping = factor > 0.0 && way != 0.0 ? (factor - 1.0) / way * force : 0.0;  // C χ/H
-  return {factor * force, factor * by_start - damping, factor * by_end + damping};
-}
-
-void HeldContact::restore(const State& state) {
-  auto numbers = flat(state);
-  // The force may be past all numbers, and then so is the tip's next place.
-  if (!std::isfinite(state.force)) numbers[1] = numbers[2] = 0.0;
-  for (const double value : numbers) {
-    if (!std::isfinite(value)) {
-      throw std::invalid_argument("spring: a saved state has numbers that are not finite");
-    }
-  }
-  now_ = state;
+  return {factor * force, factor * by_end + damping};
 }
 
 }  // namespace spring

@@ -55,12 +55,10 @@ class HeldContact {
     elsewhere,  ///< by a good part of a step's way
     late,       ///< where it would be under the forces of the next steps: values pass one after the other
     swapped,    ///< where it would be with r₁ for r₂
+    untold,     ///< a whole step's way from where it was said before the first step, or nothing was said
     kinds
   };
-  int missed(Miss kind) const { return missed_[kind]; }  ///< steps so far; no part of the state
-  double farthest() const { return farthest_; }          ///< the longest miss [m]
-  /// Whether nothing was passed on before the first step: it found the tip a whole step's way from where it was said.
-  bool untold() const { return untold_; }
+  const std::array<int, kinds>& missed() const { return missed_; }  ///< steps so far, by kind; no part of the state
 
   /// Everything that a step changes; doubles only, see flat.hpp.
   struct State {
@@ -74,13 +72,12 @@ class HeldContact {
     double last = 0.0, before = 0.0;     ///< forces over the last two steps [N]
   };
   const State& state() const { return now_; }
-  /// @throws std::invalid_argument (state unchanged) if a number that force() does not decide is not finite
-  void restore(const State& state);
+  void restore(const State& state) { now_ = state; }
 
  private:
-  /// Mean of the law's force over a step, and its slopes.
+  /// Mean of the law's force over a step [N], and its slope by the depth at the end [N/m].
   struct Mean {
-    double force, by_start, by_end;  ///< [N], [N/m]
+    double force, by_end;
   };
   Mean mean(double start, double end) const;
   void compare(const TipMessage& seen);
@@ -93,8 +90,6 @@ class HeldContact {
   std::array<double, 2> response_;
   State now_;
   std::array<int, kinds> missed_{};
-  bool untold_ = false;
-  double farthest_ = 0.0;
   double reach_ = 0.0;  ///< longest way of the tip in a step so far [m]
 };
 

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <limits>
 #include <string>
+#include <utility>
 
 #ifndef SUN_COMM_NULL  // before SUNDIALS 7
 #define SUN_COMM_NULL nullptr
@@ -116,39 +117,21 @@ int IdaSolver::advance() {
     double first = end;
     int fallen = -1;
     for (int i = 0; i < distances; ++i) {
-      const auto [value, rate] = distance(i);
-      const bool turned = rates[i] <= 0.0 && rate > 0.0;
-      rates[i] = rate;
-      if (!(value < 0.0)) {
-        if (!turned) continue;
-        last_before(start, end, [&] { return distance(i).rate > 0.0; });
-      }
-      if (distance(i).value < 0.0) {
-        const double passed = last_before(start, s_, [&] { return distance(i).value < 0.0; });
-        if (fallen < 0 || passed < first) {
-          first = passed;
-          fallen = i;
-        }
-      }
-      interpolate(end);
+      if (s_ != end) interpolate(end);
+      const Distance now = distance(i);
+      const auto at = [&](double s) {
+        interpolate(s);
+        return distance(i);
+      };
+      const auto place = fall(start, end, std::exchange(rates[i], now.rate), now, 2.0 * epsilon, at);
+      if (!place || (fallen >= 0 && *place >= first)) continue;
+      first = *place;
+      fallen = i;
     }
-    if (fallen < 0) continue;
-    interpolate(first);
-    return fallen;
+    if (s_ != first) interpolate(first);
+    if (fallen >= 0) return fallen;
   }
   return -1;
-}
-
-/// Goes to the last s from `low` on, to rounding, before past() holds, which it does at `high`.
-template <class Past>
-double IdaSolver::last_before(double low, double high, const Past& past) {
-  while (high - low > 2.0 * epsilon) {
-    const double middle = low + (high - low) / 2;
-    interpolate(middle);
-    (past() ? high : low) = middle;
-  }
-  interpolate(low);
-  return low;
 }
 
 double IdaSolver::last_step_start() const {

@@ -11,13 +11,11 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "fall.hpp"
+
 namespace spring {
 
-/// A distance whose fall through 0 is an event, and its rate d/ds.
-struct Distance {
-  double value, rate;
-};
-inline constexpr int distances = 2;  ///< of a system, at most
+inline constexpr int distances = 2;  ///< of a system, at most: their falls through 0 are events
 
 /// F(s, Y, Y') = 0 with its Jacobian J = ∂F/∂Y + c ∂F/∂Y' and distances.
 class ImplicitSystem {
@@ -27,7 +25,7 @@ class ImplicitSystem {
   virtual bool residual(double s, const double* Y, const double* Yp, double* F) const noexcept = 0;
   /// Column-major, n × n, zero on entry.
   virtual void jacobian(double s, double c, const double* Y, const double* Yp, double* J) const noexcept = 0;
-  /// {1, 1} for one that is not there.
+  /// With its rate d/ds; {1, 1} for one that is not there.
   virtual Distance distance(int which, double s, const double* Y) const noexcept = 0;
 };
 
@@ -70,8 +68,6 @@ class IdaSolver {
 
   Vector new_vector() const;
   Distance distance(int which) const { return system_->distance(which, s_, value()); }
-  template <class Past>
-  double last_before(double low, double high, const Past& past);
   double last_step_start() const;
   void interpolate(double s);
 

@@ -88,7 +88,7 @@ class Spring {
 
   /// The whole dynamic state as a flat vector of fixed length.
   void save(std::vector<double>& state) const;
-  /// @throws std::invalid_argument if the length does not fit or a number cannot be; the state is then unchanged
+  /// A state that a spring with the same parameters has saved. @throws std::invalid_argument if its length does not fit
   void restore(const std::vector<double>& state);
 
  private:

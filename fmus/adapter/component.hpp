@@ -40,7 +40,7 @@ inline void require_arrays(std::size_t n, std::initializer_list<std::pair<const 
 /// Takes a message: its status, its category and its text.
 using Log = std::function<void(Status, const char*, const std::string&)>;
 
-/// The functions that throw std::invalid_argument do so for arguments that are missing or wrong.
+/// Arguments that are missing or wrong throw std::invalid_argument.
 class Component {
  public:
   Component(Log log, bool log_events) : log_(std::move(log)), log_events_(log_events) {}

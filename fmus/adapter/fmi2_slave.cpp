@@ -5,23 +5,20 @@
 #include <new>
 #include <string>
 
+#include "common_functions.hpp"
 #include "component.hpp"
 #include "fmi2Functions.h"
 
-namespace {
+using namespace fmi;
 
-using fmi::any_phase;
-using fmi::Component;
-using fmi::require_arrays;
-using fmi::Status;
-using fmi::Type;
+namespace {
 
 fmi2Status to2(Status status) { return static_cast<fmi2Status>(status); }
 
 /// `body` may be a member of Component, then with its arguments.
 template <class Body, class... Arguments>
 fmi2Status call(fmi2Component c, const char* function, unsigned legal, const Body& body, Arguments... arguments) {
-  return to2(fmi::guard(c, function, legal, [&](Component& k) { std::invoke(body, k, arguments...); }));
+  return to2(guard(c, function, legal, [&](Component& k) { std::invoke(body, k, arguments...); }));
 }
 
 template <class Value>
@@ -36,7 +33,7 @@ fmi2Status get(fmi2Component c, const char* function, const fmi2ValueReference v
 template <class Value>
 fmi2Status set(fmi2Component c, const char* function, const fmi2ValueReference vr[], size_t n, const Value values[],
                Type type) {
-  return call(c, function, fmi::settable, [&](Component& k) {
+  return call(c, function, settable, [&](Component& k) {
     require_arrays(n, {{vr, "the array of value references"}, {values, "the array of values"}});
     for (size_t i = 0; i < n; ++i) {
       k.instance.set(vr[i], type, static_cast<double>(type == Type::boolean ? Value(values[i] != 0) : values[i]));
@@ -47,9 +44,9 @@ fmi2Status set(fmi2Component c, const char* function, const fmi2ValueReference v
 /// Most of what could be asked is about a step that is pending, and none ever is.
 template <class Value, class Get>
 fmi2Status get_status(fmi2Component c, const char* function, bool known, Value* value, const Get& status_of) {
-  return call(c, function, fmi::stepped, [&](Component& k) {
-    fmi::require(value, "value");
-    if (!known) throw fmi::Discarded("only fmi2LastSuccessfulTime and fmi2Terminated are known: no step is pending");
+  return call(c, function, stepped, [&](Component& k) {
+    require(value, "value");
+    if (!known) throw Discarded("only fmi2LastSuccessfulTime and fmi2Terminated are known: no step is pending");
     *value = status_of(k);
   });
 }
@@ -65,13 +62,15 @@ std::string as_format(const std::string& message) {
 
 extern "C" {
 
+SPRINGBEAM_COMMON_FUNCTIONS(fmi2, FMUstate, DeSerialize)
+
 const char* fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char* fmi2GetVersion(void) { return fmi2Version; }
 
 /// `functions` may be NULL, and gone after the call.
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID, fmi2String,
                               const fmi2CallbackFunctions* functions, fmi2Boolean, fmi2Boolean loggingOn) try {
-  fmi::Log log;
+  Log log;
   if (functions && functions->logger)
     log = [callbacks = *functions, name = std::string(instanceName ? instanceName : "?")](
               Status status, const char* category, const std::string& message) {
@@ -82,91 +81,47 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
   return nullptr;
 }
 
-void fmi2FreeInstance(fmi2Component c) { delete static_cast<Component*>(c); }
-
-fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
-                               const fmi2String categories[]) {
-  return call(c, __func__, any_phase, &Component::set_debugging, loggingOn != fmi2False, nCategories, categories);
-}
-
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
-  return call(c, __func__, fmi::instantiated, [&](Component& k) {
+  return call(c, __func__, instantiated, [&](Component& k) {
     k.instance.setup(startTime, stopTimeDefined ? stopTime : std::numeric_limits<double>::infinity(),
                      toleranceDefined ? tolerance : 0.0);
   });
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
-  return call(c, __func__, fmi::instantiated, &Component::enter, fmi::initialization, "entered initialization mode");
+  return call(c, __func__, instantiated, &Component::enter, initialization, "entered initialization mode");
 }
 
-fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-  return call(c, __func__, fmi::initialization, &Component::start);
-}
+#define SPRINGBEAM_VALUES(name, type)                                                                             \
+  fmi2Status fmi2Get##name(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2##name values[]) {       \
+    return get(c, __func__, vr, n, values, type);                                                                 \
+  }                                                                                                               \
+  fmi2Status fmi2Set##name(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2##name values[]) { \
+    return set(c, __func__, vr, n, values, type);                                                                 \
+  }
+SPRINGBEAM_VALUES(Real, Type::real)
+SPRINGBEAM_VALUES(Integer, Type::integer)
+SPRINGBEAM_VALUES(Boolean, Type::boolean)
+#undef SPRINGBEAM_VALUES
 
-fmi2Status fmi2Terminate(fmi2Component c) {
-  return call(c, __func__, fmi::step_complete, &Component::enter, fmi::terminated, "terminated");
+fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference[], size_t n, fmi2String[]) {
+  return call(c, __func__, any_phase, &Component::refuse_all, n, "String");
 }
-
-fmi2Status fmi2Reset(fmi2Component c) { return call(c, __func__, any_phase, &Component::reset); }
-
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {
-  return get(c, __func__, vr, nvr, value, Type::real);
-}
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[]) {
-  return get(c, __func__, vr, nvr, value, Type::integer);
-}
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[]) {
-  return get(c, __func__, vr, nvr, value, Type::boolean);
-}
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference[], size_t nvr, fmi2String[]) {
-  return call(c, __func__, any_phase, &Component::refuse_all, nvr, "String");
-}
-
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
-  return set(c, __func__, vr, nvr, value, Type::real);
-}
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[]) {
-  return set(c, __func__, vr, nvr, value, Type::integer);
-}
-fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[]) {
-  return set(c, __func__, vr, nvr, value, Type::boolean);
-}
-fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference[], size_t nvr, const fmi2String[]) {
-  return call(c, __func__, fmi::settable, &Component::refuse_all, nvr, "String");
-}
-
-fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate* FMUstate) {
-  return call(c, __func__, any_phase, &Component::get_state, FMUstate);
-}
-fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
-  return call(c, __func__, any_phase, &Component::set_state, FMUstate);
-}
-fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate* FMUstate) {
-  return call(c, __func__, any_phase, &Component::free_state, FMUstate);
-}
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t* size) {
-  return call(c, __func__, any_phase, &Component::state_size, FMUstate, size);
-}
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size) {
-  return call(c, __func__, any_phase, &Component::serialize, FMUstate, serializedState, size);
-}
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
-                                   fmi2FMUstate* FMUstate) {
-  return call(c, __func__, any_phase, &Component::deserialize, serializedState, size, FMUstate);
+fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference[], size_t n, const fmi2String[]) {
+  return call(c, __func__, settable, &Component::refuse_all, n, "String");
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
                                         const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
-  return call(c, __func__, fmi::after_instantiation, &Component::directional_derivative, vUnknown_ref, nUnknown,
-              vKnown_ref, nKnown, dvKnown, dvUnknown);
+  return call(c, __func__, after_instantiation, &Component::directional_derivative, vUnknown_ref, nUnknown, vKnown_ref,
+              nKnown, dvKnown, dvUnknown);
 }
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
-  return call(c, __func__, fmi::settable, [&](Component& k) {
+  return call(c, __func__, settable, [&](Component& k) {
     require_arrays(nvr, {{vr, "the array of value references"}, {order, "order"}, {value, "value"}});
     for (size_t i = 0; i < nvr; ++i) k.instance.set_derivative(vr[i], order[i], value[i]);
   });
@@ -174,12 +129,12 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[]) {
-  return call(c, __func__, fmi::stepped, &Component::output_derivatives, vr, nvr, order, value);
+  return call(c, __func__, stepped, &Component::output_derivatives, vr, nvr, order, value);
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
                       fmi2Boolean) {
-  return call(c, __func__, fmi::step_complete,
+  return call(c, __func__, step_complete,
               [&](Component& k) { k.step(currentCommunicationPoint, communicationStepSize); });
 }
 

@@ -7,28 +7,26 @@
 #include <string>
 #include <type_traits>
 
+#include "common_functions.hpp"
 #include "component.hpp"
 #include "fmi3Functions.h"
 #include "references3.hpp"
 
-namespace {
+using namespace fmi;
 
-using fmi::any_phase;
-using fmi::Component;
-using fmi::Status;
-using fmi::Type;
+namespace {
 
 fmi3Status to3(Status status) { return static_cast<fmi3Status>(status); }
 
 /// `body` may be a member of Component, then with its arguments.
 template <class Body, class... Arguments>
 fmi3Status call(fmi3Instance c, const char* function, unsigned legal, const Body& body, Arguments... arguments) {
-  return to3(fmi::guard(c, function, legal, [&](Component& k) { std::invoke(body, k, arguments...); }));
+  return to3(guard(c, function, legal, [&](Component& k) { std::invoke(body, k, arguments...); }));
 }
 
 fmi3Instance instantiate(const char* function, bool co_simulation, fmi3String name, fmi3String token, bool log_events,
                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback send) try {
-  fmi::Log log;
+  Log log;
   if (send)
     log = [=](Status status, const char* category, const std::string& message) {
       send(environment, to3(status), category, message.c_str());
@@ -40,13 +38,13 @@ fmi3Instance instantiate(const char* function, bool co_simulation, fmi3String na
 
 /// How many values a variable has.
 std::size_t size_of(unsigned reference) {
-  const auto& variables = fmi::table().variables;
+  const auto& variables = table().variables;
   return reference < variables.size() ? variables[reference].elements : 1;
 }
 
 /// @throws std::invalid_argument unless there are `n_values` values in all, or if an element stands for an array
 void require_sizes(const fmi3ValueReference vr[], size_t n, const void* values, size_t n_values) {
-  fmi::require_arrays(n, {{vr, "the array of value references"}, {values, "the array of values"}});
+  require_arrays(n, {{vr, "the array of value references"}, {values, "the array of values"}});
   std::size_t sum = 0;
   for (size_t i = 0; i < n; ++i) {
     if (size_of(vr[i]) == 0)
@@ -69,10 +67,10 @@ constexpr Type type_of = is_real<Value>                       ? Type::real
 
 template <class Value>
 Value get_one(Component& k, unsigned reference) {
-  const auto [index, order] = fmi::meant_by(reference);
-  const double value = is_real<Value> && index == fmi::time_index() ? k.instance.progress.time
-                       : is_real<Value> && order > 0                ? k.instance.input_derivative(index, order)
-                                                                    : k.instance.get(reference, type_of<Value>);
+  const auto [index, order] = meant_by(reference);
+  const double value = is_real<Value> && index == time_index() ? k.instance.progress.time
+                       : is_real<Value> && order > 0           ? k.instance.input_derivative(index, order)
+                                                               : k.instance.get(reference, type_of<Value>);
   return static_cast<Value>(value);
 }
 
@@ -89,10 +87,10 @@ fmi3Status get(fmi3Instance c, const char* function, const fmi3ValueReference vr
 template <class Value>
 fmi3Status set(fmi3Instance c, const char* function, const fmi3ValueReference vr[], size_t n, const Value values[],
                size_t n_values) {
-  return call(c, function, fmi::settable, [&](Component& k) {
+  return call(c, function, settable, [&](Component& k) {
     require_sizes(vr, n, values, n_values);
     for (size_t i = 0; i < n; ++i) {  // no array can be set
-      const auto [index, order] = fmi::meant_by(vr[i]);
+      const auto [index, order] = meant_by(vr[i]);
       if (is_real<Value> && order > 0)
         k.instance.set_derivative(index, order, static_cast<double>(values[i]));
       else
@@ -104,6 +102,8 @@ fmi3Status set(fmi3Instance c, const char* function, const fmi3ValueReference vr
 }  // namespace
 
 extern "C" {
+
+SPRINGBEAM_COMMON_FUNCTIONS(fmi3, FMUState, Deserialize)
 
 const char* fmi3GetVersion(void) { return "3.0"; }
 
@@ -132,44 +132,33 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
   return instantiate(__func__, false, name, token, false, environment, logMessage);
 }
 
-void fmi3FreeInstance(fmi3Instance c) { delete static_cast<Component*>(c); }
-
-fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean loggingOn, size_t nCategories,
-                               const fmi3String categories[]) {
-  return call(c, __func__, any_phase, &Component::set_debugging, loggingOn, nCategories, categories);
-}
-
 // Life cycle
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
-  return call(c, __func__, fmi::instantiated, [&](Component& k) {
+  return call(c, __func__, instantiated, [&](Component& k) {
     k.instance.setup(startTime, stopTimeDefined ? stopTime : std::numeric_limits<double>::infinity(),
                      toleranceDefined ? tolerance : 0.0);
-    k.enter(fmi::initialization, "entered initialization mode");
+    k.enter(initialization, "entered initialization mode");
   });
 }
 
-fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
-  return call(c, __func__, fmi::initialization, &Component::start);
-}
-
 fmi3Status fmi3EnterEventMode(fmi3Instance c) {
-  return call(c, __func__, fmi::step_complete, [](Component& k) {
+  return call(c, __func__, step_complete, [](Component& k) {
     if (!k.event_mode_used) throw std::logic_error("not allowed: it was instantiated with eventModeUsed = false");
-    k.enter(fmi::event_mode, "entered event mode");
+    k.enter(event_mode, "entered event mode");
   });
 }
 
 fmi3Status fmi3EnterStepMode(fmi3Instance c) {
-  return call(c, __func__, fmi::event_mode, &Component::enter, fmi::step_complete, "entered step mode");
+  return call(c, __func__, event_mode, &Component::enter, step_complete, "entered step mode");
 }
 
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean* discreteStatesNeedUpdate,
                                     fmi3Boolean* terminateSimulation, fmi3Boolean* nominalsOfContinuousStatesChanged,
                                     fmi3Boolean* valuesOfContinuousStatesChanged, fmi3Boolean* nextEventTimeDefined,
                                     fmi3Float64* nextEventTime) {
-  return call(c, __func__, fmi::event_mode, [&](Component& k) {
+  return call(c, __func__, event_mode, [&](Component& k) {
     k.instance.update();
     for (fmi3Boolean* told : {discreteStatesNeedUpdate, terminateSimulation, nominalsOfContinuousStatesChanged,
                               valuesOfContinuousStatesChanged, nextEventTimeDefined})
@@ -178,20 +167,14 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean* discreteStatesN
   });
 }
 
-fmi3Status fmi3Terminate(fmi3Instance c) {
-  return call(c, __func__, fmi::running, &Component::enter, fmi::terminated, "terminated");
-}
-
-fmi3Status fmi3Reset(fmi3Instance c) { return call(c, __func__, any_phase, &Component::reset); }
-
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
                       fmi3Boolean, fmi3Boolean* eventHandlingNeeded, fmi3Boolean* terminateSimulation,
                       fmi3Boolean* earlyReturn, fmi3Float64* lastSuccessfulTime) {
-  return call(c, __func__, fmi::step_complete, [&](Component& k) {
-    fmi::require_arrays(1, {{eventHandlingNeeded, "eventHandlingNeeded"},
-                            {terminateSimulation, "terminateSimulation"},
-                            {earlyReturn, "earlyReturn"},
-                            {lastSuccessfulTime, "lastSuccessfulTime"}});
+  return call(c, __func__, step_complete, [&](Component& k) {
+    require_arrays(1, {{eventHandlingNeeded, "eventHandlingNeeded"},
+                       {terminateSimulation, "terminateSimulation"},
+                       {earlyReturn, "earlyReturn"},
+                       {lastSuccessfulTime, "lastSuccessfulTime"}});
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = k.instance.progress.time;
     const auto [size, event] = k.step(currentCommunicationPoint, communicationStepSize, k.early_return_allowed);
@@ -219,7 +202,7 @@ SPRINGBEAM_VALUES(Boolean)
 
 #define SPRINGBEAM_NONE_OF(type, get_parameters, set_parameters)                                                     \
   fmi3Status fmi3Get##type get_parameters { return call(c, __func__, any_phase, &Component::refuse_all, n, #type); } \
-  fmi3Status fmi3Set##type set_parameters { return call(c, __func__, fmi::settable, &Component::refuse_all, n, #type); }
+  fmi3Status fmi3Set##type set_parameters { return call(c, __func__, settable, &Component::refuse_all, n, #type); }
 #define SPRINGBEAM_NO_NUMBERS(type)                                                                      \
   SPRINGBEAM_NONE_OF(type, (fmi3Instance c, const fmi3ValueReference[], size_t n, fmi3##type[], size_t), \
                      (fmi3Instance c, const fmi3ValueReference[], size_t n, const fmi3##type[], size_t))
@@ -239,32 +222,11 @@ SPRINGBEAM_NONE_OF(Clock, (fmi3Instance c, const fmi3ValueReference[], size_t n,
 #undef SPRINGBEAM_NO_NUMBERS
 #undef SPRINGBEAM_NONE_OF
 
-// States
-
-fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState* state) {
-  return call(c, __func__, any_phase, &Component::get_state, state);
-}
-fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
-  return call(c, __func__, any_phase, &Component::set_state, state);
-}
-fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState* state) {
-  return call(c, __func__, any_phase, &Component::free_state, state);
-}
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t* size) {
-  return call(c, __func__, any_phase, &Component::state_size, state, size);
-}
-fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size) {
-  return call(c, __func__, any_phase, &Component::serialize, state, bytes, size);
-}
-fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState* state) {
-  return call(c, __func__, any_phase, &Component::deserialize, bytes, size, state);
-}
-
 // Derivatives
 
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Int32 orders[],
                                     fmi3Float64 values[], size_t m) {
-  return call(c, __func__, fmi::stepped, [&](Component& k) {
+  return call(c, __func__, stepped, [&](Component& k) {
     require_sizes(vr, n, values, m);
     k.output_derivatives(vr, n, orders, values);
   });
@@ -273,7 +235,7 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t nUnknowns,
                                         const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                         size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity) {
-  return call(c, __func__, fmi::after_instantiation, [&](Component& k) {
+  return call(c, __func__, after_instantiation, [&](Component& k) {
     require_sizes(unknowns, nUnknowns, sensitivity, nSensitivity);
     require_sizes(knowns, nKnowns, seed, nSeed);
     k.directional_derivative(unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);

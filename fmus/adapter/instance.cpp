@@ -31,17 +31,6 @@ void require_allowed(const Variable& v, double value) {
   if (value < v.min || value > v.max) refuse(v, value, " is not in [" + number(v.min) + ", " + number(v.max) + "]");
 }
 
-/// Of a state that came from outside.
-void require_allowed(const Variable& v, const Polynomial& p) {
-  require_allowed(v, p[0]);
-  const bool whole = p[0] == std::floor(p[0]) && std::abs(p[0]) <= std::numeric_limits<int>::max();
-  if ((v.type == Type::integer && !whole) || (v.type == Type::boolean && p[0] != 0.0 && p[0] != 1.0))
-    refuse(v, p[0], std::string(" is not of its type, ") + name(v.type));
-  for (const double derivative : {p[1], p[2]})
-    if (!std::isnan(derivative) && !(v.continuous_input() && std::isfinite(derivative)))
-      refuse(v, derivative, " is no derivative that it can have");
-}
-
 bool is_setting(const Variable& v) { return v.causality == Causality::parameter || v.exact; }
 
 }  // namespace
@@ -261,14 +250,11 @@ void Instance::settle(bool stepped) {
 void Instance::save(Snapshot& s) const {
   s.progress = progress;
   s.values = values_;
-  s.foreign = false;
   s.numerics.clear();
   if (built_) model_->save(s.numerics);
 }
 
-void Instance::restore(Snapshot& s) {
-  if (s.foreign)
-    for (std::size_t i = 0; i < settable_.size(); ++i) require_allowed(*settable_[i], s.values[i]);
+void Instance::restore(const Snapshot& s) {
   built_ = built_ && !s.numerics.empty() && progress.tolerance == s.progress.tolerance;
   progress.tolerance = s.progress.tolerance;
   for (std::size_t i = 0; i < settable_.size(); ++i) {
@@ -279,10 +265,8 @@ void Instance::restore(Snapshot& s) {
   }
   if (!s.numerics.empty()) {
     ensure_built();
-    if (s.foreign) model_->require_state(s.numerics);
     model_->restore(s.numerics);
   }
-  s.foreign = false;
   progress = s.progress;
 }
 

@@ -44,8 +44,7 @@ class Instance {
 
   /// Into a snapshot that may hold an earlier state: its memory is used again.
   void save(Snapshot& snapshot) const;
-  /// A foreign snapshot is checked, and then no longer foreign. @throws std::invalid_argument if it is no state
-  void restore(Snapshot& snapshot);
+  void restore(const Snapshot& snapshot);
 
   std::size_t n_values() const { return values_.size(); }
 

