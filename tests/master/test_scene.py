@@ -296,3 +296,29 @@ def test_a_scene_with_all_lengths_in_mm_is_named():
     (found,) = [line for line in said if "lengths are in m" in line]
     assert "3.92e+08 kg, beside [spring] mass = 0.0002; in mm it would be 0.5 m long, of 0.393 kg" in found
     assert list(implausible(scenes[1])) == []
+
+
+def test_a_spring_that_is_held_until_the_tip_arrives_is_told_the_force_on_it():
+    """3 Ψ − 0.2 Ψ³ of it holds the load where Ψ = 1 and the load is 2.8 N; else the spring would move by itself."""
+    for load, told in (
+        (2.8, []),
+        (4.0, ["1.2 N act on it there, and the top is held until the tip arrives at t = 0.5"]),
+    ):
+        at_one = changed(
+            beam={"initial_deflection_slope": 1.5}, spring={"equilibrium": 1.0, "external_force": load}, stop=None
+        )
+        found = [line.partition(": ")[2] for line in suspicions(scene_from_dict(at_one)) if "N act on it" in line]
+        assert [line[: len(told[0])] for line in found] == told
+
+
+def test_what_is_wrong_or_doubtful_of_a_load_names_it(tmp_path):
+    """The second of three; lines 0.1 ms apart are finer than a quarter of 1 ms."""
+    np.savetxt(tmp_path / "fine.csv", [[1e-4 * k, 1.0] for k in range(20)], delimiter=",")
+    push = {"on": "spring"}
+    fine = changed(loads=[push, {"signal": "table", "file": str(tmp_path / "fine.csv"), **push}, push])
+    (told,) = suspicions(scene_from_dict(fine))
+    assert told.startswith("[loads.1] file = ")
+    assert "closer than a quarter of [coupling] macro_step = 0.001, so steps do not end on them" in told
+    assert suspicions(scene_from_dict({**fine, "coupling": {"macro_step": 3e-4}})) == []
+    with pytest.raises(SceneError, match=r"^scene: \[loads\.1\] on = \"beam\": acts on a \[beam\], and .* none$"):
+        scene_from_dict(changed(beam=None, loads=[push, {"on": "beam"}, push]))

@@ -5,10 +5,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -19,19 +20,41 @@ from .tables import Table, key
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-#: Which keys each signal takes: those that it needs, and others.
-_TAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "constant": ((), ()),
-    "harmonic": (("frequency",), ("phase", "start", "duration")),
-    "chirp": (("frequency", "frequency_end", "duration"), ("phase", "start")),
-    "half_sine": (("duration",), ("start",)),
-    "sawtooth": (("duration",), ("start",)),
-    "trapezoid": (("duration", "rise"), ("start",)),
-    "step": ((), ("start", "duration")),
-    "ramp": (("duration",), ("start",)),
-    "table": (("file",), ("interpolation", "start")),
+
+class Signal(NamedTuple):
+    """A signal: keys that it needs, keys that it may have, and its value over the amplitude at t [s] after `start`."""
+
+    needs: tuple[str, ...]
+    may: tuple[str, ...]
+    value: Callable[[Any, np.ndarray], Any]
+
+
+#: By their names in a scene; what a value is before a signal begins and after its end does not count.
+SIGNALS: dict[str, Signal] = {
+    "constant": Signal((), (), lambda load, t: 1.0),
+    "harmonic": Signal(
+        ("frequency",), ("phase", "start", "duration"), lambda load, t: np.sin(load.rate * t + load.phase)
+    ),
+    "chirp": Signal(
+        ("frequency", "frequency_end", "duration"),
+        ("phase", "start"),
+        lambda load, t: np.sin(
+            2.0 * np.pi * (load.frequency + 0.5 * (load.frequency_end - load.frequency) * t / load.duration) * t
+            + load.phase
+        ),
+    ),
+    "half_sine": Signal(("duration",), ("start",), lambda load, t: np.sin(np.pi / load.duration * t)),
+    "sawtooth": Signal(("duration",), ("start",), lambda load, t: t / load.duration),
+    "trapezoid": Signal(
+        ("duration", "rise"),
+        ("start",),
+        lambda load, t: np.clip(np.minimum(t, load.duration - t) / load.rise, 0.0, 1.0),
+    ),
+    "step": Signal((), ("start", "duration"), lambda load, t: 1.0),
+    "ramp": Signal(("duration",), ("start",), lambda load, t: np.clip(t / load.duration, 0.0, 1.0)),
+    "table": Signal(("file",), ("interpolation", "start"), lambda load, t: load.record(t)),
 }
-_OF_SIGNALS = ("frequency", "frequency_end", "phase", "start", "duration", "rise", "file", "interpolation")
+_OF_SIGNALS = {name for signal in SIGNALS.values() for name in signal.needs + signal.may}
 #: So many lines of a table in a step are data, and no kinks that are worth the end of one.
 LINES_IN_STEP = 4
 #: Most different places of point forces on a beam.
@@ -72,27 +95,29 @@ class Load(Table):
     interpolation: Literal["linear", "cubic"] = key("–", "between the lines of a table", "linear")
 
     @model_validator(mode="after")
-    def _keys_of_signal(self) -> Load:
-        given = [name for name in _OF_SIGNALS if getattr(self, name) != type(self).model_fields[name].default]
-        needs, may_have = _TAKES[self.signal]
-        for name in given:
-            if name not in needs + may_have:
-                allowed = ", ".join(needs + may_have) or "none of these keys"
-                raise ValueError(
-                    f'{name} = {getattr(self, name)!r}: plays no part in signal = "{self.signal}"; it takes {allowed}'
-                )
-        for name in needs:
-            if getattr(self, name) is None:
-                raise ValueError(f'{name}: missing; signal = "{self.signal}" needs it')
-        for name in ("shape", "at"):
-            if getattr(self, name) is not None and self.on != "beam":
-                raise ValueError(f'{name} = {getattr(self, name)!r}: is for on = "beam", this load is on = "{self.on}"')
+    def _keys_fit(self) -> Load:
+        needs, may, _ = SIGNALS[self.signal]
+        values = {name: getattr(self, name) for name in type(self).model_fields}
+        given = {name: value for name, value in values.items() if value != type(self).model_fields[name].default}
+        takes = ", ".join(needs + may) or "none of these keys"
+        wrong = [
+            f'{name} = {given[name]!r}: plays no part in signal = "{self.signal}"; it takes {takes}'
+            for name in given
+            if name in _OF_SIGNALS.difference(needs, may)
+        ]
+        wrong += [f'{name}: missing; signal = "{self.signal}" needs it' for name in needs if values[name] is None]
+        wrong += [
+            f'{name} = {given[name]!r}: is for on = "beam", this load is on = "{self.on}"'
+            for name in ("shape", "at")
+            if name in given and self.on != "beam"
+        ]
         if self.shape is not None and self.at is not None:
-            raise ValueError(f"at = {self.at}: a load has a shape or acts at a point; leave one of the two out")
-        if self.rise is not None and self.duration is not None and self.rise > 0.5 * self.duration:
-            raise ValueError(f"rise = {self.rise}: must be at most half of duration = {self.duration}")
-        if self.signal == "table":
-            _ = self.record  # refuses what is no table
+            wrong.append(f"at = {self.at}: a load has a shape or acts at a point; leave one of the two out")
+        if self.rise is not None and self.rise > 0.5 * (self.duration or inf):
+            wrong.append(f"rise = {self.rise}: must be at most half of duration = {self.duration}")
+        if wrong:
+            raise ValueError(wrong[0])
+        _ = self._extent  # refuses what is no table
         return self
 
     @property
@@ -101,18 +126,22 @@ class Load(Table):
         return {"beam": "N" if self.at is not None else "N/m", "base": "m/s²"}.get(self.on, "N")
 
     @property
+    def _extent(self) -> tuple[float, float]:
+        """From when to when it is not 0 [s], counted from `start`."""
+        if self.signal == "table":
+            return float(self.record.x[0]), float(self.record.x[-1])
+        ends = {"constant": (-inf, inf), "ramp": (0.0, inf)}
+        return ends.get(self.signal, (0.0, self.duration or inf))
+
+    @property
     def begins(self) -> float:
         """Time [s] before which the load is 0; −∞ of a constant."""
-        if self.signal == "constant":
-            return -inf
-        return self.start + (float(self.record.x[0]) if self.signal == "table" else 0.0)
+        return self.start + self._extent[0]
 
     @property
     def end(self) -> float:
         """Time [s] from which on the load is 0; ∞ if there is none."""
-        if self.signal == "table":
-            return self.start + float(self.record.x[-1])
-        return inf if self.duration is None or self.signal == "ramp" else self.start + self.duration
+        return self.start + self._extent[1]
 
     @property
     def peak(self) -> float:
@@ -139,12 +168,10 @@ class Load(Table):
         if self.signal == "constant":
             return []
         if self.signal == "table":
-            times = self.start + self.record.x
-            return list((times[[0, -1]] if self.interpolation == "cubic" else times).tolist())
-        if self.duration is None:
-            return [self.start]
-        bends = [] if self.rise is None else [self.rise, self.duration - self.rise]
-        return [self.start + since for since in (0.0, *bends, self.duration)]
+            lines = self.start + self.record.x
+            return list((lines[[0, -1]] if self.interpolation == "cubic" else lines).tolist())
+        rise, duration = self.rise or 0.0, self.duration or 0.0
+        return [self.start + since for since in sorted({0.0, rise, duration - rise, duration})]
 
     @property
     def record(self) -> PPoly:
@@ -159,35 +186,17 @@ class Load(Table):
 
     def value(self, times: Any) -> np.ndarray:
         """Return the signal at ``times`` [s], any shape, in `unit`; where it jumps, the value after the jump."""
-        t = np.asarray(times, dtype=float) - self.start
-        if self.signal == "constant":
-            return np.full_like(t, self.amplitude)
-        if self.signal == "table":
-            record = self.record
-            return np.asarray(self.amplitude * np.where((t >= record.x[0]) & (t <= record.x[-1]), record(t), 0.0))
-        duration = inf if self.duration is None else self.duration
-        if self.signal == "ramp":
-            return self.amplitude * np.clip(t / duration, 0.0, 1.0)
-        wave = np.ones_like(t)
-        if self.signal == "harmonic":
-            wave = np.sin(self.rate * t + self.phase)
-        elif self.signal == "chirp":
-            first, last = self.frequency or 0.0, self.frequency_end or 0.0
-            wave = np.sin(2.0 * np.pi * (first + 0.5 * (last - first) * t / duration) * t + self.phase)
-        elif self.signal == "half_sine":
-            wave = np.sin(np.pi / duration * t)
-        elif self.signal == "sawtooth":
-            wave = t / duration
-        elif self.signal == "trapezoid":
-            wave = np.clip(np.minimum(t, duration - t) / (self.rise or inf), 0.0, 1.0)
-        return np.where((t >= 0.0) & (t < duration), self.amplitude * wave, 0.0)
+        t, (first, last) = np.asarray(times, dtype=float) - self.start, self._extent
+        to_the_end = np.less_equal if self.signal == "table" else np.less  # the last line of a table belongs to it
+        value = self.amplitude * SIGNALS[self.signal].value(self, t)
+        return np.where((t >= first) & to_the_end(t, last), value, 0.0)
 
 
 @lru_cache(maxsize=16)
 def _record(path: Path, modified: int, interpolation: str, unit: str) -> PPoly:
     recorded = Recorded(path)
-    if len(recorded) != 2:
-        raise ValueError(f"{len(recorded)} columns; a table has two, time and value")
+    if len(recorded.units) != 2:
+        raise ValueError(f"{len(recorded.units)} columns; a table has two, time and value")
     values, times = recorded.column(1, unit), recorded.times()
     from scipy.interpolate import CubicSpline, PPoly  # takes half a second to load: only for who has a table
 

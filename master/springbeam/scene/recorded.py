@@ -10,16 +10,14 @@ from __future__ import annotations
 
 import csv
 import re
-from functools import lru_cache
-from math import isfinite
+from math import isnan, nan
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 #: Standard gravity [m/s²].
 GRAVITY = 9.80665
-_NAME = re.compile(r"\s*(.*?)(?:\s*\[(.*)\]|\s+\((.*)\))?\s*")
+_NAME_AND_UNIT = re.compile(r"^\s*(.*?)(?:\s*\[(.*)\]|\s+\((.*)\))?\s*$")
 
 
 class Recorded:
@@ -33,76 +31,61 @@ class Recorded:
         kept = [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
         separator = max(",;\t", key=kept[0][1].count) if kept else ","
         self._rows = [(number, next(csv.reader([line], delimiter=separator))) for number, line in kept]
-        named = bool(kept) and _number(self._rows[0][1][0]) is None
-        cells = self._rows.pop(0)[1] if named else self._rows[0][1] if kept else []
-        found = [m for cell in cells if (m := _NAME.fullmatch(cell)) is not None]
+        first = self._rows[0][1] if kept else []
+        named = bool(first) and isnan(_number(first[0]))
         #: Names of the columns, none where the file has none.
-        self.names = [m[1] for m in found] if named else []
-        self._units = [(m[2] or m[3] or "") if named else "" for m in found]
-        self._labels = self.names or [str(k + 1) for k in range(len(found))]
-        if kept and len(found) < 2:
+        self.names = [_NAME_AND_UNIT.sub(r"\1", cell) for cell in first if named]
+        #: Their units, "" where the file has none.
+        self.units = [_NAME_AND_UNIT.sub(r"\2\3", cell) if named else "" for cell in first]
+        self._labels = self.names or [str(k + 1) for k in range(len(first))]
+        del self._rows[:named]
+        if len(first) == 1:
             raise ValueError(f"line {kept[0][0]}: one column; there must be two at least, with , or ; or a tab between")
         if len(self._rows) < 2:
             raise ValueError(f"{len(self._rows)} lines with numbers; there must be two at least")
         for number, row in self._rows:
-            if len(row) != len(found):
-                raise ValueError(f"line {number}: {len(row)} columns; the first line has {len(found)}")
-
-    def __len__(self) -> int:
-        return len(self._units)
+            if len(row) != len(first):
+                raise ValueError(f"line {number}: {len(row)} columns; the first line has {len(first)}")
 
     def times(self) -> np.ndarray:
         """Return the first column [s], ascending, shape (n,)."""
         times = self.column(0, "s")
         if not (rising := np.diff(times) > 0.0).all():
-            row = int(np.argmin(rising))
-            before, after = (self._rows[k][1][0].strip() for k in (row, row + 1))
-            raise ValueError(f"line {self._rows[row + 1][0]}: time {after} comes after {before}; times must increase")
+            (_, before), (number, after) = self._rows[(row := int(np.argmin(rising))) : row + 2]
+            raise ValueError(
+                f"line {number}: time {after[0].strip()} comes after {before[0].strip()}; times must increase"
+            )
         return times
 
     def column(self, k: int, wanted: str = "") -> np.ndarray:
         """Return column ``k`` in the unit ``wanted``, as it is without any; shape (n,)."""
-        found = []
-        for number, row in self._rows:
-            value = _number(row[k])
-            if value is None or not isfinite(value):
-                cell = row[k].strip()[:40]
-                remedy = "decimals have a point" if "," in cell else "leave the line out, or begin it with #"
-                raise ValueError(f"line {number}, column {self._labels[k]}: {cell!r} is not a finite number; {remedy}")
-            found.append(value)
-        unit = self._units[k]
-        return (
-            _factor(unit, wanted, f"column {self._labels[k]}") * np.array(found) if unit and wanted else np.array(found)
-        )
-
-    def unit(self, k: int) -> str:
-        """Return the unit of column ``k``, "" if the file has none."""
-        return self._units[k]
+        values, label = np.array([_number(row[k]) for _, row in self._rows]), f"column {self._labels[k]}"
+        if not (finite := np.isfinite(values)).all():
+            number, row = self._rows[int(np.argmin(finite))]
+            remedy = "decimals have a point" if "," in row[k] else "leave the line out, or begin it with #"
+            raise ValueError(f"line {number}, {label}: {row[k].strip()[:40]!r} is not a finite number; {remedy}")
+        try:
+            return values * _factor(self.units[k], wanted)
+        except ValueError as error:
+            raise ValueError(f"{label}: [{self.units[k]}] is no unit of what a run has in {wanted}: {error}") from error
 
 
-def _number(text: str) -> float | None:
+def _number(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        return None
+        return nan
 
 
-@lru_cache(maxsize=1)
-def _registry() -> Any:
-    from pint import UnitRegistry  # takes a second: only for who has units to convert
-
-    return UnitRegistry()
-
-
-def _factor(unit: str, wanted: str, where: str) -> float:
-    """Return what a value in ``unit`` is multiplied by to have it in ``wanted``."""
-    if unit == wanted:
+def _factor(unit: str, wanted: str) -> float:
+    """Return what a value in ``unit`` is multiplied by to have it in ``wanted``; 1 where one of them is not known."""
+    if not unit or wanted in ("", unit):
         return 1.0
     if (unit, wanted) == ("g", "m/s²"):
         return GRAVITY
-    from pint.errors import PintError
+    from pint import PintError, Quantity  # takes a second: only for who has units to convert
 
     try:
-        return float(_registry().Quantity(1.0, unit.replace("·", "*")).to(wanted.replace("·", "*")).magnitude)
-    except (PintError, ValueError, AssertionError) as error:
-        raise ValueError(f"{where}: [{unit}] is no unit of what a run has in {wanted}: {error}") from error
+        return float(Quantity(1.0, unit.replace("·", "*")).to(wanted.replace("·", "*")).magnitude)
+    except (PintError, AssertionError) as error:
+        raise ValueError(str(error)) from error

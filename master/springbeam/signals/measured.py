@@ -87,7 +87,7 @@ def _read(file: Recorded, units: Mapping[str, str], names: Mapping[str, str]) ->
     for name, what in wanted.items():
         Expression(what).check(column for column in units if column != "phase")
         k = 1 + there.index(name)
-        own = units[what] if what in units else _unit_of(what, units) if file.unit(k) else ""
+        own = units[what] if what in units else _unit_of(what, units) if file.units[k] else ""
         values[what] = file.column(k, own)
     return Measured(file.times(), values)
 
