@@ -222,6 +222,14 @@ def test_a_table_may_name_its_units_and_be_parted_by_semicolons(text):
     assert load.value([load.start + 0.005, load.start + 0.01]) == pytest.approx([1.5, 2.0], rel=1e-12)
 
 
+def test_a_table_ends_with_its_last_line_and_a_ramp_stays():
+    Path("record.csv").write_text("time [ms],acceleration [g]\n0,1\n10,2\n")
+    table = Load(on="base", signal="table", file="record.csv")
+    assert table.value([-1e-9, 0.0, 0.01, 0.010001]) == pytest.approx([0.0, 9.80665, 2.0 * 9.80665, 0.0])
+    ramp = Load(on="tip", signal="ramp", duration=0.01, amplitude=3.0)
+    assert ramp.value([-1e-9, 0.005, 0.01, 7.0]) == pytest.approx([0.0, 1.5, 3.0, 3.0])
+
+
 @pytest.mark.parametrize(
     ("text", "error"),
     [

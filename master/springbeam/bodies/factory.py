@@ -66,8 +66,9 @@ def _body(
     if scene.static:
         tip = tip_load_deflection(spec) + contact * tip_compliance(spec)
         return QuasiStaticBeam(spec, scene.coupling.degree, tip, 0.0)
-    assert scene.tip_at_start is not None
-    tip, velocity = scene.tip_at_start.value + start_time * rate * spec.length, rate * spec.length
+    tip_at_start = scene.at_start("beam")
+    assert tip_at_start is not None
+    tip, velocity = tip_at_start.value + start_time * rate * spec.length, rate * spec.length
     beam = QuasiStaticBeam(spec, scene.coupling.degree, tip, velocity)
     if spec.approach == "elastic" or scene.contact.soft:
         beam.release()

@@ -60,7 +60,7 @@ def schema() -> dict[str, Any]:
         described.pop("required", None)
         for key in described["properties"].values():
             # What says nothing about a file is left out: TOML has no null, and names are titles enough.
-            key |= next((way for way in key.pop("anyOf", ()) if way.get("type") != "null"), {})
+            key |= key.pop("anyOf", [{}])[0]
             for name, empty in (("title", key.get("title")), ("default", None), ("otherwise", "")):
                 if name in key and (key[name] == empty or isinstance(key[name], dict)):
                     del key[name]

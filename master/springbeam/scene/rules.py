@@ -88,7 +88,7 @@ def _of_others(when: Callable[[Scene], bool], text: str) -> Iterator[Rule]:
 
 def _ends(scene: Scene) -> Mapping[str, Any]:
     """Return where both ends are at the start, and what the tip meets, for the texts of rules."""
-    heights = {"tip": scene.tip_at_start, "top": scene.top_at_start, "target": scene.tip_target}
+    heights = {"tip": scene.at_start("beam"), "top": scene.at_start("spring"), "target": scene.tip_target}
     return {name: at(scene, height.key) for name, height in heights.items() if height is not None} | {
         "height": heights["tip"].value if heights["tip"] else None,
         "below": -(scene.initial_clearance or 0.0),
@@ -371,7 +371,7 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     # Heights
     Rule(
-        lambda s: s.stop and s.top_at_start and s.stop.position >= s.top_at_start.value,
+        lambda s: s.stop and (top := s.at_start("spring")) and s.stop.position >= top.value,
         "{stop.position}: the foundation must lie below {top}",
         _ends,
     ),
@@ -379,9 +379,9 @@ FORBIDDEN: tuple[Rule, ...] = (
         lambda s: (
             s.contact.lasting
             and s.contact.rigid
-            and s.tip_at_start
-            and s.top_at_start
-            and not math.isclose(s.tip_at_start.value, s.top_at_start.value, rel_tol=1e-12)
+            and (tip := s.at_start("beam"))
+            and (top := s.at_start("spring"))
+            and not math.isclose(tip.value, top.value, rel_tol=1e-12)
         ),
         "{tip}: the tip starts at {height:.6g} m, but {contact.law} holds it at {top}; let them start at one height, "
         'or use "link"',

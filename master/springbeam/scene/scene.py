@@ -67,12 +67,10 @@ class Scene(Table):
         Those outside the tables go by their names.
         """
         data = self.model_dump(exclude_none=True)
-        data |= {f"loads.{i}": load for i, load in enumerate(data.pop("loads", ()))}
-        values: dict[str, Any] = {}
-        for name, content in data.items():
-            within = isinstance(content, dict)
-            values |= {f"{name}.{key}": value for key, value in content.items()} if within else {name: content}
-        return values
+        tables = data | {f"loads.{i}": load for i, load in enumerate(data.pop("loads", ()))}
+        outside = {name: value for name, value in data.items() if not isinstance(value, dict)}
+        within = {name: content for name, content in tables.items() if isinstance(content, dict)}
+        return outside | {f"{name}.{key}": value for name, content in within.items() for key, value in content.items()}
 
     @property
     def joins(self) -> bool:
@@ -126,27 +124,20 @@ class Scene(Table):
             return self.spring.linear_stiffness
         return None
 
-    @property
-    def tip_at_start(self) -> Height | None:
-        """Where the upper end is at the start; ``None`` where only an FMU knows, or it is found.
+    def at_start(self, table: str) -> Height | None:
+        """Return where the end of the body ``[table]`` is at the start.
 
-        That is s₀ L, or the static deflection of a beam let go without inertia and damping.
+        ``None`` where only an FMU knows, or it is found. For our spring that is Ψ, for our beam s₀ L, or its static
+        deflection if it is let go without inertia and damping.
         """
-        body = self.upper
+        body = self.under(table)
         if body is None or body.START is None or self.static:
             return None
         height: float = getattr(body, body.START)
         if isinstance(body, Beam):
             static = self.massless and body.approach == "elastic" and body.alpha_b == 0.0
             height = tip_load_deflection(body) if static else height * body.length
-        return Height(f"beam.{body.START}", height)
-
-    @property
-    def top_at_start(self) -> Height | None:
-        """Where the lower end is at the start, of our spring Ψ; ``None`` where only an FMU knows, or it is found."""
-        if self.lower is None or self.lower.START is None or self.static:
-            return None
-        return Height(f"spring.{self.lower.START}", getattr(self.lower, self.lower.START))
+        return Height(f"{table}.{body.START}", height)
 
     @property
     def tip_target(self) -> Height | None:
@@ -157,13 +148,13 @@ class Scene(Table):
         if self.upper is None or self.contact.lasting:
             return None
         if self.lower is not None:
-            return self.top_at_start
+            return self.at_start("spring")
         return None if self.stop is None else Height("stop.position", self.stop.position)
 
     @property
     def initial_clearance(self) -> float | None:
         """Height [m] of the upper end above `tip_target` at the start, 0 where only rounding separates them."""
-        tip, target = self.tip_at_start, self.tip_target
+        tip, target = self.at_start("beam"), self.tip_target
         if tip is None or target is None:
             return None
         return 0.0 if math.isclose(tip.value, target.value, rel_tol=1e-12) else tip.value - target.value

@@ -6,6 +6,8 @@ Field names are those of the FMU parameters; units are SI. `springbeam.scene.rul
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Callable
 from math import pi
 from typing import Any, ClassVar, Literal, NamedTuple
 
@@ -86,7 +88,10 @@ class Table(BaseModel):
     #: Of a body: the key that says where its end is at the start; ``None`` where only an FMU knows.
     START: ClassVar[str | None] = None
 
-    #: Keys that follow from others that were given; files do not have them.
+    #: Which keys follow from others: where they do, by the keys given, and their values, by the values of these.
+    FOLLOWS: ClassVar[tuple[tuple[Callable[[set[str]], bool], dict[str, Callable[[Any], float]]], ...]] = ()
+
+    #: Keys that have followed so; files do not have them.
     _followed: frozenset[str] = PrivateAttr(frozenset())
 
     @classmethod
@@ -99,24 +104,25 @@ class Table(BaseModel):
         """Return the table of `ones` with some keys changed."""
         return cls(**{**cls.ones(), **keys})
 
-    @classmethod
-    def _follows(cls, data: dict[str, Any]) -> dict[str, Any]:
-        """Return the values of keys that follow from those given."""
-        return {}
-
     @model_validator(mode="wrap")
     @classmethod
     def _completed(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         if not isinstance(data, dict):
             return handler(data)
-        given = [name for name, value in data.items() if value is not None]
+        given = {name for name, value in data.items() if value is not None}
         for ways in cls.WAYS:
             if len(groups := ways.taken(given)) > 1:
                 both = [name for group in groups for name in group if name in given]
                 raise ValueError(f"{', '.join(both)}: give the {ways.thing} one way: {ways}")
-        follows = {name: value for name, value in cls._follows(data).items() if name not in given}
-        if not any(name in given for name in cls.SCALES):
+        # A bad value, which is reported as such, counts as 1.
+        sane = {name: x for name, x in data.items() if isinstance(x, (int, float)) and abs(x) < 1e300}
+        following = [values for follow, values in cls.FOLLOWS if follow(given)]
+        follows = {
+            name: value(defaultdict(lambda: 1.0, sane)) for values in following for name, value in values.items()
+        }
+        if given.isdisjoint(cls.SCALES):
             follows |= {name: one for name, one in cls.ones().items() if name in cls.SCALES}
+        follows = {name: value for name, value in follows.items() if name not in given}
         table = handler({**data, **follows})
         table._followed = frozenset(follows)
         return table
@@ -198,31 +204,35 @@ class Beam(Table):
         ("width", "height", "diameter", "poisson_ratio", "approach_speed", "approach", "fidelity")
     )
 
-    @classmethod
-    def _follows(cls, data: dict[str, Any]) -> dict[str, Any]:
-        """Return what follows from the given keys: A, I, K of a section, G, s₁; a bad value is reported as such."""
-
-        def number(name: str) -> float | None:
-            value = data.get(name)
-            if value is None or (isinstance(value, (int, float)) and abs(value) < 1e300):
-                return value
-            return 1.0
-
-        follows: dict[str, Any] = {}
-        b, h, d = number("width"), number("height"), number("diameter")
-        if b is not None and h is not None:
-            follows |= {"area": b * h, "second_moment_of_area": b * h * h * h / 12.0, "shear_coefficient": 5.0 / 6.0}
-        elif d is not None:
-            follows |= {"area": pi * d * d / 4.0, "second_moment_of_area": pi * d * d * d * d / 64.0}
-            follows["shear_coefficient"] = 9.0 / 10.0
-        elif data.get("area") is None:
-            follows["shear_coefficient"] = 1.0  # what is missing is the section
-        E, nu, L, speed = number("young_modulus"), number("poisson_ratio"), number("length"), number("approach_speed")
-        if nu is not None:
-            follows["shear_modulus"] = (1.0 if E is None else E) / (2.0 * (1.0 + nu)) if nu > -1.0 else 1.0
-        if speed is not None:
-            follows["initial_velocity_slope"] = 0.0 - speed / (L or 1.0)
-        return follows
+    FOLLOWS = (
+        (lambda given: "area" not in given, {"shear_coefficient": lambda k: 1.0}),  # what is missing is the section
+        (
+            lambda given: {"width", "height"} <= given,
+            {
+                "area": lambda k: k["width"] * k["height"],
+                "second_moment_of_area": lambda k: k["width"] * k["height"] * k["height"] * k["height"] / 12.0,
+                "shear_coefficient": lambda k: 5.0 / 6.0,
+            },
+        ),
+        (
+            lambda given: "diameter" in given,
+            {
+                "area": lambda k: pi * k["diameter"] * k["diameter"] / 4.0,
+                "second_moment_of_area": lambda k: (
+                    pi * k["diameter"] * k["diameter"] * k["diameter"] * k["diameter"] / 64.0
+                ),
+                "shear_coefficient": lambda k: 9.0 / 10.0,
+            },
+        ),
+        (
+            lambda given: "poisson_ratio" in given,
+            {"shear_modulus": lambda k: k["young_modulus"] / (2.0 * (abs(1.0 + k["poisson_ratio"]) or 1.0))},
+        ),
+        (
+            lambda given: "approach_speed" in given,
+            {"initial_velocity_slope": lambda k: 0.0 - k["approach_speed"] / (k["length"] or 1.0)},
+        ),
+    )
 
     @property
     def section_height(self) -> float:
