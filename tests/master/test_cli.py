@@ -25,7 +25,7 @@ from springbeam.results.directory import PICTURES
 from springbeam.results.reading import load_trajectory
 from springbeam.results.steps import STEP
 from springbeam.results.totals import totals
-from springbeam.scene import load_scene, shipped_scenes, with_changes
+from springbeam.scene import load_scene, with_changes
 
 SUMMARY = {"status": "done", "macro_steps": 31, "wall_time": 0.25, "max_energy_residual": 3e-14, "warnings": []}
 
@@ -88,15 +88,6 @@ def test_a_picture_that_cannot_be_written_ends_with_3_and_loses_nothing(here, mo
     assert "no pictures: " in result.stderr
     assert "No space left on device; what was computed is in results/soft" in " ".join(result.stderr.split())
     assert len(load_trajectory(here / "results" / "soft")) == 31
-
-
-def test_results_are_named_after_the_file_and_a_second_run_does_not_touch_the_first(here):
-    (here / "mine.toml").write_text(shipped_scenes()["soft"].read_text(encoding="utf-8"), encoding="utf-8")
-    assert "results   results/mine\n" in printed("run", "mine.toml", "--no-plots")
-    summary = here / "results" / "mine" / "summary.json"
-    first = summary.stat().st_mtime_ns
-    assert "results   results/mine-2\n" in printed("run", "mine.toml", "--no-plots")
-    assert summary.stat().st_mtime_ns == first
 
 
 def test_report_fits_80_columns_with_whole_numbers_and_warnings_as_they_are(here, monkeypatch):

@@ -31,18 +31,6 @@ def test_legendre_coefficients_and_derivatives_are_one_polynomial(a, size):
 
 
 @pytest.mark.parametrize("size", [1e-4, 0.5])
-def test_free_mass_response_is_the_repeated_integral(size):
-    """m y⁽²⁾ = −P_k from rest: displacement, velocity and both integrals are its 2nd, 1st, 3rd, 4th integrals."""
-    mass = 0.37
-    for k, motion in enumerate(force.free_mass_response(2, size, mass)):
-        p = Legendre.basis(k, domain=(0.0, size))
-        exact = [-p.integ(n, lbnd=0.0)(size) / mass for n in (2, 1, 3, 4)]
-        scales = [size**n / mass for n in (2, 1, 3, 4)]
-        for got, want, scale in zip(motion, exact, scales, strict=True):
-            assert got == pytest.approx(want, abs=4 * EPS * scale)
-
-
-@pytest.mark.parametrize("size", [1e-4, 0.5])
 def test_the_work_on_an_end_is_of_its_motion_from_wherever_it_starts(size):
     """∫ C ẇ over w = 0.3 + 0.4 s − 0.7 s² + 0.2 s³, s = τ/H."""
     w, a = np.polynomial.Polynomial([0.3, 0.4, -0.7, 0.2]), COEFFICIENTS[2]

@@ -5,12 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bodies import orders, simulate
+from bodies import simulate
 from references import integrated_anew
 from scenes import scene_from_dict
 
 from springbeam.bodies import force
-from springbeam.monolithic import event_driven
 from springbeam.run.loads import Signal
 from springbeam.scene import Load, SceneError, load_scene, with_changes
 from springbeam.scene.linearised import contact_energy
@@ -125,31 +124,6 @@ def test_a_chirp_turns_from_one_frequency_to_the_other():
 def test_a_signal_with_wrong_keys_is_refused(keys, why):
     with pytest.raises(ValueError, match=why):
         Load(on="tip", **keys)
-
-
-ORDERS = [("energy", 0, 4, 2), ("energy", 1, 4, 2), ("energy", 2, 6, 4), ("hermite", 1, 4, 4), ("hermite", 2, 6, 6)]
-
-
-@pytest.mark.parametrize(
-    ("names", "scheme", "degree", "displacement", "velocity"),
-    [(("harmonic", "cubic", "linear", "constant"), *row) for row in ORDERS]
-    # Steps of another size, as before a jump, cost degree 0 the order 4 that it has on a regular grid.
-    + [(("pulse", "ramp", "step", "burst"), *row) for row in ORDERS[1:]]
-    + [(("chirp", "sawtooth", "trapezoid"), *ORDERS[2])],
-)
-def test_the_schemes_keep_their_orders_under_loads(names, scheme, degree, displacement, velocity):
-    """Tied, before any event; bounded from both sides where rounding is not reached."""
-    sizes, errors = (2e-3, 1e-3), []
-    for size in sizes:
-        scene = soft(*names, t_end=0.05, scheme=scheme, degree=degree, macro_step=size)
-        run = simulate(scene)
-        rows = run.time > 0.01
-        exact = event_driven.simulate(scene, sample_times=run.time[rows])
-        errors.append([np.abs(run[column][rows] - exact[column]).max() for column in ("y", "z")])
-    found = [orders(column, sizes)[0] for column in np.transpose(errors)]
-    for order, expected, error in zip(found, (displacement, velocity), errors[-1], strict=True):
-        assert order > expected - 0.5 or error < 1e-14
-        assert order < expected + 1.5 or error < 1e-12
 
 
 @pytest.mark.parametrize(

@@ -60,17 +60,6 @@ def test_what_is_neglected_is_below_the_bound(what):
     assert one_way.summary["max_energy_residual"] < 1e-13
 
 
-def test_the_driving_body_steps_once_a_macro_step():
-    for feedback, driver, changes in (
-        ("beam_drives", "beam", {}),
-        ("spring_drives", "spring", CASES["heavy spring"][1]),
-    ):
-        two_way = simulate(scene(**changes))
-        one_way = simulate(scene(**{**changes, "coupling": {"feedback": feedback}}))
-        assert one_way.summary["work"][driver] == one_way.summary["macro_steps"] == 200
-        assert two_way.summary["work"][driver] > 1.2 * 200
-
-
 def test_a_step_on_the_foundation_is_of_the_degree_asked_for_whatever_was_tried_before(monkeypatch):
     """A step with the lower end let go was tried, found no force above degree 0, and was not taken."""
     coupling = OneWay(Compliance(1e3, 1.5), 2, 1e-12, upper_drives=True)

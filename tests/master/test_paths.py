@@ -57,23 +57,6 @@ def test_path_and_cubic_are_apart_by_no_more_than_they_say(even, odd):
         assert told == pytest.approx(apart, rel=1e-4)
 
 
-def test_orders_of_path_and_cubic():
-    """cos(ωτ) over one step: H⁶/46080 and H⁴/384 of the derivative in the middle; the distance tells the cubic's."""
-    errors = []
-    for turn in (0.8, 0.4):
-        w, half = turn, 0.5 * turn
-        samples = [(np.cos(x), -w * np.sin(x)) for x in (-half, half)]
-        mean = 2.0 * np.sin(half) / turn
-        # ∫∫ cos = ∫ (1 − s) cos; symmetric about the middle, so half the mean.
-        path = Path.through(*samples, 1.0, (mean, 0.5 * mean))
-        cubic = Path.through(*samples, 1.0)
-        s = np.linspace(0.0, 1.0, 101)
-        exact = np.cos(-half + turn * s)
-        errors.append([max(abs(f.at(x) - y) for x, y in zip(s, exact, strict=True)) for f in (path, cubic)])
-        assert path.beside_cubic == pytest.approx(errors[-1][1], rel=0.05)
-    assert np.log2(np.divide(*errors)) == pytest.approx([6.0, 4.0], abs=0.1)
-
-
 def test_a_quartic_is_beside_the_cubic_through_its_ends_and_a_cubic_is_not():
     """s⁴ lies s²(1 − s)² above it: 1/30 in the mean, and 1/30 as twice the moment ∫(1 − s) s²(1 − s)² ds = 1/60."""
     assert through(Polynomial((0.0, 0.0, 0.0, 0.0, 1.0))).moments_beside_cubic == pytest.approx(1.0 / 30.0, rel=1e-12)

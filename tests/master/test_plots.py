@@ -87,21 +87,6 @@ def test_axes_have_quantities_and_units_and_the_key_names_phases_and_events(pict
         assert (NOT_RESOLVED in texts(marked)) is not resolved
 
 
-def test_shapes_start_at_first_contact():
-    """A beam moving as u = −2 t x² has the mean velocity −2 x² between any two shapes."""
-    t = np.linspace(0.0, 0.6, 400)
-    run = a_trajectory(events=[Event(0.1, "separation"), Event(0.2, "impact")])
-    figure = figure_of(
-        dataclasses.replace(run, shapes=(t, np.outer(-2.0 * t, SHAPE_POINTS**2))), "shapes_after_contact"
-    )
-    curves, velocities = (ax.collections[0] for ax in figure.axes[:2])
-    times = curves.get_array()
-    assert 0.2 <= times[0] < 0.2 + 0.6 / 399
-    assert np.allclose(velocities.get_array(), 0.5 * (times[1:] + times[:-1]), rtol=1e-12)
-    for curve in velocities.get_segments():
-        assert np.allclose(curve[:, 1], -2.0 * SHAPE_POINTS**2, rtol=1e-12)
-
-
 T = np.linspace(0.0, 0.6, 400)
 INNER = np.outer(T, np.sin(np.pi * SHAPE_POINTS))  # 1 m/s in the middle, the tip at rest but for its bounces
 #: Columns, shapes, and what the shapes of such a run say in one of their pictures, or nothing of the kind.
@@ -203,15 +188,6 @@ def test_energies_are_stacked_to_the_total_unless_one_is_negative_and_those_too_
     lines = panel("energies", a_trajectory(e_spring=np.linspace(-1.0, 1.0, 400)))
     assert "spring" in words_in(lines)
     assert not any(curve.stacked for curve in lines.curves)
-
-
-def test_residual_is_relative_to_the_largest_energy():
-    trajectory = a_trajectory(e_beam=np.full(400, 3.0), energy_residual=np.full(400, -6e-12))
-    stored = np.abs(trajectory.e_beam) + np.abs(trajectory.e_spring) + np.abs(trajectory.e_contact)
-    for total in (0.0, 50.0):
-        trajectory.columns["e_total"] = np.full(400, total)
-        found = panel("residual", trajectory).curves[0].values
-        assert np.allclose(found, 6e-12 / max(stored.max(), total), rtol=1e-12, atol=0.0)
 
 
 def test_the_largest_mean_is_drawn_over_its_window():

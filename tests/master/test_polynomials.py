@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from springbeam.results.polynomials import derivative, sign_changes, value
+from springbeam.results.polynomials import sign_changes
 
 INSIDE = [(), (0.2,), (0.2, 0.9), (1e-9, 0.5, 1.0 - 1e-9), (0.1, 0.11, 0.5, 0.7, 0.9)]
 OUTSIDE = [(), (-0.3,), (1.7,), (-0.3, 1.7)]
@@ -40,9 +40,3 @@ def test_no_sign_change_where_a_polynomial_only_touches_zero(p):
 
 def test_values_too_small_to_be_multiplied_have_signs():
     assert sign_changes((1e-300, -4e-300), 0.0, 1.0) == [0.25]
-
-
-def test_value_and_derivative_are_those_of_numpy():
-    p = Polynomial((0.3, 1.0, -4.0, 1.5, 2.0, 1.0))
-    assert value(p.coef.tolist(), 0.7) == pytest.approx(p(0.7), rel=1e-14)
-    assert derivative(p.coef.tolist()) == pytest.approx(p.deriv().coef, rel=1e-15)

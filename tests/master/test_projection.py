@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import legendre
 from scipy.integrate import quad
 
-from springbeam.contact.laws import Compliance, Link
+from springbeam.contact.laws import Compliance
 from springbeam.coupling.projection import Projection
 
 EPS, SMALLEST = float(np.finfo(float).eps), float(np.finfo(float).smallest_subnormal)
@@ -71,33 +71,6 @@ def test_it_is_the_projection_of_the_force(degree, q, shape):
         assert value == pytest.approx(exact, abs=1e-7 * largest)
 
 
-@pytest.mark.parametrize("least", [0.02, 0.1, 0.25])
-def test_a_power_that_comes_near_its_zero_is_projected_as_well(least):
-    """p from ``least`` to 1 mm on a straight line; eight plain points leave 1e-9 and more of the largest force."""
-    law = Compliance(1e4, 1.5)
-    start, x = 1e-3 * least, [1e-3, 0.5e-3 * (1.0 + least)]
-    c = series(Projection(law, 1), start, x)
-    exact = 1.5 * integral(lambda s: law.force(legendre.legval(s, c)) * s, c)
-    assert Projection(law, 1).force(start, SIZE, x)[1] == pytest.approx(exact, abs=1e-10 * law.force(1e-3))
-
-
-@pytest.mark.parametrize("law", [Compliance(1e4, 1.5), Compliance(1e4, 3.0, 0.5), Link(1e4, 20.0)], ids=repr)
-@pytest.mark.parametrize("degree", [0, 1, 2])
-@pytest.mark.parametrize("shape", ["in", "opens", "dips in"])
-def test_slopes_are_those_of_the_force(law, degree, shape):
-    """Central differences, second order in 1e-5 of the penetration; the correction along p̃′ is not differentiated."""
-    projection = Projection(law, degree)
-    start, x = numbers(shape, degree)
-    slope = np.array(projection.slope(start, SIZE, x, projection.force(start, SIZE, x)))
-    for j in range(degree + 1):
-        ends = []
-        for sign in (1.0, -1.0):
-            moved = list(x)
-            moved[j] += sign * 1e-8
-            ends.append(np.array(projection.force(start, SIZE, moved)))
-        assert (ends[0] - ends[1]) / 2e-8 == pytest.approx(slope[:, j], rel=1e-4, abs=1e-4 * np.abs(slope).max())
-
-
 @given(
     start=st.floats(-1e-2, 1e-2), end=st.floats(-1e-2, 1e-2), mean=st.floats(-1e-2, 1e-2), skew=st.floats(-5e-3, 5e-3),
     degree=st.sampled_from([0, 1, 2]), q=st.floats(1.0, 4.0), chi=st.floats(0.0, 3.0),
@@ -116,17 +89,6 @@ def test_damping_never_gives_energy(start, end, mean, skew, degree, q, chi):
     dissipated = projection.dissipated(start, SIZE, x) if law.damped else 0.0
     assert dissipated >= -roundings
     assert work(projection, a, start, x) - gained == pytest.approx(dissipated, abs=roundings)
-
-
-@pytest.mark.parametrize("degree", [0, 1, 2])
-def test_a_link_dissipates_its_dashpots_work(degree):
-    """D ṗ = c ṗ², of p̃ exactly."""
-    law = Link(0.0, 20.0)
-    projection = Projection(law, degree)
-    start, x = numbers("in", degree)
-    rate = 2.0 / SIZE * legendre.legder(series(projection, start, x))
-    exact = 20.0 * 0.5 * SIZE * quad(lambda s: legendre.legval(s, rate) ** 2, -1.0, 1.0)[0]
-    assert projection.dissipated(start, SIZE, x) == pytest.approx(exact, rel=1e-13)
 
 
 # -- degree 0: the discrete gradient ----------------------------------------------------------------------------------

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from bodies import orders, simulate
-from scenes import kinds, scene_from_dict
+from bodies import simulate
+from scenes import scene_from_dict
 from scipy.sparse.linalg import spsolve
 
 from springbeam.bodies.quasi_static import QuasiStaticBeam
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import assemble, constant_forces
 from springbeam.results.contact_times import contact_changes
-from springbeam.scene import Beam, Coupling, statics, suspicions, with_changes
+from springbeam.scene import Beam, Coupling, statics, suspicions
 from springbeam.scene.statics import SHAPE_POINTS
 
 BEAM = Beam.with_ones(
@@ -74,32 +74,6 @@ def scene(**tables):
         "coupling": {"macro_step": 0.01},
     }  # fmt: skip
     return scene_from_dict({table: {**data.get(table, {}), **tables.get(table, {})} for table in {**data, **tables}})
-
-
-@pytest.mark.parametrize("alpha", [0.0, 0.02, 0.4])
-@pytest.mark.parametrize(
-    ("degree", "sizes", "order"), [(0, (0.02, 0.01), 2), (1, (0.02, 0.01), 4), (2, (0.07, 0.035), 6)]
-)
-def test_tied_it_is_a_spring_in_parallel(degree, sizes, order, alpha):
-    """m ÿ + k α ẏ + (k1 + k) y = k u_F in closed form; order 2d + 2, and no energy lost or gained at any step."""
-    errors = []
-    for size in sizes:
-        run = simulate(scene(beam={"alpha_b": alpha}, coupling={"macro_step": size, "degree": degree}))
-        assert [e.kind for e in run.events] == ["impact"]
-        assert run.events[0].energy_loss == 0.0
-        assert run.events[0].z == -0.5
-        beam = run.scene.beam
-        k, rest, m = 1.0 / statics.tip_compliance(beam), statics.tip_load_deflection(beam), 2.0
-        roots = np.roots([m, k * alpha, 3.0 + k]).astype(complex)
-        mean = k * rest / (3.0 + k)
-        amplitudes = np.linalg.solve(np.vstack([np.ones(2), roots]), [-mean, -0.5])
-        exact = mean + (np.exp(np.outer(run.time, roots)) @ amplitudes).real
-        errors.append(np.abs(run.y - exact).max())
-        assert run.summary["max_energy_residual"] < 1e-13
-        # The coupling's tolerance of the motion over a step, up to 0.5 m/s · H.
-        assert np.abs(run.u_tip - run.y).max() < 1e-12 * 0.6 * size + 1e-15
-        assert run.e_dissipated[-1] > 0.0 if alpha else run.e_dissipated[-1] == 0.0
-    assert orders(errors, sizes)[0] == pytest.approx(order, abs=0.25)
 
 
 @pytest.mark.parametrize(
@@ -178,19 +152,6 @@ def test_the_whole_life_is_that_of_the_reference(what):
     assert run.e_beam[0] == pytest.approx(exact.e_beam[0], rel=1e-12, abs=1e-15)  # also what no place of the tip tells
     assert run.summary["max_energy_residual"] < 1e-12
     assert np.abs(exact.energy_residual).max() < 1e-12
-
-
-def test_it_is_the_limit_of_a_light_beam():
-    """At density ρ → 0 the difference is of first order in ρ, through meeting, release and retie."""
-    light = simulate(scene(time={"t_end": 2.0}, beam={"alpha_b": 0.05}, coupling={"degree": 2}))
-    errors, densities = [], (1e-3, 1e-4, 1e-5)
-    for density in densities:
-        mesh = {"fidelity": "dynamic", "density": density, "element_degree": 4, "n_elements": 2}
-        run = simulate(with_changes(light.scene, beam=mesh))
-        assert kinds(run) == kinds(light) == ["impact", "release", "retie"]
-        errors.append(np.abs(np.interp(light.time, run.time, run.y) - light.y)[light.time < 0.8].max())
-    assert orders(errors, densities) == pytest.approx([1.0, 1.0], abs=0.005)
-    assert errors[-1] < 1e-6
 
 
 # -- what is said ----------------------------------------------------------------------------------------------------

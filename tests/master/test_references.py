@@ -7,11 +7,10 @@ import pytest
 from references import dips, integrated_anew
 from scenes import kinds, soft
 from scipy.integrate import quad
-from scipy.sparse.linalg import spsolve
 
 from springbeam.monolithic import algorithm1, event_driven
 from springbeam.monolithic.laws import law_of
-from springbeam.monolithic.semi_discrete import assemble, constant_forces, modal_beam, points
+from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.scene import Beam, load_scene, with_changes
 from springbeam.studies import exact, verify
 from springbeam.studies.verify.alone import clamped_free_frequencies
@@ -165,16 +164,6 @@ def test_a_beam_on_a_link_is_the_matrix_exponential(stiffness, damping, alpha):
     np.testing.assert_allclose(found, expected, atol=2e-13)
 
 
-@pytest.mark.parametrize("fidelity", ["dynamic", "quasi_static"])
-def test_ends_that_move_alike_are_tied_without_an_impact(fidelity):
-    changes = {"fidelity": fidelity, "initial_velocity_slope": 0.5}
-    scene = linear(contact={"law": "tie"}, beam=changes, spring={"initial_velocity": 0.5}, stop=None)
-    result = event_driven.simulate(scene)
-    assert (result.events, set(result.phase)) == ([], {"tied"})
-    assert np.max(np.abs(result.gap)) < 1e-15
-    assert np.max(np.abs(result.energy_residual)) < 1e-12
-
-
 @pytest.mark.parametrize(("name", "contact"), [("compliance", "touch"), ("compliance", "slack"), ("link", "tied")])
 def test_what_a_law_stores_and_takes_is_the_power_of_its_force(name, contact):
     """C ṗ = dΦ/dt + dissipation, with dΦ/dt from Φ itself."""
@@ -304,23 +293,6 @@ def test_the_order_of_the_frequencies_is_twice_the_degree(degree, n, reduced):
     # Of higher degrees the errors of the lowest modes are rounding, those of the highest not small yet.
     judged = orders if degree == 1 else orders[2:4]
     assert np.all(np.abs(judged - 2 * degree) < 0.08 * degree)
-
-
-@pytest.mark.parametrize("n_modes", [1, 3, 8])
-def test_truncated_beam_keeps_static_answers_and_its_start(n_modes):
-    """Tip force, uniform load and u = x lie in the space, however few the modes; the tip is exact under any load."""
-    b = beam(4.0, 9.0, n_elements=30, n_modes=n_modes, distributed_load=-2.0, tip_load_coefficient=-6.0)
-    d, m = assemble(b), modal_beam(b)
-    assert len(m.omega) == n_modes + 3
-    assert m.tip**2 @ m.omega**-2.0 == pytest.approx(spsolve(d.K, d.tip_vector)[d.tip], rel=1e-11)
-    full = spsolve(d.K, d.nodal(*constant_forces(b)))
-    assert m.tip @ (m.load / m.omega**2) == pytest.approx(full[d.tip], rel=1e-11)
-    unit = d.nodal(*points(b))
-    uniform = spsolve(d.K, unit)
-    found = m.basis @ (m.basis.T @ unit / m.omega**2)
-    np.testing.assert_allclose(found, uniform, atol=1e-11 * abs(uniform).max())
-    np.testing.assert_allclose(m.basis @ m.slope_shape, d.slope_shape, atol=1e-12)
-    np.testing.assert_allclose(m.omega[:n_modes], modal_beam(b.model_copy(update={"n_modes": 0})).omega[:n_modes])
 
 
 @pytest.mark.parametrize(("metre", "second"), [(1e-9, 1.0), (1.0, 1e-9), (1e3, 1.0)])

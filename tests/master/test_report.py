@@ -169,13 +169,6 @@ def test_the_page_opens_with_the_scene_the_motion_and_the_results():
     assert dict(described(scene))["steps"].startswith("energy of degree 2, picked by auto, macro step ")
 
 
-def test_phases_are_shaded_where_they_hold():
-    run = a_trajectory(phase=np.where(np.linspace(0.0, 0.6, 400) < 0.3, "tied", "free"))
-    tied, free = shown(run).data["backdrop"]
-    change = float(run.time[run.phase == "free"][0])
-    assert (tied["path"], free["path"]) == (f"M0.0,0V1H{change!r}V0Z", f"M{change!r},0V1H0.6V0Z")
-
-
 # -- motion -------------------------------------------------------------------------------------------------------
 
 
@@ -190,15 +183,6 @@ def test_frames_are_the_recorded_shapes_with_the_spring_of_the_same_time():
     assert motion["y"] == pytest.approx(run.y[::3], rel=1e-8)
 
 
-def test_a_curve_of_few_digits_keeps_them_and_one_that_is_too_large_its_size():
-    fine, large = 0.5 + 1e-9 * np.sin(np.arange(400.0)), np.linspace(-1e300, 1e300, 400)
-    found = curves(shown(a_trajectory(y=fine, e_beam=large)).data)
-    for name, values in (("y", fine), ("e_beam", large)):
-        assert array(found[name]["y"]).dtype == np.float64
-        assert np.ptp(array(found[name]["y"])) == pytest.approx(np.ptp(values) * 10.0 ** round(
-            np.log10(np.ptp(array(found[name]["y"])) / np.ptp(values))), rel=1e-6)  # fmt: skip
-
-
 def test_a_page_is_small_and_explains_its_words():
     text = page(a_trajectory(n=20_000, events=EVERY_EVENT))
     assert len(text) < 2_000_000
@@ -206,13 +190,6 @@ def test_a_page_is_small_and_explains_its_words():
     assert all(name.replace("_", " ") in words for name in ("tied", "free", "stop_impact", "foundation", "window"))
     assert "seated" in words
     assert "touch" not in Page(page(a_trajectory()))["glossary"]
-
-
-def test_the_window_of_the_peak_force_is_drawn():
-    told = {"contact_force_max": 8.0, "contact_force_window": 0.02, "contact_force_max_time": 0.1}
-    curve = curves(shown(**told).data)["contact_force_max"]
-    assert array(curve["x"]) == pytest.approx([0.1, 0.12], rel=1e-6)
-    assert array(curve["y"])[0] / array(curve["y"])[1] == 1.0
 
 
 def test_a_contact_lost_in_the_motion_is_drawn_once_more_enlarged():

@@ -218,13 +218,6 @@ def test_a_softening_spring_may_start_with_the_energy_of_its_lower_rim(load, sto
         assert "J deep; the run stops if it escapes" in suspicions(scene_from_dict(scene))[0]
 
 
-def test_the_beams_energy_counts_for_the_well():
-    """ρAL³s²/6 = 11.25 J, the depth k1²/4|k2|, at s = 8.2158."""
-    slow, fast = (scene_from_dict(changed(beam={"initial_velocity_slope": -s})) for s in (8.21, 8.22))
-    assert suspicions(slow) == []
-    assert "starts with 11.3 J" in suspicions(fast)[0]
-
-
 @pytest.mark.parametrize(
     ("given", "follows"),
     [

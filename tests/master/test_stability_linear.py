@@ -120,23 +120,6 @@ def test_the_matrix_of_a_damped_link_is_that_of_the_solvers(scheme, degree, stif
         assert abs(np.linalg.det(ours)) == pytest.approx(shrinks, rel=0.1 / (1 + degree) ** 2)
 
 
-@pytest.mark.parametrize("degree", [0, 1, 2])
-@pytest.mark.parametrize(("mass", "stiffness"), [(0.01, 0.0), (1.0, 0.0), (100.0, 0.0), (1.0, 1e2), (1.0, 1e8)])
-@pytest.mark.parametrize("frequency", [0.5, 3.3, 50.0, 1000.0])
-def test_energy_has_spectral_radius_one(degree, mass, stiffness, frequency):
-    """An isometry, of a tie of the states with g = 0: one to the rounding of an eigenvalue problem of size 42."""
-    p = pair(10, mass, stiffness)
-    assert spectral_radius(p, "energy", degree, frequency / omega_max(p)) == pytest.approx(1.0, abs=1e-12)
-
-
-@pytest.mark.parametrize(("degree", "turn"), [(1, 8.0), (2, 10.0)])
-@pytest.mark.parametrize("mass", [1.0, 100.0])
-def test_well_above_its_bound_hermite_amplifies(degree, turn, mass):
-    """ω_max·H is 2 and 4 at its bounds; test_automatic.py has that no pair grows below 3."""
-    p = pair(4, mass)
-    assert spectral_radius(p, "hermite", degree, turn / omega_max(p)) > 1.1
-
-
 @pytest.mark.parametrize(("scheme", "degree"), EXCHANGES)
 def test_critical_step_is_where_the_spectral_radius_passes_the_threshold(scheme, degree):
     """To 1e-3 of itself; from there on the growth has its order, 2 or 4 in H (degree 0 or 1), within 15 %."""
@@ -177,16 +160,6 @@ def test_compliance_is_predicted_where_it_is_stiffest():
     assert pressed["contact_frequency"] == pytest.approx(2.0**0.25 * cubic["contact_frequency"])
     assert [(s["scheme"], s["degree"]) for s in cubic["schemes"]] == [*ENERGY, *EXCHANGES]
     assert cubic["auto"][:2] == ("energy", 2)
-
-
-def test_an_elastic_stop_is_predicted_as_a_law_on_a_wall_and_a_coarse_drive_is_told():
-    """√(k/m_tip): the wall has no mass to swing; 20 ms at 45 Hz are 5.65 rad."""
-    scene = load_scene("vibro-impact")
-    p = predict(with_changes(scene, coupling={"macro_step": 0.02}))
-    assert [(s["scheme"], s["degree"]) for s in p["schemes"]] == [*ENERGY, *EXCHANGES]
-    assert p["contact_frequency"] == pytest.approx(np.sqrt(2e5 / p["tip_mass"]), rel=1e-12)
-    assert any("loads.0 turns 5.65 rad in a macro step; H <= 0.00354 s resolves it" in note for note in p["notes"])
-    assert not any("loads.0" in note for note in predict(scene)["notes"])
 
 
 @pytest.mark.parametrize(

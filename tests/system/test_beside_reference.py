@@ -1,6 +1,5 @@
 """Runs beside the event-driven reference, a case a line: the events, the motion and the energy."""
 
-from functools import cache
 from pathlib import Path
 
 import bodies
@@ -140,36 +139,3 @@ def test_a_run_is_that_of_the_reference(name):
         scale = min(np.ptp(exact[column]), np.abs(exact[column]).max())
         assert np.abs(run[column][rows] - there).max() <= bounds.get("motion", np.inf) * scale, column
     assert run.summary["max_energy_residual"] < bounds.get("energy", np.inf)
-
-
-GRAZING = with_changes(named("grazing"), time={"t_end": 0.06})
-
-
-@cache
-def last_of_grazing():
-    return event_driven.simulate(GRAZING, sample_times=[0.0]).events[-1]
-
-
-@pytest.mark.parametrize(
-    ("scheme", "degree", "lowest", "highest"),
-    [
-        ("energy", 0, 1.5, 3.0),
-        ("energy", 1, 3.0, 4.5),
-        ("energy", 2, 4.5, 7.0),
-        ("hermite", 1, 3.5, 5.0),
-        ("hermite", 2, 5.0, 7.0),
-    ],
-)
-def test_times_of_separation_have_the_order_of_the_motion(scheme, degree, lowest, highest):
-    """C itself has order degree + 1 at the ends of a step, and carries the image of the mismatch with `energy`; errors
-    are means over steps of four sizes, since where in a step a separation falls decides."""
-    exact = last_of_grazing()
-
-    def error(size):
-        coupling = {"scheme": scheme, "degree": degree, "macro_step": size}
-        event = simulate(with_changes(GRAZING, coupling=coupling)).events[-1]
-        assert (event.kind, exact.kind) == ("separation", "separation")
-        return np.log2(abs(event.time - exact.time))
-
-    coarse, fine = (np.mean([error(size / parts) for size in 3.3e-4 * np.linspace(0.85, 1.0, 4)]) for parts in (2, 4))
-    assert lowest <= coarse - fine <= highest

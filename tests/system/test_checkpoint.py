@@ -218,40 +218,6 @@ def test_an_interrupted_run_goes_on(interrupted, whole):
     assert not (interrupted / "run.checkpoint").exists()
 
 
-def test_rows_at_an_interval_are_those_of_a_run_that_was_never_stopped(tmp_path):
-    """They are functions of the records, whenever these were made."""
-    for name, stops in (("whole", False), ("cut", True)):
-        with FileRecorder(SCENE, RunDirectory.create(tmp_path / name), 7e-3) as recorder:
-            if stops:
-                with pytest.raises(KeyboardInterrupt):
-                    runner.run(SCENE, recorder, Interrupt(150), seconds=0.0)
-            else:
-                runner.run(SCENE, recorder)
-    springbeam.resume(tmp_path / "cut")
-    assert written(tmp_path / "cut") == written(tmp_path / "whole")
-    assert (tmp_path / "whole" / "trajectory.csv").read_text().count("\n") == 1 + int(SCENE.time.t_end / 7e-3) + 1
-
-
-def test_a_run_that_stopped_stops_again_at_the_same_place(tmp_path):
-    scene = with_changes(
-        SCENE, contact={"law": "compliance", "exponent": 1.5}, coupling={"scheme": "gauss_seidel", "macro_step": 1e-3}
-    )
-
-    def ended(run):
-        with pytest.raises(springbeam.RunStopped, match="has changed the energy by") as stopped:
-            run()
-        return stopped.value.time, written(tmp_path), load_trajectory(tmp_path).summary["status"]
-
-    def begin():
-        with FileRecorder(scene, RunDirectory.create(tmp_path)) as recorder:
-            runner.run(scene, recorder, seconds=0.01)
-
-    first = ended(begin)
-    assert first[0] > 0.1
-    assert first[2] == "stopped"
-    assert ended(lambda: springbeam.resume(tmp_path)) == first
-
-
 # -- the command, as a process --------------------------------------------------------------------------------------
 
 

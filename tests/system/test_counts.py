@@ -13,7 +13,6 @@ from springbeam.bodies.functions import Functions
 from springbeam.contact.events import EventFunctions
 from springbeam.contact.laws import law_of
 from springbeam.contact.phases import Joint, Phase
-from springbeam.scene import shipped_scenes
 
 SET_SLOPES = "fmi2SetRealInputDerivatives"
 
@@ -47,16 +46,6 @@ def counted(monkeypatch):
 
     yield run
     release()  # what is kept would go on counting
-
-
-@pytest.mark.parametrize("name", sorted(shipped_scenes()))
-def test_each_fmu_of_a_scene_is_loaded_once_and_no_other(counted, name):
-    scene = load_scene(name)
-    end = (scene.contact_time or 0.0) + 5.0 * scene.coupling.macro_step
-    _, calls = counted(with_changes(scene, time={"t_end": end}))
-    loaded = {body: number for (body, function), number in calls.items() if function == "instance"}
-    assert loaded == dict.fromkeys(scene.fmus, 1)
-    assert set(scene.fmus) == {body for body in ("beam", "spring") if getattr(scene, body) is not None}
 
 
 SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 1e-3})

@@ -99,26 +99,6 @@ def test_rows_are_themselves_and_between_them_every_column_holds(changes):
                 assert before.e_spring[0] == pytest.approx(stored, abs=1e-5 * scale)
 
 
-def test_the_smoothed_force_goes_on_to_the_end_of_its_phase():
-    """It belongs to the start of its row's step; the row at a change of phase has that of the next one."""
-    run = simulate(SOFT)
-    changes = np.flatnonzero((run.phase[1:] != run.phase[:-1]) & (np.diff(run.time) > 0.0))
-    assert len(changes) > 0
-    before = run.at(run.time[changes + 1] - 1e-6 * np.diff(run.time)[changes])
-    assert before.contact_force_smoothed == pytest.approx(run.contact_force_smoothed[changes], rel=1e-12)
-
-
-def test_soft_contact_opens_where_the_ends_part():
-    run = simulate(with_changes(SOFT, contact={"law": "compliance", "stiffness": 1e4, "exponent": 1.5}))
-    times = np.linspace(run.time[0], run.time[-1], 5003)[1:-1]
-    there = run.at(times)
-    between = ~np.isin(times, run.time)
-    assert np.array_equal((there.phase == "touch")[between], (there.gap < 0.0)[between])
-    opened = next(event.time for event in run.events if event.kind == "separation")
-    around = run.at([opened - 1e-5, opened + 1e-5])
-    assert around.phase.tolist() == ["touch", "free"]
-
-
 @pytest.mark.parametrize(
     "changes",
     [{}, {"contact": {"law": "compliance", "stiffness": 1e4, "exponent": 1.5}}, {"spring": None, "stop": None}],

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenes import scene_from_dict, soft
+from scenes import scene_from_dict
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
-from springbeam.bodies.fmu_bodies import FmuSpring
 from springbeam.monolithic import event_driven
 from springbeam.scene.reading import tomllib
 
@@ -85,46 +84,6 @@ def test_a_tip_that_is_let_go_does_not_strike_at_once():
     for run in runs:
         kinds = [event.kind for event in run.events if event.kind != "stop_impact"]
         assert kinds == ["seated", "separation"] * 2, run.scene.coupling
-
-
-@pytest.mark.parametrize(
-    ("scheme", "degree", "size"), [("energy", 2, 1e-2), ("hermite", 1, 1e-3), ("hermite", 2, 1e-3)]
-)
-@pytest.mark.parametrize(("slope", "load"), [(0.0, -0.5), (0.05, -0.5), (0.05, 0.0)])
-def test_a_tip_is_held_at_zero(scheme, degree, size, slope, load):
-    """The tip rests where its displacement is 0 while the beam moves: that is a sum of modes as large as the beam's
-    deflection, and so is its rounding. Relative to the tip's own motion no force would do."""
-    beam = {"distributed_load": load, "initial_deflection_slope": slope, "n_elements": 10}
-    stop = {"position": 0.0, "restitution": 0.0}
-    coupling = {"scheme": scheme, "degree": degree, "macro_step": size}
-    run = simulate(
-        with_changes(load_scene("beam-on-stop"), time={"t_end": 0.5}, beam=beam, stop=stop, coupling=coupling)
-    )
-    seated = run.phase == "seated"
-    assert seated.sum() * size > 0.01
-    assert np.abs(run.u_tip[seated]).max() < 1e-14
-    assert run.summary["halved_steps"] == 0
-
-
-@pytest.mark.parametrize(
-    ("stiffness", "exponent", "degree", "size"), [(1e12, 1.0, 0, 1e-3), (1e12, 1.0, 1, 4e-3), (1e8, 1.5, 2, 4e-3)]
-)
-def test_the_force_of_a_contact_that_is_far_too_stiff_is_found(stiffness, exponent, degree, size):
-    """Some 10⁴ rad a step: no step is halved or made at degree 0, since the law is first softened, then stiffened."""
-    contact = {"law": "compliance", "stiffness": stiffness, "exponent": exponent}
-    coupling = {"macro_step": size, "degree": degree}
-    run = simulate(soft(10, time={"t_end": 0.3}, stop=None, contact=contact, coupling=coupling))
-    assert (run.summary["halved_steps"], run.summary.get("reduced_steps", 0)) == (0, 0)
-    assert run.summary["number_of_contacts"] > 0
-
-
-def test_finite_outputs_whose_sum_is_not_are_taken():
-    """½ k y² and ½ m z² are 1.44e308 J each."""
-    spring = {"mass": 2.0, "linear_stiffness": 2.0, "equilibrium": 1.2e154, "initial_velocity": 1.2e154}
-    body = FmuSpring(scene_from_dict({"time": {"t_end": 1.0}, "spring": spring}).spring, 0.0)
-    assert body.energies()[:2] == pytest.approx([1.44e308] * 2, rel=1e-14)
-    assert not np.isfinite(sum(body.energies()[:2]))
-    body.close()
 
 
 def test_a_force_too_large_for_a_double_halves_the_step():

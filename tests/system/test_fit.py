@@ -9,21 +9,21 @@ from commands import command, printed, refused
 from scenes import scene_from_dict
 
 from springbeam import SceneError, load_scene, simulate, with_changes
-from springbeam.signals.measured import read_measured, residuals, time_shift
+from springbeam.signals.measured import read_measured, residuals
 from springbeam.studies.fit import Fit
 from springbeam.studies.study import record_all
 
-TRUE = {"spring.linear_stiffness": 800.0, "spring.damping": 1.2, "shift": 0.0}
+TRUE = {"spring.linear_stiffness": 800.0, "spring.damping": 1.2}
 OSCILLATOR = scene_from_dict(
     {
-        "time": {"t_end": 0.6},
+        "time": {"t_end": 0.3},
         "spring": {"mass": 0.2, "linear_stiffness": 800.0, "damping": 1.2, "initial_velocity": 0.4},
         "coupling": {"macro_step": 5e-3},
     }
 )
 #: Starts away from what is right, as a user would.
 GUESSES = ("spring.linear_stiffness=700", "spring.damping=2")
-TIMES = np.linspace(0.01, 0.59, 150)
+TIMES = np.linspace(0.01, 0.29, 75)
 
 
 def exact(times=TIMES):
@@ -52,17 +52,6 @@ def test_units_and_names_of_a_file(tmp_path):
     assert found.time == pytest.approx(TIMES, rel=1e-15)
     assert found.values["a_y"] == pytest.approx(9.80665 * TIMES, rel=1e-15)
     assert list(read_measured(path, OSCILLATOR).values) == ["y"]
-
-
-def test_the_shift_of_a_clock_is_found_and_what_is_left_is_rounding(tmp_path):
-    run = simulate(OSCILLATOR)
-    path = written(tmp_path / "m.csv", "time,y [mm]", TIMES[20:100] + 3.7, 1e3 * exact()[20:100])
-    measured = read_measured(path, OSCILLATOR)
-    shift = time_shift(run, measured)
-    assert shift == pytest.approx(-3.7, abs=1e-6)
-    (left,) = residuals(run, measured, -3.7)
-    assert (left.signal, left.points) == ("y", 80)
-    assert left.rms < 1e-10
 
 
 def test_residuals_are_those_of_each_curve(tmp_path):
@@ -114,20 +103,10 @@ def test_the_command_compare_takes_a_measurement(tmp_path, monkeypatch):
 # -- keys found ---------------------------------------------------------------------------------------------------
 
 
-def test_keys_are_found_to_1e_6_without_noise(tmp_path):
-    path = written(tmp_path / "m.csv", "time,y", TIMES, exact())
-    found = fitted(path)
-    assert found["undetermined"] == []
-    for row in found["keys"]:
-        assert row["value"] == pytest.approx(TRUE[row["key"]], rel=1e-6, abs=1e-9)
-        assert row["low"] <= row["value"] <= row["high"]
-    assert len(found["runs"]) > 10
-
-
 def test_a_contact_is_found_by_the_acceleration_of_the_tip_through_impacts(tmp_path):
-    scene = load_scene("vibro-impact", ["time.t_end=0.2", "beam.n_elements=6", "beam.n_modes=3"])
+    scene = load_scene("vibro-impact", ["time.t_end=0.06", "beam.n_elements=6", "beam.n_modes=3"])
     run = simulate(scene)
-    times = np.linspace(1e-3, 0.199, 400)
+    times = np.linspace(1e-3, 0.059, 150)
     found = run.at(times)
     path = written(tmp_path / "m.csv", "time,u_tip,acc [g]", times, found["u_tip"], found["a_tip"] / 9.80665)
     guess = 1.2 * scene.contact.stiffness
@@ -136,17 +115,15 @@ def test_a_contact_is_found_by_the_acceleration_of_the_tip_through_impacts(tmp_p
     assert key["value"] == pytest.approx(scene.contact.stiffness, rel=1e-6)
 
 
-@pytest.mark.parametrize("late", [3.7e-3, -3.7e-3, 13.0])
-def test_a_clock_that_is_off_is_found_beside_keys(tmp_path, late):
+@pytest.mark.parametrize("late", [0.0, 3.7e-3, 13.0])
+def test_keys_and_a_clock_that_is_off_are_found_to_1e_6_without_noise(tmp_path, late):
     path = written(tmp_path / "m.csv", "time,y", TIMES + late, exact())
     found = fitted(path)
     assert found["undetermined"] == []
-    stiffness, damping, shift = found["keys"]
-    assert stiffness["value"] == pytest.approx(800.0, rel=1e-6)
-    assert damping["value"] == pytest.approx(1.2, rel=1e-6)
-    assert shift["key"] == "shift"
-    assert shift["value"] == pytest.approx(-late, abs=1e-6)
-    assert shift["low"] <= shift["value"] <= shift["high"]
+    for row in found["keys"]:
+        assert row["value"] == pytest.approx({**TRUE, "shift": -late}[row["key"]], rel=1e-6, abs=1e-6)
+        assert row["low"] <= row["value"] <= row["high"]
+    assert len(found["runs"]) > 10
 
 
 def test_a_clock_that_the_data_does_not_tell_is_held(tmp_path):
@@ -166,32 +143,20 @@ def test_a_clock_is_held_where_the_user_says(tmp_path):
     assert stiffness["value"] == pytest.approx(800.0, rel=1e-6)
 
 
-def covered(seeds, tmp_path, **options):
-    """How often the interval of each key holds what is right, of data with noise of 2 % of the largest value."""
+def test_intervals_hold_what_is_right_in_most_cases(tmp_path):
+    """Of data with noise of 2 % of the largest value; the clock is held.
+
+    Four of four have a chance of 81 %, three or more of 98.6 %; these seeds are fixed.
+    """
     hits = Counter()
-    for seed in seeds:
+    for seed in range(4):
         noise = 0.02 * np.abs(exact()).max() * np.random.default_rng(seed).normal(size=len(TIMES))
         path = written(tmp_path / f"{seed}.csv", "time,y", TIMES, exact() + noise)
-        for row in fitted(path, ["spring.linear_stiffness=780", "spring.damping=1.4"], **options)["keys"]:
+        for row in fitted(path, ["spring.linear_stiffness=780", "spring.damping=1.4"], shift=0.0)["keys"]:
             hits[row["key"]] += row["low"] <= TRUE[row["key"]] <= row["high"]
-            assert row["high"] - row["low"] < 0.2 * (TRUE[row["key"]] or 0.1)
-    return hits
-
-
-def test_intervals_hold_what_is_right_in_most_cases(tmp_path):
-    """Four of four have a chance of 81 %, three or more of 98.6 %; these seeds are fixed, and the clock is held."""
-    hits = covered(range(4), tmp_path, shift=0.0)
-    assert hits.keys() == TRUE.keys() - {"shift"}
+            assert row["high"] - row["low"] < 0.2 * TRUE[row["key"]]
+    assert hits.keys() == TRUE.keys()
     assert min(hits.values()) >= 3
-
-
-@pytest.mark.slow
-def test_intervals_hold_what_is_right_in_95_of_100(tmp_path):
-    """Intervals of 95 % hold in 90 … 99 of 100 cases, with a probability of 98 % each.
-
-    The same search on the closed form holds in 94.9, 95.2 and 95.4 % of 2000 cases, and in 92, 91 and 91 of these 100.
-    """
-    assert [key for key, hits in covered(range(100), tmp_path).items() if 90 <= hits <= 99] == list(TRUE)
 
 
 @pytest.mark.parametrize(

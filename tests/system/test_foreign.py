@@ -15,7 +15,7 @@ import tomli_w
 from commands import HANGS, command, printed, refused
 from scenes import kinds
 
-from springbeam import RunStopped, SceneError, load_scene, resume, simulate, with_changes
+from springbeam import RunStopped, SceneError, resume, simulate, with_changes
 from springbeam.bodies import isolated
 from springbeam.bodies.protocol import FmuError
 from springbeam.results.directory import RunDirectory
@@ -131,33 +131,6 @@ BEAM_NAMES = {
     "potential_energy": "strain_energy",
     "dissipated_energy": "dissipated_energy",
 }
-SPRING_NAMES = {
-    "force": "contact_force",
-    "displacement": "displacement",
-    "velocity": "velocity",
-    "integral": "displacement_integral",
-    "integral_2": "displacement_integral_2",
-    "impulse": "impulse",
-    "kinetic_energy": "kinetic_energy",
-    "potential_energy": "potential_energy",
-}
-
-
-def test_our_own_fmus_named_as_foreign_ones_give_our_own_run(fmu_folder):
-    """Three events of `soft`, with masses that are measured."""
-    soft = with_changes(load_scene("soft"), time={"t_end": 0.15}, coupling={"degree": 2, "macro_step": 1e-3})
-    own, data = simulate(soft), soft.model_dump(exclude_none=True)
-    left_out = ("approach", "approach_speed", "fidelity", "integrator", "mass_matrix", "initial_velocity")
-    for table, names in (("beam", BEAM_NAMES), ("spring", SPRING_NAMES)):
-        parameters = {key: value for key, value in data[table].items() if key not in left_out and value != 0.0}
-        data[table] = {**names, "fmu": str(fmu_folder / f"{table}.fmu"), "parameters": parameters}
-    run = simulate(scene_from_dict(data))
-    assert kinds(run) == kinds(own)
-    assert np.abs(run.u_tip - own.u_tip).max() < 1e-12
-    assert np.abs(run.y - own.y).max() < 1e-12
-    assert run.summary["warnings"] == []
-
-
 ELEMENT = {"element": "spring_damper", "mass": M2, "stiffness": K, "damping": C}
 #: A mass of weight 8 N below: its tables, and the stiffness k of what holds it.
 HEAVY = {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from springbeam import PointMass, load_scene, simulate, with_changes
+from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
 from springbeam.pictures import panels
 from springbeam.studies.metrics import METRICS
@@ -83,24 +83,6 @@ def test_every_row_satisfies_the_equation_of_the_spring(degree):
     elastic = s.damping * run.z + s.linear_stiffness * run.y + s.cubic_stiffness * run.y**3
     rest = inertia + elastic + run.contact_force - run.foundation_force - run.load_4 - s.external_force
     assert np.abs(rest).max() < 1e-13 * np.abs(inertia).max()
-
-
-def test_between_rows_they_are_there_too():
-    run = simulate(SOFT)
-    middle = 0.5 * (run.time[40] + run.time[41])
-    found = run.at([run.time[40], middle])
-    assert found.clamp_force[0] == run.clamp_force[40]
-    assert found.clamp_force[1] == pytest.approx(0.5 * (run.clamp_force[40] + run.clamp_force[41]), rel=1e-12)
-    s = run.scene.spring
-    force = -s.linear_stiffness * found.y[1] - s.cubic_stiffness * found.y[1] ** 3 - found.contact_force[1]
-    assert found.a_y[1] == pytest.approx(force / s.mass, rel=1e-13)
-
-
-def test_a_body_of_the_callers_leaves_its_columns_out():
-    scene = with_changes(SOFT, stop=None)
-    run = simulate(scene, lower=PointMass(1.0))
-    assert "a_y" not in run.columns
-    assert {"a_tip", "clamp_force", "clamp_moment"} <= run.columns.keys()
 
 
 #: A beam that turns as its clamp does not let it: the clamp feels 50 times as much at the start as later.

@@ -217,18 +217,6 @@ def test_the_grid_covers_the_ranges():
     assert sampled_cells(300, 1) == cells != sampled_cells(300, 2)
 
 
-@pytest.mark.parametrize("s", SLICES, ids=[s.name for s in SLICES])
-def test_slices_reach_both_ends(s):
-    axes = {p.name: p for p in PARAMETERS}
-    mine = [cell for cell in slice_cells(3) if cell["slice"] == s.name]
-    assert len(mine) == 9
-    for name in (s.x, s.y):
-        values = {cell[name] for cell in mine}
-        assert len(values) == 3
-        assert max(values) == pytest.approx(axes[name].high)
-        assert min(values) == pytest.approx(0.0 if axes[name].zero else axes[name].low)
-
-
 # -- a part of it ---------------------------------------------------------------------------------------------------
 
 

@@ -96,25 +96,6 @@ def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
         assert rows["first_stop_impact"][k] == next(e.time for e in run.events if e.kind == "stop_impact")
 
 
-@pytest.mark.parametrize(
-    ("values", "log", "borders"),
-    [([1.0, 2.0, 4.0], False, [0.5, 1.5, 3.0, 5.0]), ([1.0, 100.0], True, [0.1, 10.0, 1000.0])],
-)
-def test_cells_of_a_map_meet_halfway_between_their_values(values, log, borders):
-    """The lowest cell of a logarithmic key was below 0, and not to be seen."""
-    assert picture._borders(np.array(values), log) == pytest.approx(borders, rel=1e-12)
-
-
-def test_what_multiplies_a_scale_stands_in_the_title_where_nothing_is_over_it():
-    pairs = enumerate(product((1.0, 2.0), (0.0, 1.0)))
-    rows = [{"spring.mass": m, "spring.damping": d, "y_min": 1e-7 * k} for k, (m, d) in pairs]
-    scales = [Scale("spring.mass", "m"), Scale("spring.damping", "c")]
-    for several in (scales[:1], scales):
-        panels = picture.multiples(rows, several, {"y_min": "y_min [m]"}, "").axes
-        assert panels[0].get_title() == "y_min [m]   1e−7"
-        assert not panels[-1].yaxis.get_offset_text().get_visible()
-
-
 def drawn(count):
     """The panels and colours of a grid of ``count`` axes with two values each, and one metric: the row's number."""
     names = "abcdef"[:count]

@@ -185,12 +185,9 @@ def test_the_implicit_methods_get_the_jacobian(method):
     """By differences it would take as many evaluations as there are unknowns."""
     what = with_changes(load_scene("soft"), beam={"n_elements": 20}, time={"t_end": 0.02})
     times = np.linspace(0.0, 0.02, 21)
-    solved = Rival(what).solve(method, 1e-5, 1e-9, times)
-    assert worst(motion_errors(solved.columns, event_driven.simulate(what, sample_times=times))) < 1e-4
-    phase = next(iter(Rival(what)._phases.values()), None)
-    assert phase is None
     rival = Rival(what)
-    rival.solve(method, 1e-5, 1e-9, times)
+    solved = rival.solve(method, 1e-5, 1e-9, times)
+    assert worst(motion_errors(solved.columns, event_driven.simulate(what, sample_times=times))) < 1e-4
     (phase,) = rival._phases.values()
     X = np.random.default_rng(0).normal(size=82)
     for k in (0, 45, 80):

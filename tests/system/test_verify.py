@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from commands import command, printed
 from rich.console import Console
@@ -15,10 +14,7 @@ from springbeam.bodies.protocol import StepRefused
 from springbeam.cli.checks import report
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.tie import SCHEMES
-from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.scene import Beam
 from springbeam.studies import verify
-from springbeam.studies.verify.alone import clamped_free_frequencies
 from springbeam.studies.verify.check import Check, section
 from springbeam.studies.verify.coupled import _airy_overshoot
 
@@ -169,13 +165,6 @@ def test_a_case_that_cannot_be_computed_fails_alone_and_with_its_cause():
 
 
 # -- the exact values themselves ------------------------------------------------------------------------------------
-
-
-def test_frequencies_of_the_transfer_matrix_are_the_limit_of_the_mesh():
-    """Extrapolation by h² leaves O((kh)⁴), 0.05⁴ relative at n = 160."""
-    w = np.array(clamped_free_frequencies()[:6])
-    coarse, fine = (modal_beam(Beam.with_ones(n_elements=n)).omega[:6] for n in (80, 160))
-    assert (4.0 * fine - coarse) / 3.0 == pytest.approx(w, rel=(8.4 / 80.0) ** 4)
 
 
 def test_the_overshoot_of_a_dispersed_step_is_the_integral_of_airy():
