@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scenes import scene_from_dict
 
-from springbeam.results.contact_times import contact_changes, tip_contacts
+from springbeam.results.contact_times import contact_changes, foundation_contacts, tip_contacts
 from springbeam.results.contact_times import contact_time_difference as difference
 from springbeam.results.steps import STEP
 from springbeam.results.trajectory import Event, Trajectory
@@ -103,9 +103,15 @@ def test_changes_of_contact_are_named_in_their_order():
     )  # fmt: skip
     expected = [("closes", 0.0), ("strikes", 0.3), ("leaves", 0.35), ("opens", 0.4)]
     assert contact_changes(events, 0.01) == expected  # the last contact is too short
-    assert contact_changes(events, 0.004)[-2:] == [("closes", 0.6), ("opens", 0.605)]
+    strokes = [("strikes", 0.3), ("strikes", 0.305), ("leaves", 0.35)]  # an impact leaves at once, without a rest
+    assert contact_changes(events, 0.004)[1:] == [*strokes, ("opens", 0.4), ("closes", 0.6), ("opens", 0.605)]
     # What closes and opens at once is seen without a window.
     assert contact_changes(GRAZE, 0.0)[-2:] == [("closes", 0.7), ("opens", 0.7)]
+
+
+def test_a_rest_on_the_foundation_ends_where_the_tip_parts_from_it():
+    rest = run((0.2, "seated"), (0.5, "separation")).events
+    assert foundation_contacts(rest, 1.0) == [(0.2, 0.5)]
 
 
 @pytest.mark.parametrize(("phase", "last"), [("free", [("opens", 0.4)]), ("touch", [])])

@@ -165,3 +165,23 @@ def test_a_peak_may_be_where_the_run_begins():
     assert found(steps, window=0.2)["contact_force_max"] == pytest.approx(0.9, rel=1e-13)
     struck = found(steps, Event(0.0, "impact", impulse_contact=0.05), window=0.2)
     assert struck["contact_force_max"] == pytest.approx(0.9 + 0.05 / 0.2, rel=1e-13)
+
+
+@pytest.mark.parametrize("at", [0.0, 1.0])
+def test_an_impulse_at_an_end_of_the_run_belongs_to_the_window_that_touches_it(at):
+    """C = 12 t (1 − t) in one step, in which another window is the best of those that do not touch the impulse."""
+    steps = steps_with(lambda t: (12.0 * t * (1.0 - t), 12.0 - 24.0 * t, -24.0), [0.0, 1.0])
+    numbers = found(steps, Event(at, "impact", impulse_contact=1.0), window=0.2)
+    assert numbers["contact_force_max"] * 0.2 == pytest.approx(1.0 + 6.0 * 0.2**2 - 4.0 * 0.2**3, rel=1e-13)
+
+
+def test_an_impulse_is_not_lost_by_the_rounding_of_a_window():
+    assert (0.9 - 0.19) + 0.19 < 0.9
+    steps = steps_with(lambda t: (1.0, 0.0, 0.0), [0.0, 0.9])
+    numbers = found(steps, Event(0.9, "impact", impulse_contact=1.0), window=0.19)
+    assert numbers["contact_force_max"] * 0.19 == pytest.approx(1.0 + 0.19, rel=1e-14)
+
+
+def test_a_window_may_begin_before_the_run_where_the_ends_pull_later():
+    steps = steps_with(lambda t: (1.0 if t < 0.5 else -0.5, 0.0, 0.0), [0.0, 0.5, 1.0])
+    assert found(steps, window=1.0)["contact_force_max"] == pytest.approx(0.5, rel=1e-14)

@@ -6,8 +6,8 @@ at all is decided by rounding.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import pairwise, zip_longest
 from math import inf, nan
 from typing import NamedTuple
 
@@ -18,6 +18,14 @@ from .trajectory import Event, EventKind, Trajectory
 
 #: Share of the impulse of a run below which a contact or a stroke is none to speak of.
 SLIGHT = 2e-3
+
+#: Whether the lower end is on the foundation from an event on, or at it and no longer after it.
+_ON_FOUNDATION = {
+    EventKind.STOP_IMPACT: (True, False),
+    EventKind.SEATED: (True,),
+    EventKind.UNSEATED: (False,),
+    EventKind.SEPARATION: (False,),
+}
 
 #: From when to when something is touched [s]; an impact that lets go at once has no length.
 Interval = tuple[float, float]
@@ -37,15 +45,14 @@ def contact_changes(run: Trajectory, window: float) -> list[ContactChange]:
     Strokes on the foundation that follow each other within ``window`` are one.
     """
     changes = []
-    for intervals, least, begin, end in (
-        (_contacts(run, inf), window, "closes", "opens"),
-        (foundation_contacts(run.events, inf), 0.0, "strikes", "leaves"),
-    ):
-        for since, until in _lasting(intervals, window, least):
-            changes.append(ContactChange(begin, float(since)))
-            if until < inf and (until > since or end == "opens"):
-                changes.append(ContactChange(end, float(until)))
-    return sorted(changes, key=lambda change: change.time)
+    for since, until in _merged(_contacts(run, inf), window):
+        if until - since >= window:
+            changes += [ContactChange("closes", since), ContactChange("opens", until)]
+    for since, until in _merged(foundation_contacts(run.events, inf), window):
+        changes += [ContactChange("strikes", since)]
+        if until > since:
+            changes += [ContactChange("leaves", until)]
+    return sorted((change for change in changes if change.time < inf), key=lambda change: change.time)
 
 
 def contact_time_difference(first: Trajectory, second: Trajectory, window: float) -> float:
@@ -58,14 +65,9 @@ def contact_time_difference(first: Trajectory, second: Trajectory, window: float
     """
     end = float(second.time[-1])
     worst = 0.0
-    runs = first, second
-    tip = [_contacts(run, end) for run in runs]
-    low = [foundation_contacts(run.events, end) for run in runs]
-    for all_of, felt in (
-        (tip, [_felt(found, _passed_to_tip(run), window) for found, run in zip(tip, runs, strict=True)]),
-        (low, [_felt(found, _passed_to_foundation(run), window) for found, run in zip(low, runs, strict=True)]),
-    ):
-        worst = max(worst, _furthest(felt[0], all_of[1], end), _furthest(felt[1], all_of[0], end))
+    for ours, theirs in zip(_contacts_and_strokes(first, end), _contacts_and_strokes(second, end), strict=True):
+        for one, other in ((ours, theirs), (theirs, ours)):
+            worst = max(worst, _furthest(_felt(*one, window), other[0], end))
     return worst
 
 
@@ -90,18 +92,16 @@ def _contacts(run: Trajectory, end: float) -> list[Interval]:
 
 def tip_contacts(events: Iterable[Event], end: float, *, free_at_end: bool) -> list[Interval]:
     """Return the contacts of tip and spring; one that goes on ends at ``end`` [s]."""
-    edges: list[float] = []
-    events = [event for event in events if event.kind.joins]
-    for event, after in itertools.zip_longest(events, events[1:]):
-        if event.kind is EventKind.RELEASE:  # to `touch`, or to `free`
-            joined = not free_at_end if after is None else after.kind is not EventKind.IMPACT
-        else:
-            joined = event.kind is not EventKind.SEPARATION
-        if joined == (len(edges) % 2 == 0):
-            edges.append(event.time)
-    if len(edges) % 2:
-        edges.append(end)
-    return list(zip(edges[::2], edges[1::2], strict=True))
+    joins = [event for event in events if event.kind.joins]
+    # A release leaves the ends free, not touching, if they meet again or nothing follows.
+    free_after = [*(event.kind is EventKind.IMPACT for event in joins[1:]), free_at_end]
+    return _intervals(
+        (
+            (event.time, not (event.kind is EventKind.SEPARATION or (event.kind is EventKind.RELEASE and free)))
+            for event, free in zip(joins, free_after, strict=False)
+        ),
+        end,
+    )
 
 
 def touches(events: Iterable[Event]) -> list[Interval]:
@@ -109,71 +109,69 @@ def touches(events: Iterable[Event]) -> list[Interval]:
     joins = [event for event in events if event.kind.joins]
     return [
         (event.time, after.time)
-        for event, after in itertools.pairwise(joins)
+        for event, after in pairwise(joins)
         if (event.kind, after.kind) == (EventKind.RELEASE, EventKind.SEPARATION)
     ]
 
 
 def foundation_contacts(events: Iterable[Event], end: float) -> list[Interval]:
     """Return the impacts on the foundation, and the rests on it; a rest that goes on ends at ``end`` [s]."""
-    intervals: list[Interval] = []
-    since: float | None = None
-    for event in events:
-        if event.kind is EventKind.STOP_IMPACT:
-            intervals.append((event.time, event.time))
-        elif event.kind is EventKind.SEATED:
-            since = event.time
-        elif event.kind in (EventKind.UNSEATED, EventKind.SEPARATION) and since is not None:
-            intervals.append((since, event.time))
-            since = None
-    return intervals if since is None else [*intervals, (since, end)]
+    return _intervals(((event.time, held) for event in events for held in _ON_FOUNDATION.get(event.kind, ())), end)
 
 
-def _lasting(intervals: list[Interval], window: float, least: float) -> list[Interval]:
-    """Join intervals closer than ``window``; return those that then last at least ``least`` [s]."""
+def _intervals(changes: Iterable[tuple[float, bool]], end: float) -> list[Interval]:
+    """Return when something is touched, from ``changes``: times [s], and whether it is touched from then on."""
+    edges, touched = list[float](), False
+    for time, touches in changes:
+        if touches != touched:
+            edges.append(time)
+            touched = touches
+    return list(zip_longest(edges[::2], edges[1::2], fillvalue=end))
+
+
+def _merged(intervals: list[Interval], window: float) -> list[Interval]:
+    """Join intervals closer than ``window`` [s]."""
     merged: list[Interval] = []
     for begin, end in intervals:
         if merged and begin - merged[-1][1] < window:
-            merged[-1] = (merged[-1][0], end)
-        else:
-            merged.append((begin, end))
-    return [(begin, end) for begin, end in merged if end - begin >= least]
+            begin, _ = merged.pop()
+        merged.append((begin, end))
+    return merged
 
 
-def _felt(intervals: list[Interval], passed: tuple[np.ndarray, np.ndarray], window: float) -> list[Interval]:
+def _contacts_and_strokes(run: Trajectory, end: float) -> Iterator[tuple[list[Interval], np.ndarray, np.ndarray]]:
+    """Yield the contacts of tip and spring, and those with the foundation; what goes on ends at ``end`` [s].
+
+    Beside them are times [s] and the impulse passed on up to each since the one before, without its sign [N·s]; none
+    if it is not known.
+    """
+    times, passed = np.empty(0), np.empty(0)
+    if run.steps is not None:
+        times = run.steps["time"]
+        passed = np.abs(impulse(run.steps, run.steps["size"])) + np.abs(kicks(times, run.events))
+    yield _contacts(run, end), times, passed
+    times = np.array([event.time for event in run.events])
+    yield foundation_contacts(run.events, end), times, np.array([abs(e.impulse_foundation) for e in run.events])
+
+
+def _felt(intervals: list[Interval], times: np.ndarray, passed: np.ndarray, window: float) -> list[Interval]:
     """Join ``intervals`` closer than ``window`` [s]; return those that last longer or pass on `SLIGHT` of the impulses.
 
-    ``passed`` is times [s], and the impulse [N·s] up to and with each, without signs; none if it is not known.
+    Other parameters as of `_contacts_and_strokes`.
     """
-    times, total = passed
-    total = np.append(0.0, total)
+    least = SLIGHT * passed.sum() if times.size else inf
 
-    def impulse_over(since: float, until: float) -> float:
-        return float(total[np.searchsorted(times, until, "right")] - total[np.searchsorted(times, since, "left")])
+    def felt(since: float, until: float) -> bool:
+        within = slice(np.searchsorted(times, since, "left"), np.searchsorted(times, until, "right"))
+        return until - since > window or passed[within].sum() >= least
 
-    found = _lasting(intervals, window, 0.0)
-    return [(s, u) for s, u in found if u - s > window or (times.size and impulse_over(s, u) >= SLIGHT * total[-1])]
-
-
-def _passed_to_tip(run: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    if run.steps is None:
-        return np.empty(0), np.empty(0)
-    steps = run.steps
-    return steps["time"], np.cumsum(np.abs(impulse(steps, steps["size"])) + np.abs(kicks(steps["time"], run.events)))
-
-
-def _passed_to_foundation(run: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    passed = np.cumsum([abs(event.impulse_foundation) for event in run.events])
-    return np.array([event.time for event in run.events]), passed
+    return [interval for interval in _merged(intervals, window) if felt(*interval)]
 
 
 def kicks(times: np.ndarray, events: Iterable[Event]) -> np.ndarray:
     """Return the events' impulses on the tip [N·s] at each of ``times`` [s], those of one time at its last row."""
-    found = np.zeros(len(times))
-    for event in events:
-        if event.impulse_contact != 0.0:
-            found[np.searchsorted(times, event.time, side="right") - 1] += event.impulse_contact
-    return found
+    at = np.array([(event.time, event.impulse_contact) for event in events]).reshape(-1, 2)
+    return np.bincount(np.searchsorted(times, at[:, 0], side="right") - 1, at[:, 1], len(times))
 
 
 def _furthest(ours: list[Interval], theirs: list[Interval], end: float) -> float:

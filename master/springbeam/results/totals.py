@@ -143,10 +143,10 @@ def shortest_contact(
 def _contact(
     scene: Scene, steps: np.ndarray, events: list[Event], window: float, free_at_end: bool
 ) -> dict[str, float | int]:
-    before, after = _cumulative(steps, events)
-    largest, since = _largest_mean(steps, before, after, window)
+    at_events = kicks(steps["time"], events)
+    largest, since = _largest_mean(steps, at_events, window)
     found: dict[str, float | int] = {
-        "contact_impulse": after[-1],
+        "contact_impulse": (impulse(steps, steps["size"]) + at_events).sum(),
         "contact_force_max": largest,
         "contact_force_window": window,
         "contact_force_max_time": since,
@@ -171,31 +171,20 @@ def _contact(
     return found
 
 
-def _cumulative(steps: np.ndarray, events: list[Event]) -> tuple[np.ndarray, np.ndarray]:
-    """Return ∫ C dt with the impulses [N·s] up to each row, without and with those that act at its own time.
-
-    Impulses at one time, as of the rows of one event, all act at its last row.
-    """
-    at_events = kicks(steps["time"], events)
-    after = np.cumsum(impulse(steps, steps["size"])) + np.cumsum(at_events)
-    return after - at_events, after
-
-
-def _largest_mean(steps: np.ndarray, before: np.ndarray, after: np.ndarray, window: float) -> tuple[float, float]:
+def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tuple[float, float]:
     """Return the largest mean of C [N] over windows of ``window`` [s], wherever they begin, and when that begins [s].
 
-    An impulse at the edge of a window belongs to it if that makes the mean larger.
+    ``at_events`` are the impulses [N·s] that act at each row, as of `kicks`. One at the edge of a window belongs to it
+    if that makes the mean larger.
     """
     time = steps["time"]
-    ending = np.maximum(before, after) - _impulse_until(steps, time, after, time - window)
-    beginning = _impulse_until(steps, time, after, time + window) - np.minimum(before, after)
     # Inside steps the mean is largest where C is the same at both edges of the window.
     edges = np.union1d(time, time - window)
-    since = edges[:-1] + _equal_at_both_edges(steps, edges, window)
-    inside = _impulse_until(steps, time, after, since + window) - _impulse_until(steps, time, after, since)
-    impulses = np.concatenate([ending, beginning, inside])
+    inside = edges[:-1] + _equal_at_both_edges(steps, edges, window)
+    begins, ends = np.array([[time - window, time], [time, time + window]]).reshape(2, -1)
+    begins, ends = np.append(begins, inside), np.append(ends, inside + window)
+    impulses = _impulse_until(steps, at_events, ends).max(axis=0) - _impulse_until(steps, at_events, begins).min(axis=0)
     at = int(np.argmax(impulses))
-    begins = np.concatenate([time - window, time, since])
     return max(0.0, float(impulses[at])) / window, max(float(begins[at]), float(time[0]))
 
 
@@ -226,10 +215,17 @@ def _force(steps: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return known * value, known * (rate + tau * curvature), known * 0.5 * curvature
 
 
-def _impulse_until(steps: np.ndarray, time: np.ndarray, after: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return ∫ C dt with the impulses [N·s] up to ``times`` [s]: 0 before the first row, all of it after the last."""
+def _impulse_until(steps: np.ndarray, at_events: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return ∫ C dt with the impulses [N·s] up to ``times`` [s], with and without those at that time, shape (2, n).
+
+    It is 0 before the first row, and all of it after the last one.
+    """
+    time = steps["time"]
     row = np.searchsorted(time, times, side="right") - 1
     into = np.minimum(row + 1, len(steps) - 1)
     tau = np.clip(times - time[row], 0.0, steps["size"][into])
-    found = after[row] + np.where(into > row, impulse(steps, tau, into), 0.0)
-    return np.where(row < 0, 0.0, found)
+    found = np.cumsum(impulse(steps, steps["size"]) + at_events)[row] + np.where(
+        into > row, impulse(steps, tau, into), 0.0
+    )
+    found = np.where(row < 0, 0.0, found)
+    return np.array([found, found - np.where(time[row] == times, at_events[row], 0.0)])
