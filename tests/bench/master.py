@@ -12,13 +12,13 @@ from measure import Row, Times, below, compare, median_and_spread, ratio_row, sh
 from springbeam import load_scene, simulate, with_changes
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring, release
-from springbeam.bodies.functions import Functions
+from springbeam.bodies.functions import Slave
 from springbeam.monolithic import algorithm1
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
 
 #: The calls of a macro step; those before the first one are set-up.
-STEPPING = ("DoStep", "GetReal", "SetReal", "SetRealInputDerivatives", "GetFMUState", "SetFMUState")
+STEPPING = ("DoStep", "GetReal", "SetReal", "SetRealInputDerivatives", "GetFMUstate", "SetFMUstate")
 
 
 class Inside:
@@ -26,13 +26,13 @@ class Inside:
 
     def __init__(self):
         self.seconds, self.calls = 0.0, 0
-        self._prepared = Functions.prepared
+        self._bound = Slave.bound
 
     def __enter__(self):
-        inside, prepared = self, self._prepared
+        inside, bound = self, self._bound
 
         def timed_call(self, name, *arguments):
-            function = prepared(self, name, *arguments)
+            function = bound(self, name, *arguments)
             if name not in STEPPING:
                 return function
 
@@ -45,18 +45,18 @@ class Inside:
 
             return call
 
-        Functions.prepared = timed_call
+        Slave.bound = timed_call
         return self
 
     def __exit__(self, *_):
-        Functions.prepared = self._prepared
+        Slave.bound = self._bound
 
 
 def nothing(times=20_000):
     """Seconds that `Inside` sees of a call that does nothing."""
     with Inside() as inside:
         body = FmuSpring(load_scene("soft").spring, 0.0)
-        call = body.fmu.prepared("GetReal", None, c_size_t(0), None)
+        call = body.fmu.bound("GetReal", None, c_size_t.from_param(0), None)
         inside.seconds, inside.calls = 0.0, 0
         for _ in range(times):
             call()

@@ -40,6 +40,10 @@ def renamed(old, new):
     return lambda files: files.__setitem__(new, files.pop(old))
 
 
+def both(*edits):
+    return lambda files: [edit(files) for edit in edits]
+
+
 TIP_FORCE = r'(name="tip_force" valueReference=")\d+'
 BROKEN = {
     "no description": (without(XML), "modelDescription.xml"),
@@ -54,7 +58,13 @@ BROKEN = {
         edited(r"<CoSimulation.*</CoSimulation>", '<ModelExchange modelIdentifier="beam"/>'),
         "co-simulation",
     ),
-    "another model identifier": (edited(r'modelIdentifier="beam"', 'modelIdentifier="cable"'), "'cable'"),
+    "another model identifier": (
+        both(
+            edited(r'modelIdentifier="beam"', 'modelIdentifier="cable"'),
+            renamed(BINARY, BINARY.replace("beam", "cable")),
+        ),
+        "'cable'",
+    ),
     "wrong GUID": (edited(r'guid="\{[^"]*\}"', 'guid="{0}"'), r"the GUID \{0\} is not that of this FMU"),
     "no binary": (without(BINARY), r"beam\.so|platform|binary|binaries"),
     "binary of another platform": (renamed(BINARY, "binaries/win64/beam.dll"), r"linux64|platform|beam\.so|binar"),

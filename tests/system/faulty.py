@@ -6,9 +6,10 @@ The script is below the master, in place of the functions of the shared library,
 import ctypes
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
-from types import SimpleNamespace
+from functools import lru_cache
+from pathlib import Path
 
+from springbeam.bodies import fmu as fmus
 from springbeam.bodies import functions
 from springbeam.bodies.fmu_bodies import release
 from springbeam.coupling.algorithm_1 import Algorithm1
@@ -111,22 +112,17 @@ def hang():
     raise AssertionError("returned")
 
 
-class Library:
+class Library(functions.Library):
     """A shared library with the script between it and its callers."""
 
-    def __init__(self, script, path):
-        self._script, self._library = script, real_cdll.LoadLibrary(path)
-        self._fmu = "beam" if "beam" in path.rsplit("/", 1)[-1] else "spring"
-        self._handle = self._library._handle
-
-    def __getattr__(self, name):
-        return getattr(self._library, name)
+    _script = None
 
     def __getitem__(self, name):
-        script, fmu, function = self._script, self._fmu, self._library[name]
+        fmu, function = Path(self._name).stem, super().__getitem__(name)
 
         def call(*arguments):
-            function.restype = call.restype
+            script = self._script
+            function.restype, function.argtypes = call.restype, getattr(call, "argtypes", None)
             fault = next((f for f in script.faults if f.after(fmu, name, script.where)), None)
             if fault is None:
                 result = function(*arguments)
@@ -146,9 +142,6 @@ class Library:
         return call
 
 
-real_cdll = functions.cdll
-
-
 def installed(monkeypatch, *faults):
     """The script of all FMUs loaded from now on; it follows where the master is.
 
@@ -157,7 +150,8 @@ def installed(monkeypatch, *faults):
     """
     script = Script(faults)
     release()  # what is kept would not be loaded
-    monkeypatch.setattr(functions, "cdll", SimpleNamespace(LoadLibrary=partial(Library, script)))
+    monkeypatch.setattr(fmus, "_opened", lru_cache(fmus._opened.__wrapped__))  # what is loaded is not scripted
+    monkeypatch.setattr(functions, "Library", type("Scripted", (Library,), {"_script": script}))
 
     def watch(owner, name, where):
         function = getattr(owner, name)

@@ -5,11 +5,10 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from faulty import installed
 
 from springbeam import Simulation, load_scene, simulate, with_changes
-from springbeam.bodies import fmu
 from springbeam.bodies.fmu_bodies import release
-from springbeam.bodies.functions import Functions
 from springbeam.contact.events import EventFunctions
 from springbeam.contact.laws import law_of
 from springbeam.contact.phases import Joint, Phase
@@ -19,30 +18,13 @@ SET_SLOPES = "fmi2SetRealInputDerivatives"
 
 @pytest.fixture
 def counted(monkeypatch):
-    """Runs a scene and counts ``(FMU, FMI function)``; ``(FMU, "instance")`` for those loaded."""
-    calls = Counter()
-    load, prepared = fmu.Fmu.__init__, Functions.prepared
-
-    def counted_load(self, name, *rest):
-        calls[name, "instance"] += 1
-        load(self, name, *rest)
-
-    def counted_function(self, name, *arguments):
-        function, body = prepared(self, name, *arguments), Path(self._library._name).stem
-
-        def call():
-            calls[body, self.spelt(name)] += 1
-            return function()
-
-        return call
-
-    monkeypatch.setattr(fmu.Fmu, "__init__", counted_load)
-    monkeypatch.setattr(Functions, "prepared", counted_function)
+    """Runs a scene and counts ``(FMU, FMI function)``."""
+    script = installed(monkeypatch)
 
     def run(scene):
         release()
-        calls.clear()
-        return simulate(scene), calls
+        script.calls.clear()
+        return simulate(scene), Counter((fmu, function) for fmu, function, _ in script.calls)
 
     yield run
     release()  # what is kept would go on counting
