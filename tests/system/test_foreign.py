@@ -4,6 +4,7 @@ import functools
 import os
 import signal
 import threading
+from contextlib import suppress
 from itertools import product
 from multiprocessing.connection import Connection
 from time import sleep
@@ -313,6 +314,7 @@ def test_the_process_of_an_fmu_that_hangs_ends_with_the_master(fmu, hanging):
     spec = pair(fmu(), spring={"parameters": {"lie": oscillator.LIES["late hang"]}}).lower
     body = isolated.IsolatedBody(spec, False, 0.0, None)
     process = body._process._process
+    assert os.getpgid(process.pid) != os.getpgrp()  # Ctrl-C in a terminal goes to the master alone
 
     def gone():
         while not hanging():
@@ -326,6 +328,24 @@ def test_the_process_of_an_fmu_that_hangs_ends_with_the_master(fmu, hanging):
         body.advance(1.5, 0.1, (0.0, 0.0, 0.0))
     ending.join()
     body.close()
+
+
+def test_a_process_waits_for_the_next_body_of_its_file(fmu):
+    """One that has crashed does not."""
+
+    def used(path, lie="none"):
+        spec = pair(path, spring={"parameters": {"lie": oscillator.LIES[lie]}}).lower
+        body = isolated.IsolatedBody(spec, False, 0.0, None)
+        process = body._process
+        with suppress(FmuError):
+            body.advance(1.5, 0.1, (0.0, 0.0, 0.0))
+        body.close()
+        return process
+
+    first = used(fmu())
+    assert used(fmu("another")) is not first
+    assert used(fmu(), "late crash") is first
+    assert used(fmu()) is not first
 
 
 def test_ctrl_c_names_an_fmu_that_does_not_return(fmu, monkeypatch, hanging):

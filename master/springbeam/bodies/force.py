@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from operator import mul
 
-import numpy as np
+from numpy.polynomial import Legendre
 
 from .protocol import Force, Motion
-
-#: Gauss–Legendre nodes and weights on [0, 1], exact to degree 7: enough for (1 − x)³ P₂.
-_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2
 
 
 def derivatives(a: Sequence[float], size: float) -> Force:
@@ -64,14 +61,10 @@ def legendre(force: Force, size: float, degree: int) -> list[float]:
     return [mean] if degree == 0 else [mean, slope / 2.0 + bend / 4.0, bend / 12.0][: degree + 1]
 
 
-def _unit_response(k: int) -> tuple[float, float, float, float]:
-    """Return ∫ P_k(2x − 1) (1 − x)ⁿ/n! dx over [0, 1] for n = 1, 0, 2, 3: in the order of `Motion`."""
-    p = _WEIGHTS * np.polynomial.legendre.legval(2.0 * _NODES - 1.0, [0.0] * k + [1.0])
-    left = 1.0 - _NODES
-    return float(p @ left), float(p.sum()), float(p @ left**2) / 2.0, float(p @ left**3) / 6.0
-
-
-_UNIT_RESPONSES = [_unit_response(k) for k in range(3)]
+#: Integrals of P_k(2x − 1) from 0 to 1, taken 2, 1, 3 and 4 times: of each k in the order of `Motion`.
+_UNIT_RESPONSES = [
+    [float(Legendre.basis(k, domain=[0.0, 1.0]).integ(n, lbnd=0.0)(1.0)) for n in (2, 1, 3, 4)] for k in range(3)
+]
 
 
 def free_mass_response(degree: int, size: float, mass: float) -> list[Motion]:

@@ -14,8 +14,6 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import msgspec
-
 from ..scene.partners import ForeignFmu
 from . import force
 from .abilities import Abilities
@@ -64,6 +62,7 @@ class ForeignState(NamedTuple):
     load_work: float = 0.0  #: of the loads so far [J]
     time: float = 0.0  #: of the present state [s]
     size: float = 0.0  #: of the last step [s]
+    held: tuple[float, float] | None = None  #: where its end rests on the foundation [m], and the force there [N]
 
 
 class ForeignBody(FmuBody, EndLoaded):
@@ -90,14 +89,12 @@ class ForeignBody(FmuBody, EndLoaded):
         self.abilities = self._found.abilities
         names, energies = spec.named(spec.MOTION), spec.named(spec.ENERGIES)
         self._MOTION = tuple(name for name in names if name is not None)
-        self._at = [None if name is None else self._MOTION.index(name) for name in names]
         self._ENERGIES = tuple(name for name in energies if name is not None) if self.abilities.energies else ()
         self._IMPULSE = () if spec.impulse is None else (spec.impulse,)
         self._FORCES, self._SLOPES = (spec.force,), self.abilities.slopes
         self._upward = 1.0 if upper else -1.0
         self.state = ForeignState(Motion(0.0, 0.0, 0.0, 0.0), time=start_time)
         self._size = 0.0  #: of the step that is being made [s]
-        self._held: dict[float, float] = {}  #: holding forces [N] by displacement [m]
         super().__init__(fmu)
 
     def _prepare(self, fmu: Fmu) -> None:
@@ -183,7 +180,8 @@ class ForeignBody(FmuBody, EndLoaded):
     def _made_up(self, told: tuple[float, ...]) -> Motion:
         """Return the motion with what the FMU does not tell of it."""
         size = self._size
-        w, v, once, twice = (None if at is None else told[at] for at in self._at)
+        by_name = dict[str | None, float](zip(self._MOTION, told, strict=False))
+        w, v, once, twice = (by_name.get(name) for name in self._spec.named(self._spec.MOTION))
         assert w is not None
         if size == 0.0:
             return Motion(w, self._found.velocity if v is None else v, once or 0.0, twice or 0.0)
@@ -205,8 +203,8 @@ class ForeignBody(FmuBody, EndLoaded):
 
         Raises BodyFailed if no constant force does, as where a body moves inside.
         """
-        if (known := self._held.get(displacement)) is not None:
-            return known
+        if self.state.held is not None and self.state.held[0] == displacement:
+            return self.state.held[1]
         size = self.state.size or self._found.H
         load, self._on_end = self._on_end, NO_FORCE
 
@@ -229,15 +227,8 @@ class ForeignBody(FmuBody, EndLoaded):
                 f"{self.fmu.path}: no constant force holds its end at rest on the foundation; use a [stop] restitution "
                 "of 1, which lets nothing come to rest, or leave [stop] out"
             )
-        self._held[displacement] = found
+        self.state = self._marked = self.state._replace(held=(displacement, found))
         return found
-
-    def save(self) -> bytes:
-        return msgspec.msgpack.encode((super().save(), self._held))
-
-    def restore(self, saved: bytes) -> None:
-        of_fmu, self._held = msgspec.msgpack.decode(saved, type=tuple[bytes, dict[float, float]])
-        super().restore(of_fmu)
 
 
 def moments(w0: float, v0: float, w: float, v: float, size: float) -> tuple[float, float]:

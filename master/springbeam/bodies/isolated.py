@@ -35,21 +35,13 @@ _MOST_IDLE = 4
 Call = tuple[Any, ...]
 
 
-def changed(path: str) -> int:
-    """Return when the FMU at ``path`` was last changed [ns]. Raises FmuError if it is not there."""
-    try:
-        return Path(path).stat().st_mtime_ns
-    except OSError:
-        raise FmuError(f"{path}: not found") from None
-
-
 class FmuProcess:
     """A process for one body after another of an FMU file; `of` returns one. It ends with the process that made it."""
 
     _idle: ClassVar[list[FmuProcess]] = []
 
-    def __init__(self, path: str, made_for: tuple[str, int, int]) -> None:
-        self._path, self._made_for = path, made_for
+    def __init__(self, path: str) -> None:
+        self._path, self._master = path, os.getpid()
         self._folder = TemporaryDirectory(prefix="springbeam-", ignore_cleanup_errors=True)
         self._errors = Path(self._folder.name) / "errors"
         requests, self._requests = Pipe(duplex=False)
@@ -67,13 +59,12 @@ class FmuProcess:
 
     @classmethod
     def of(cls, path: str) -> FmuProcess:
-        """Return a process for the FMU at ``path``, one that is idle if there is one. Raises FmuError."""
-        made_for = path, changed(path), os.getpid()
+        """Return a process for the FMU at ``path``, one that is idle if there is one."""
         for process in cls._idle:
-            if process._made_for == made_for:
+            if (process._path, process._master) == (path, os.getpid()):
                 cls._idle.remove(process)
                 return process
-        return cls(path, made_for)
+        return cls(path)
 
     def ask(self, calls: Sequence[Call], doing: str, patience: float | None) -> tuple[Any, Any]:
         """Make ``calls``; return what the last one returns, and what the body says of itself then.

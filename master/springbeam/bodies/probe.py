@@ -10,14 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..scene.partners import ForeignFmu
 from .abilities import Abilities
 from .foreign import Findings, moments
-from .isolated import IsolatedBody, changed
+from .isolated import IsolatedBody
 from .protocol import NO_FORCE, FmuError, Force, StepRefused
 
 #: Sizes tried, over H; steps of a record.
@@ -28,17 +29,6 @@ _TOLERANCE, _ROUNDING = 0.04, 1e-9
 _RESPONSE, _AGREE = 0.1, 0.01
 #: Forces tried: each so many times the one before [N]; a change is seen if it is so large a part of the value.
 _STRONGER, _STRONGEST, _SEEN = 1e3, 1e15, 1e-6
-
-
-class Sample(NamedTuple):
-    """The motion after a step, the sum of the energies that are told, and the work done on the end."""
-
-    x: float
-    v: float
-    once: float
-    twice: float
-    energy: float
-    work: float
 
 
 class _TriedBody(IsolatedBody):
@@ -78,13 +68,17 @@ class Bench:
         """Free the instance."""
         self._body.close()
 
-    def run(self, size: float, forces: Sequence[Force], impulse: float = 0.0) -> list[Sample]:
-        """Return the samples at the start and after each step of ``size`` [s] under a force C and an ``impulse``."""
+    def run(self, size: float, forces: Sequence[Force], impulse: float = 0.0) -> np.ndarray:
+        """Make a step of ``size`` [s] under each force C, after an ``impulse``.
+
+        Return rows at the start and after each step, shape (n + 1, 6): the motion, the sum of the energies that are
+        told, and the work done on the end.
+        """
         if self._body.steps > 0 and not self.abilities.state:
             self.renew()
         body = self._body
         body.rewind()
-        samples = [self._sample()]
+        rows = [[*body.motion(), sum(body.energies()), body.received]]
         if impulse:
             body.apply_impulse(impulse)
         for i, given in enumerate(forces):
@@ -92,17 +86,14 @@ class Bench:
                 body.advance(self._start + i * size, size, given)
             except StepRefused as refused:
                 raise FmuError(f"{self.spec.fmu}: {refused}") from None
-            samples.append(self._sample())
-        return samples
-
-    def _sample(self) -> Sample:
-        return Sample(*self._body.motion(), sum(self._body.energies()), self._body.received)
+            rows.append([*body.motion(), sum(body.energies()), body.received])
+        return np.array(rows)
 
     def change(self, size: float, force: Force, impulse: float = 0.0) -> float:
         """Return what ``force`` or ``impulse`` changes over a step: the velocity, without one the displacement."""
-        moved, free = (self.run(size, [given], kick)[1] for given, kick in ((force, impulse), (NO_FORCE, 0.0)))
-        change, value = (moved.v - free.v, free.v) if self.spec.velocity else (moved.x - free.x, free.x)
-        return change if abs(change) > _SEEN * abs(value) else 0.0
+        column = 1 if self.spec.velocity else 0
+        moved, free = (self.run(size, [given], kick)[1, column] for given, kick in ((force, impulse), (NO_FORCE, 0.0)))
+        return float(moved - free) if abs(moved - free) > _SEEN * abs(free) else 0.0
 
     def extrapolated(self, inertia: Callable[[float], float | None]) -> float | None:
         """Return ``inertia`` of a step's size [s] as that goes to 0, from the shortest steps that tell it."""
@@ -140,11 +131,13 @@ def examined(spec: ForeignFmu, upper: bool, start_time: float, H: float) -> Find
     FmuError
         If the FMU cannot be used as the scene says, crashes, or does not return.
     """
-    return _examined(changed(spec.fmu), spec.model_dump_json(), upper, start_time, H)
+    path = Path(spec.fmu)
+    changed = path.stat().st_mtime_ns if path.is_file() else None
+    return _examined(changed, spec.model_dump_json(), upper, start_time, H)
 
 
 @lru_cache(maxsize=64)
-def _examined(_changed: int, spec: str, upper: bool, start_time: float, H: float) -> Findings:
+def _examined(_changed: int | None, spec: str, upper: bool, start_time: float, H: float) -> Findings:
     bench = Bench(ForeignFmu.model_validate_json(spec), upper, start_time, H)
     try:
         return _examine(bench)
@@ -158,15 +151,15 @@ def _examine(bench: Bench) -> Findings:
     bench.renew(slopes=0)
     _check_state(bench)
     mass = _mass(bench)
-    start = bench.run(H, [])[0]
+    x, v = bench.run(H, [])[0, :2].tolist()
     #: Steps move its end by this much, against how far it is from 0 and comes by itself [m].
-    length = max(1e-3 * abs(start.x), abs(start.v) * H, 1e-6)
+    length = max(1e-3 * abs(x), abs(v) * H, 1e-6)
     bench.fault(*bench.wrong(partial(_wrong_outputs, bench, mass * length)))
     if promised:
         _try_slopes(bench, mass * length)
     if bench.abilities.impulse and bench.abilities.velocity:
         mass = _check_impulse(bench, spec.mass or mass, length / H)
-    velocity = start.v if bench.abilities.velocity else _velocity(bench)
+    velocity = v if bench.abilities.velocity else _velocity(bench)
     return Findings(bench.abilities, mass, velocity, H, tuple(bench.faults))
 
 
@@ -177,11 +170,11 @@ def _check_state(bench: Bench) -> None:
     first = bench.run(H, [push, push])
     bench.run(H, [(-1.0, 0.0, 0.0)] * 3)
     second = bench.run(H, [push, push])
-    if first != second:
-        k, (a, b) = next((k, pair) for k, pair in enumerate(zip(first, second, strict=True)) if pair[0] != pair[1])
+    for k in np.flatnonzero((first != second).any(axis=1))[:1]:
+        (a, a_speed), (b, b_speed) = first[k, :2].tolist(), second[k, :2].tolist()
         bench.fault(
-            f"canGetAndSetFMUstate = true, but from one state {k} equal steps lead to {a.x!r} m and {a.v!r} m/s, "
-            f"and then to {b.x!r} m and {b.v!r} m/s"
+            f"canGetAndSetFMUstate = true, but from one state {k} equal steps lead to {a} m and {a_speed} m/s, "
+            f"and then to {b} m and {b_speed} m/s"
         )
         bench.renew(state=False, serialized=False)  # what follows starts from new instances
 
@@ -215,7 +208,7 @@ def _wrong_outputs(bench: Bench, impetus: float, h: float) -> dict[str, str]:
     """
     spec, n = bench.spec, _RECORD
     force = impetus / (n * h) ** 2
-    x, v, once, twice, energy, work = np.array(bench.run(h, [(force, 0.0, 0.0)] * n)).T
+    x, v, once, twice, energy, work = bench.run(h, [(force, 0.0, 0.0)] * n).T
     moved, gained, received = np.diff(x), np.diff(energy), np.diff(work)
     means = 0.5 * h * (v[:-1] + v[1:])
     first, second = np.array(moments(x[:-1], v[:-1] if spec.velocity else v[1:], x[1:], v[1:], h))
@@ -288,8 +281,8 @@ def _check_impulse(bench: Bench, mass: float, speed: float) -> float:
 def _velocity(bench: Bench) -> float:
     """Return the velocity at the start [m/s] from displacements."""
     h = bench.sizes[min(2, len(bench.sizes) - 1)]
-    x0, whole = (sample.x for sample in bench.run(h, [NO_FORCE]))
+    x0, whole = bench.run(h, [NO_FORCE])[:, 0]
     if not bench.abilities.any_size:
-        return (whole - x0) / h
-    half = bench.run(0.5 * h, [NO_FORCE])[1].x
-    return (4.0 * half - whole - 3.0 * x0) / h
+        return float(whole - x0) / h
+    half = bench.run(0.5 * h, [NO_FORCE])[1, 0]
+    return float(4.0 * half - whole - 3.0 * x0) / h
