@@ -11,9 +11,8 @@ from commands import printed
 from scenes import scene_from_dict
 
 from springbeam import load_scene, simulate, with_changes
+from springbeam.signals.driven import responses, settled
 from springbeam.signals.report import spectra
-from springbeam.signals.response import responses
-from springbeam.signals.settled import settled
 from springbeam.signals.shock import shock_of_run, shock_spectrum
 from springbeam.signals.spectra import power_spectrum
 from springbeam.studies.metrics import METRICS

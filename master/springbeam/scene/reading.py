@@ -6,6 +6,7 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -207,13 +208,10 @@ def _change(data: dict[str, Any], table: str, changes: Mapping[str, Any]) -> Non
 
 def parse_value(text: str) -> Any:
     """Return a value given in TOML syntax; a bare word is taken as a string."""
-    try:
+    with suppress(ValueError, RecursionError):
         parsed = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):
-        parsed = {}
-    if parsed.keys() == {"value"}:
-        return parsed["value"]
-    try:
+        if parsed.keys() == {"value"}:
+            return parsed["value"]
+    with suppress(ValueError):
         return float(text)  # ".5" and "1." are not TOML
-    except ValueError:
-        return text
+    return text

@@ -321,16 +321,9 @@ def fastest_frequency(beam: Beam) -> float:
     high = mesh_frequency(beam)
     if beam.integrator != "modal" or beam.n_modes == 0 or modes_below(beam, high) <= beam.n_modes:
         return high
-    return _nth_frequency(beam, high)
+    from scipy.optimize import bisect  # takes long to load: only for who leaves modes out
 
-
-def _nth_frequency(beam: Beam, high: float) -> float:
-    """Return the frequency below which ``n_modes`` waves are, at most ``high`` [rad/s]."""
-    low = 0.0
-    while high - low > 1e-3 * high:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if modes_below(beam, middle) < beam.n_modes else (low, middle)
-    return high
+    return float(bisect(lambda omega: modes_below(beam, omega) - beam.n_modes + 0.5, 0.0, high, rtol=1e-3))
 
 
 def mesh_frequency(beam: Beam) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable
 from math import pi
+from sys import float_info
 from typing import Any, ClassVar, Literal, NamedTuple
 
 from pydantic import (
@@ -115,7 +116,7 @@ class Table(BaseModel):
                 both = [name for group in groups for name in group if name in given]
                 raise ValueError(f"{', '.join(both)}: give the {ways.thing} one way: {ways}")
         # A bad value, which is reported as such, counts as 1.
-        sane = {name: x for name, x in data.items() if isinstance(x, (int, float)) and abs(x) < 1e300}
+        sane = {name: x for name, x in data.items() if isinstance(x, (int, float)) and abs(x) <= float_info.max}
         following = [values for follow, values in cls.FOLLOWS if follow(given)]
         follows = {
             name: value(defaultdict(lambda: 1.0, sane)) for values in following for name, value in values.items()

@@ -9,10 +9,9 @@ import numpy as np
 
 from ..results.trajectory import Trajectory
 from ..scene import SceneError
+from .driven import Response, Settled, drive_of, poincare, responses, settled
 from .expressions import Expression
-from .response import Response, responses
-from .settled import Settled, drive_of, poincare, settled
-from .shock import VELOCITIES, ShockSpectrum, largest_jump, shock_of_run, without_peak
+from .shock import ShockSpectrum, ends_of, largest_jump, shock_of_run, without_peak
 from .spectra import PowerSpectrum, power_spectrum
 
 #: Oscillators of a shock spectrum in an octave.
@@ -97,13 +96,14 @@ def spectra(
     frequencies = np.geomspace(low, high, 1 + int(np.ceil(_PER_OCTAVE * np.log2(high / low))))
     begin = since if since is not None or tail is None else tail.since
     wanted = of or [name for name in ("u_tip", "y") if name in run.columns]
-    shock, jumps = {}, {}
-    for end in (end for end, column in VELOCITIES.items() if column in run.columns):
-        shock[end], jumps[end] = shock_of_run(run, end, frequencies, quality), largest_jump(run, VELOCITIES[end])
-    points = None
-    if drive is not None and drive.frequency is not None:
-        points = poincare(run, 1.0 / drive.frequency, drive.start)
-    power = {what: power_spectrum(run, what, begin, segments) for what in wanted}
-    unpeaked = {what: why for what in wanted if (why := without_peak(run, Expression(what).names))}
-    chirps = {what: found for what in wanted if (found := responses(run, what))}
-    return Spectra(shock, jumps, power, unpeaked, chirps, points, tail, drive is not None, quality)
+    return Spectra(
+        shock={end: shock_of_run(run, end, frequencies, quality) for end in ends_of(run)},
+        jumps={end: largest_jump(run, column) for end, column in ends_of(run).items()},
+        power={what: power_spectrum(run, what, begin, segments) for what in wanted},
+        without_peak={what: why for what in wanted if (why := without_peak(run, Expression(what).names))},
+        responses={what: found for what in wanted if (found := responses(run, what))},
+        points=poincare(run, 1.0 / drive.frequency, drive.start) if drive and drive.frequency else None,
+        settled=tail,
+        driven=drive is not None,
+        quality=quality,
+    )

@@ -20,7 +20,7 @@ from scipy.signal import lfilter
 
 from ..results.trajectory import Trajectory
 from ..scene import SceneError
-from .sampled import sampled
+from .spectra import sampled
 
 #: Samples in a period of the fastest oscillator: a peak between two of them is missed by 1 − cos(π/64), 0.12 %.
 _PER_PERIOD = 64
@@ -62,13 +62,13 @@ def shock_spectrum(velocity: np.ndarray, step: float, frequencies: np.ndarray, q
     if not ((frequencies > 0.0) & (frequencies * step < 0.5)).all():
         raise SceneError(f"frequencies: must lie between 0 and half the sampling rate, {0.5 / step:g} Hz")
     acceleration = np.diff(velocity) / step
-    found = [_response_extremes(acceleration, step, f, quality) for f in frequencies]
-    highest, lowest = np.array(found).T
+    answers = (_answer(acceleration, step, f, quality) for f in frequencies)
+    highest, lowest = np.maximum([(answer.max(), -answer.min()) for answer in answers], 0.0).T
     return ShockSpectrum(frequencies, np.maximum(highest, lowest), highest, lowest)
 
 
-def _response_extremes(acceleration: np.ndarray, step: float, frequency: float, quality: float) -> tuple[float, float]:
-    """Return the largest ẍ and the largest −ẍ, up to one period after the base has come to its last velocity."""
+def _answer(acceleration: np.ndarray, step: float, frequency: float, quality: float) -> np.ndarray:
+    """Return ẍ, up to one period after the base has come to its last velocity."""
     omega, zeta = 2.0 * np.pi * frequency, 0.5 / quality
     swing = omega * np.sqrt(1.0 - zeta**2)
     decay = np.exp(-zeta * omega * step)
@@ -77,8 +77,7 @@ def _response_extremes(acceleration: np.ndarray, step: float, frequency: float, 
     after = np.zeros(int(np.ceil(1.0 / (frequency * step))) + 1)
     denominator = (1.0, -2.0 * cosine, decay**2)
     numerator = (1.0 + held - 2.0 * cosine, decay**2 - held)
-    answer = lfilter(numerator, denominator, np.concatenate([acceleration, after]))
-    return max(float(answer.max()), 0.0), max(float(-answer.min()), 0.0)
+    return np.asarray(lfilter(numerator, denominator, np.concatenate([acceleration, after])))
 
 
 def shock_of_run(run: Trajectory, end: str, frequencies: np.ndarray, quality: float = 10.0) -> ShockSpectrum:
@@ -86,19 +85,18 @@ def shock_of_run(run: Trajectory, end: str, frequencies: np.ndarray, quality: fl
 
     The motion is that in space: where the base accelerates, its velocity is added.
     """
-    column = VELOCITIES.get(end)
-    if column is None or column not in run.columns:
-        there = [name for name, velocity in VELOCITIES.items() if velocity in run.columns]
-        raise SceneError(f"{end}: no end of this run; it has {', '.join(there)}")
-    step = 1.0 / (_PER_PERIOD * float(np.max(frequencies)))
-    samples = sampled(run, column, min(step, float(run.time[-1] - run.time[0]) / _PER_PERIOD))
-    velocity = samples.values.copy()
-    times = samples.times
-    for load in run.scene.loads:
-        if load.on == "base":
-            middle = load.value(times[:-1] + 0.5 * samples.step)
-            velocity[1:] += samples.step * np.cumsum(middle)
-    return shock_spectrum(velocity, samples.step, frequencies, quality)
+    if end not in (ends := ends_of(run)):
+        raise SceneError(f"{end}: no end of this run; it has {', '.join(ends)}")
+    step = min(1.0 / np.max(frequencies), run.time[-1] - run.time[0]) / _PER_PERIOD
+    times, velocity = sampled(run, ends[end], float(step))
+    middle = times[:-1] + 0.5 * step
+    of_base = sum((load.value(middle) for load in run.scene.loads if load.on == "base"), np.zeros(len(middle)))
+    return shock_spectrum(velocity + np.append(0.0, step * np.cumsum(of_base)), float(step), frequencies, quality)
+
+
+def ends_of(run: Trajectory) -> dict[str, str]:
+    """Return the ends of a run, ``"tip"`` and ``"spring"``, and the columns of their velocities."""
+    return {end: column for end, column in VELOCITIES.items() if column in run.columns}
 
 
 def without_peak(run: Trajectory, columns: Iterable[str]) -> str:
@@ -114,8 +112,7 @@ def without_peak(run: Trajectory, columns: Iterable[str]) -> str:
 
 def largest_jump(run: Trajectory, column: str) -> float:
     """Return the largest jump of a velocity at an event [m/s], 0 if there is none to speak of."""
-    steps = run.steps
-    if steps is None:
+    if (steps := run.steps) is None:
         return 0.0
     before, after = steps[column], steps[f"{column}_after"]
     ending = (steps["size"] > 0.0) & (np.diff(steps["events"], prepend=0.0) > 0.0)

@@ -1,0 +1,119 @@
+"""Driven motion: whether it has settled, since when and with which period, and its response to a chirp.
+
+A scene with two chirps, one after the other, up and down, goes on from the state that the first has left: where the
+responses to both differ, motions coexist.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from ..results.dense import rows_at
+from ..results.trajectory import Trajectory
+from ..scene import Load
+from .expressions import signal
+
+#: A motion has settled where its points repeat themselves within this share of the range of the motion …
+_ALIKE = 0.01
+#: … for so many periods of the motion, each of at most so many periods of the drive.
+_PERIODS, _LONGEST = 8, 8
+#: Periods of a chirp over which the range of its response is taken.
+_OF_CHIRP = 2
+
+
+class Settled(NamedTuple):
+    """The settled part of a driven run."""
+
+    since: float  #: [s]
+    drive: float  #: period of the drive [s]
+    multiple: int  #: periods of the drive in a period of the motion
+
+    @property
+    def period(self) -> float:
+        """Period of the motion [s]."""
+        return self.multiple * self.drive
+
+    def amplitude(self, run: Trajectory, column: str) -> float:
+        """Return half the range of a column over the last 8 periods, where the transient has faded further."""
+        return 0.5 * float(np.ptp(run[column][run.time >= run.time[-1] - _PERIODS * self.period]))
+
+
+def drive_of(run: Trajectory) -> Load | None:
+    """Return the first harmonic load, ``None`` if there is none."""
+    return next((load for load in run.scene.loads if load.signal == "harmonic"), None)
+
+
+def poincare(run: Trajectory, period: float, start: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return the motion once a ``period`` [s], from ``start`` [s] on: times (n,), and position and velocity (n, 2).
+
+    The point is the tip, or the spring's top where there is no beam.
+    """
+    first = np.ceil((run.time[0] - start) / period - 1e-9)
+    last = np.floor((run.time[-1] - start) / period + 1e-9)
+    times = start + period * np.arange(first, last + 1.0)
+    found = rows_at(run, np.clip(times, run.time[0], run.time[-1]))
+    return times, np.column_stack([found[name] for name in _point(run)])
+
+
+def _point(run: Trajectory) -> tuple[str, str]:
+    """Return the columns of the point that is looked at, position and velocity."""
+    return ("u_tip", "v_tip") if "u_tip" in run.columns else ("y", "z")
+
+
+def settled(run: Trajectory) -> Settled | None:
+    """Return the settled part of a driven run, ``None`` if it is not driven, or has not settled.
+
+    It has settled where its points once a period of the drive lie within 1 % of the range of position and velocity
+    of its last ones, in turn, for 8 periods of the motion at least. Those of a chaotic motion never do.
+    """
+    drive = drive_of(run)
+    if drive is None or drive.frequency is None or run.steps is None:
+        return None
+    times, points = poincare(run, 1.0 / drive.frequency, drive.start)
+    late = run.time >= 0.5 * (run.time[0] + run.time[-1])
+    scale = np.array([float(np.ptp(run[name][late])) for name in _point(run)])
+    for multiple in range(1, _LONGEST + 1) if (scale > 0.0).all() else ():
+        alike = np.tile(points[-multiple:], (len(points) // multiple + 1, 1))[-len(points) :]
+        off = np.flatnonzero((np.abs(points - alike) > _ALIKE * scale).any(axis=1))
+        since = int(off[-1]) + 1 if len(off) else 0
+        if len(times) - 1 - since >= _PERIODS * multiple:
+            return Settled(float(times[since]), 1.0 / drive.frequency, multiple)
+    return None
+
+
+class Response(NamedTuple):
+    """Half the range of a signal, by the frequency of a chirp, in the order of time; shapes (n,)."""
+
+    load: int  #: number of the chirp
+    frequency: np.ndarray  #: [Hz]
+    amplitude: np.ndarray
+
+    @property
+    def way(self) -> str:
+        """``up`` or ``down``."""
+        return "up" if self.frequency[-1] > self.frequency[0] else "down"
+
+
+def responses(run: Trajectory, what: str) -> list[Response]:
+    """Return the response of a column, or of a formula of columns, to each chirp of the run."""
+    chirps = [number for number, load in enumerate(run.scene.loads) if load.signal == "chirp"]
+    values = signal(run, what)
+    return [_response(number, run.scene.loads[number], run.time, values) for number in chirps]
+
+
+def _response(number: int, chirp: Load, time: np.ndarray, values: np.ndarray) -> Response:
+    """Return the range over each `_OF_CHIRP` turns of a chirp, and its frequency amidst them."""
+    first, last, duration = chirp.frequency or 0.0, chirp.frequency_end or 0.0, chirp.duration or inf
+    rate = (last - first) / duration
+    driven = (time >= chirp.start) & (time <= chirp.start + duration)
+    since = time[driven] - chirp.start
+    turns = (first + 0.5 * rate * since) * since + 1e-9
+    whole = np.arange(turns[-1] // _OF_CHIRP if len(turns) else 0.0)
+    begins = np.searchsorted(turns, _OF_CHIRP * np.append(whole, len(whole)))
+    values, rows = values[driven][: begins[-1]], np.diff(begins) > 1
+    ranges = np.maximum.reduceat(values, begins[:-1]) - np.minimum.reduceat(values, begins[:-1])
+    frequency = np.sqrt(first**2 + 2.0 * rate * _OF_CHIRP * (whole + 0.5))
+    return Response(number, frequency[rows], 0.5 * ranges[rows])
