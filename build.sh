@@ -172,7 +172,7 @@ case $command in
     say "C++ tests"
     $venv/bin/ctest --test-dir build --output-on-failure --parallel "${JOBS:-$(nproc)}" || failed="C++ tests"
     say "Python tests"
-    $python -m pytest -n auto --dist worksteal -m "not slow" "$@" || failed="${failed:+$failed and }Python tests"
+    $python -m pytest -n auto --dist worksteal "$@" || failed="${failed:+$failed and }Python tests"
     [ -z "$failed" ] || die "failed: $failed"
     ;;
   kernels)
@@ -185,7 +185,7 @@ print(*(name for name in extra if has[name]))')
       local kernel=$1
       shift
       say "numeric tests with OpenBLAS for $kernel"
-      OPENBLAS_CORETYPE=$kernel $python -m pytest -n auto --dist worksteal -m "not slow" \
+      OPENBLAS_CORETYPE=$kernel $python -m pytest -n auto --dist worksteal \
         tests/contract tests/master tests/system "$@" || failed="$failed $kernel"
     }
     grep -qw avx512bw /proc/cpuinfo && numeric_tests SkylakeX "$@" || say "this processor has no AVX-512: no SkylakeX"

@@ -1,8 +1,5 @@
 """What an engineer loads the pair for: forces, moments, stresses, gravity, a start at rest; impacts of the spring."""
 
-import ctypes as ct
-import math
-
 import numpy as np
 import pytest
 
@@ -68,31 +65,3 @@ def test_the_clamp_balances_the_momentum(beam, integrator):
     assert abs(momentum) > 0.1
     assert [shear[-1], bending[-1]] == [pytest.approx(C + tip_load, rel=1e-14), 0.0]
     assert [clamp, moment] == [-shear[0], -bending[0]]
-
-
-def test_gravity_is_a_load(spring):
-    """Its work is m g y; at rest on k1 the deflection would be −m g/k1. The cantilever above bears it, too."""
-    g, m, k1 = 9.81, 2.0, 30.0
-    k = spring.running(gravity=g, mass=m, linear_stiffness=k1)
-    assert k.get("acceleration") == pytest.approx(-g, rel=1e-15)
-    for i in range(20):
-        k.step(0.1 * i, 0.1)
-    w = math.sqrt(k1 / m)
-    y = -m * g / k1 * (1.0 - math.cos(2.0 * w))
-    assert k.get("displacement") == pytest.approx(y, rel=1e-11)
-    assert k.get("load_work") == pytest.approx(-m * g * y, rel=1e-11)
-
-
-def test_impacts_are_timed(spring):
-    """Free fall from 0.5 m with g = 10: impacts at √0.1, then every 2 e √0.1, e², …; at last the top rests."""
-    k = spring.running(gravity=10.0, linear_stiffness=0.0, stop_enabled=True, stop_position=0.0, displacement=0.5,
-                       restitution=0.5, stop_time=10.0, start_time=1.0)  # fmt: skip
-    first, time, seated = math.sqrt(0.1), 1.0, (ct.c_int * 1)(1)
-    for until, last, rests in ((0.3, -1.0, 0), (0.5, 1.0 + first, 0), (0.7, 1.0 + 2.0 * first, 0), (2.7, None, 1)):
-        k.step(time, 1.0 + until - time)
-        time = 1.0 + until
-        assert k.access("GetBoolean", spring.references("seated"), 1, seated) == 0
-        assert seated[0] == rests
-        assert last in (None, pytest.approx(k.get("last_impact_time"), rel=1e-9))
-    assert k.get("acceleration", "displacement") == [0.0, 0.0]
-    assert k.get("last_impact_time") == pytest.approx(1.0 + 3.0 * first, rel=1e-6)  # the sum of the series

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from commands import ran
 
-pytestmark = pytest.mark.slow
-
 SOFT_BEAM = {"young_modulus": 100.0, "shear_modulus": 100.0, "initial_velocity_slope": -1.0, "alpha_b": 1e-3}
 SOFT_SPRING = {"linear_stiffness": 3.0, "cubic_stiffness": -0.2, "damping": 0.1, "velocity": -1.0}
 RUNS = {

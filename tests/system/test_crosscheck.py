@@ -99,7 +99,7 @@ def test_a_wrong_reference_fails(monkeypatch, what):
     )
     scheme, degree = ("energy", 0) if what == "law" else ("hermite", 2)
     coupling = {"macro_step": 1e-3, "scheme": scheme, "degree": degree}
-    assert compare(with_changes(SOFT, time={"t_end": 0.2}, coupling=coupling))["verdict"] == "differs"
+    assert compare(with_changes(SOFT, time={"t_end": 0.1}, coupling=coupling))["verdict"] == "differs"
 
 
 @pytest.mark.parametrize(

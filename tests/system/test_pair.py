@@ -33,17 +33,6 @@ def test_the_papers_law_injects_all_of_the_energy_residual():
     assert found.energy_residual[-1] == pytest.approx(injected, rel=1e-9)
 
 
-def test_hermite_says_when_the_macro_step_is_too_large():
-    """ω_max H = 7 is beyond its stability: the energy changes, and the run says so; at 17 with a light top it stops."""
-    hermite = {"scheme": "hermite", "degree": 2}
-    summary = run("soft", macro_step=4e-3, **hermite).summary
-    assert summary["max_energy_residual"] > 1e-3
-    assert any("hermite of degree 2" in warning for warning in summary["warnings"])
-    with pytest.raises(RunStopped, match="hermite of degree 2") as stopped:
-        simulate(with_changes(load_scene("soft"), spring={"mass": 0.05}, coupling={"macro_step": 1e-2, **hermite}))
-    assert 0.0 < stopped.value.time < 0.6
-
-
 # -- either version of FMI ------------------------------------------------------------------------------------------
 
 LOADS = [
