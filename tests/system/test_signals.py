@@ -212,6 +212,7 @@ def swept(first, last, seconds, cubic=0.0, **spring):
 def test_a_slow_sweep_of_a_linear_oscillator_is_its_frequency_response():
     run = swept(6.0, 8.5, 25.0, initial_velocity=0.0)
     for found in responses(run, "y"):
+        assert len(found.frequency) == 90  # pairs of its 181.25 turns
         rate = 2.0 * pi * found.frequency
         exact = 0.3 / np.sqrt((STIFFNESS - MASS * rate**2) ** 2 + (DAMPING * rate) ** 2)
         late = slice(20, None)  # the second begins as the first has ended; the first from rest

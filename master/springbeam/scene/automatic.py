@@ -5,11 +5,10 @@ The choice depends on the scene alone (``docs/coupling.md``, "The scheme that fi
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from .linearised import spring_frequency
-from .messages import filled
+from .messages import Rule, filled
 from .reading import with_changes
 from .resolution import STABLE, TURN, mesh_frequency, slowest_frequency
 from .scene import Scene
@@ -23,43 +22,56 @@ class Choice(NamedTuple):
     because: str
 
 
-#: What decides before the frequencies do, the first that holds: whether it does, scheme and degree, and the reason.
-_DECIDED: tuple[tuple[Callable[[Scene], bool], str, int, str], ...] = (
-    (lambda s: s.contact.algorithm, "energy", 0, "{contact.law}"),
-    (lambda s: s.beam is None, "energy", 0, "one body"),
-    (lambda s: s.beam is not None and s.beam.integrator != "modal", "energy", 0, "{beam.integrator}"),
-    (lambda s: s.massless, "energy", 2, "{beam.fidelity}"),
-    (lambda s: not s.contact.rigid, "energy", 2, "{contact.law}"),
-    (lambda s: s.contact.impact == "rest" and s.spring is not None, "energy", 2, "{contact.impact}"),
-    (lambda s: s.coupling.adaptive, "hermite", 2, "the steps follow from tolerances"),
+def _integrals(scene: Scene) -> bool:
+    """Return whether all foreign FMUs of the scene tell both integrals of their motion."""
+    return all(body.integral and body.integral_2 for body in scene.foreign.values())
+
+
+def _turns(scene: Scene) -> dict[str, float]:
+    """Return what the fastest and the slowest oscillation turn in a macro step [rad]."""
+    beam, H = scene.beam, scene.coupling.H
+    assert beam is not None
+    fastest = max(mesh_frequency(beam), 0.0 if scene.spring is None else spring_frequency(scene))
+    return {"fastest": fastest * H, "slowest": slowest_frequency(beam) * H}
+
+
+#: What decides, the first rule that holds: the reason, and the scheme and degree for it.
+_DECIDED: tuple[tuple[Rule, str, int], ...] = (
+    (Rule(lambda s: s.partners and _integrals(s), "a body that is not our own"), "energy", 2),
+    (Rule(lambda s: s.partners, "a body that is not our own"), "energy", 0),
+    (Rule(lambda s: s.contact.algorithm, "{contact.law}"), "energy", 0),
+    (Rule(lambda s: s.beam is None, "one body"), "energy", 0),
+    (Rule(lambda s: s.beam.integrator != "modal", "{beam.integrator}"), "energy", 0),
+    (Rule(lambda s: s.massless, "{beam.fidelity}"), "energy", 2),
+    (Rule(lambda s: not s.contact.rigid, "{contact.law}"), "energy", 2),
+    (Rule(lambda s: s.contact.impact == "rest" and s.spring, "{contact.impact}"), "energy", 2),
+    (Rule(lambda s: s.coupling.adaptive, "the steps follow from tolerances"), "hermite", 2),
+    (
+        Rule(
+            lambda s: _turns(s)["fastest"] <= STABLE,
+            f"the whole mesh's ω_max H = {{fastest:.3g}} <= {STABLE:g}",
+            _turns,
+        ),
+        "hermite",
+        2,
+    ),
+    (
+        Rule(
+            lambda s: _turns(s)["slowest"] <= TURN,
+            f"the whole mesh's ω_max H = {{fastest:.3g}} > {STABLE:g}",
+            _turns,
+        ),
+        "energy",
+        2,
+    ),
+    (Rule(lambda s: True, f"ω₁H = {{slowest:.3g}} > {TURN:g}", _turns), "energy", 0),
 )
 
 
 def choice(scene: Scene) -> Choice:
     """Return the scheme and degree that fit ``scene``, whatever it asks for."""
-    if scene.partners:
-        return Choice("energy", _highest_degree(scene), "a body that is not our own")
-    for decides, scheme, degree, because in _DECIDED:
-        if decides(scene):
-            return Choice(scheme, degree, filled(scene, because))
-    beam, H = scene.beam, scene.coupling.H
-    assert beam is not None
-    fastest = max(mesh_frequency(beam), 0.0 if scene.spring is None else spring_frequency(scene))
-    bound = f"the whole mesh's ω_max H = {fastest * H:.3g}"
-    if fastest * H <= STABLE:
-        return Choice("hermite", 2, f"{bound} <= {STABLE:g}")
-    turn = slowest_frequency(beam) * H
-    return (
-        Choice("energy", 2, f"{bound} > {STABLE:g}")
-        if turn <= TURN
-        else Choice("energy", 0, f"ω₁H = {turn:.3g} > {TURN:g}")
-    )
-
-
-def _highest_degree(scene: Scene) -> int:
-    """Return the highest degree that the bodies' tables speak of: of a foreign FMU, by its integrals."""
-    integrals = [(body.integral, body.integral_2) for body in scene.foreign.values()]
-    return min((2 if all(names) else 0 for names in integrals), default=2)
+    rule, scheme, degree = next(row for row in _DECIDED if row[0].when(scene))
+    return Choice(scheme, degree, filled(scene, rule.text, **rule.numbers(scene)))
 
 
 def with_scheme_chosen(scene: Scene) -> tuple[Scene, Choice | None]:
