@@ -5,7 +5,8 @@ import pytest
 from runs import a_trajectory
 from scipy.integrate import quad
 
-from springbeam.scene import SceneError
+from springbeam.scene import Load, SceneError
+from springbeam.signals.driven import response
 from springbeam.signals.expressions import Expression, function_of, signal
 from springbeam.signals.shock import shock_spectrum
 
@@ -47,6 +48,16 @@ def test_a_formula_whose_part_did_not_happen_has_no_value():
 def test_a_function_that_is_not_there_is_refused(text):
     with pytest.raises(SceneError, match=text):
         function_of(text)
+
+
+def test_the_response_to_a_chirp_is_that_of_whole_pairs_of_its_turns():
+    """Of 2.5 turns two, from 1 s to 1.2 s; what comes before and after does not count."""
+    chirp = Load(on="tip", signal="chirp", start=1.0, frequency=10.0, frequency_end=10.0, duration=0.25)
+    time = 1e-3 * np.arange(2000)
+    values = np.where((time > 0.9995) & (time < 1.1995), 3.0 * np.sin(20.0 * np.pi * time), 9.0)
+    found = response(0, chirp, time, values)
+    assert found.frequency == pytest.approx([10.0])
+    assert found.amplitude == pytest.approx([3.0])
 
 
 # -- shock response spectra ---------------------------------------------------------------------------------------

@@ -101,10 +101,10 @@ def responses(run: Trajectory, what: str) -> list[Response]:
     """Return the response of a column, or of a formula of columns, to each chirp of the run."""
     chirps = [number for number, load in enumerate(run.scene.loads) if load.signal == "chirp"]
     values = signal(run, what)
-    return [_response(number, run.scene.loads[number], run.time, values) for number in chirps]
+    return [response(number, run.scene.loads[number], run.time, values) for number in chirps]
 
 
-def _response(number: int, chirp: Load, time: np.ndarray, values: np.ndarray) -> Response:
+def response(number: int, chirp: Load, time: np.ndarray, values: np.ndarray) -> Response:
     """Return the range over each `_OF_CHIRP` turns of a chirp, and its frequency amidst them."""
     first, last, duration = chirp.frequency or 0.0, chirp.frequency_end or 0.0, chirp.duration or inf
     rate = (last - first) / duration
