@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from bodies import DuffingBody, Upper
 
-from springbeam.bodies.elements import RigidWall
 from springbeam.contact.phases import Joint, Phase
 from springbeam.results.steps import STEP
 from springbeam.results.trajectory import Event, EventKind
@@ -107,90 +106,3 @@ def test_at_degree_0_the_force_before_ends_part_tells(number, seated):
     alternates = number > 3
     assert seen.alternation == pytest.approx(3.0 * H / momentum if alternates else 0.0, rel=1e-9)
     assert seen.mismatch_at_events == pytest.approx(0.0 if alternates else mass * 0.01 / momentum, rel=1e-9)
-
-
-@pytest.mark.parametrize(("mismatch", "size", "swing"), [(9.0, H, 2e-3), (4.0, H, 1e-3), (9.0, 0.9 * H, 0.0)])
-def test_rows_that_go_up_and_down_about_a_smooth_curve_jitter(mismatch, size, swing):
-    """y = (n/10)³ ± 2 mm while tied, at rows H apart; but no more than the mismatch parts the ends, w H/4."""
-    n = np.arange(8)
-    y = (n / 10.0) ** 3 + 2e-3 * (-1.0) ** n
-    steps = records(Phase(Joint.TIED), y=y, u_tip=2.0 * y, v_tip=np.append(np.zeros(7), 1e-3 * mismatch / H))
-    steps["phase"], steps["size"][1:] = steps["phase"][0], size
-    assert observed(*pair(), steps, []).jitter == pytest.approx(swing / np.ptp(y), rel=1e-9, abs=1e-12)
-
-
-def sinking(depth, force):
-    """Steps in which the top rises past the resting tip on straight lines, to ``depth`` [m] at the rows."""
-    steps = records(Phase(), z=np.append(0.0, np.diff(depth)) / H)
-    steps["z_after"] = np.append(np.diff(depth), 0.0) / H
-    steps["y"] = steps["y_after"] = depth
-    before = np.append(0.0, depth[:-1])
-    steps["y_integral"], steps["y_integral_2"] = 0.5 * H * (before + depth), H**2 * (2.0 * before + depth) / 6.0
-    steps["contact_force"] = force
-    return steps
-
-
-def test_a_contact_is_late_by_each_steps_own_penetration():
-    """x²/12 of each step, x² = 2 λ p (1/2 + 1) H² of the deeper of its ends."""
-    stiffness, depth = 3.0, np.array([0.0, 0.1, 0.2, -0.1])
-    seen = observed(*pair(0, law="compliance", stiffness=stiffness, exponent=2.0), sinking(depth, 1.0), [])
-    assert seen.late == pytest.approx(2.0 * stiffness * (0.1 + 0.2 + 0.2) * 1.5 * H**3 / 12.0, rel=1e-12)
-    assert seen.contact_frequency == pytest.approx(np.sqrt(2.0 * stiffness * 0.2 * 1.5), rel=1e-12)
-
-
-@pytest.mark.parametrize("law", ["compliance", "link"])
-def test_a_force_misses_the_law_by_its_impulse_along_the_path(law):
-    """λ p² where 1 N acts; in the last step contact opens 2/3 on. Or k p. The top has 300 kg·m/s."""
-    stiffness, depth = 3.0, np.array([0.0, 0.1, 0.2, -0.1])
-    asked = stiffness * np.array([0.1**2 / 3.0, (0.2**3 - 0.1**3) / 0.3, 2.0 / 3.0 * 0.2**2 / 3.0])
-    if law == "link":
-        asked = stiffness * 0.5 * (depth[:-1] + depth[1:])
-    seen = observed(*pair(law=law, stiffness=stiffness, exponent=2.0), sinking(depth, 1.0), [])
-    assert seen.missed == pytest.approx(H * np.linalg.norm(asked - 1.0) / 300.0, rel=1e-4)
-
-
-def test_a_contact_between_two_rows_is_seen():
-    """p = 1.6 s (1 − s) − 0.1 m on a step: where no row shows it and no force acts, the law asks for ∫ λ p₊ dτ."""
-    steps = sinking(np.array([-0.1, -0.1]), 0.0)
-    steps["z_after"][0], steps["z"][1] = 1.6 / H, -1.6 / H
-    steps["y_integral"] += 1.6 * H / 6.0
-    steps["y_integral_2"] += 1.6 * H**2 / 12.0
-    seen = observed(*pair(law="compliance", stiffness=3.0, exponent=1.0), steps, [])
-    assert seen.contact_frequency == pytest.approx(np.sqrt(3.0 * 1.5), rel=1e-12)
-    half = np.sqrt(0.3 / 1.6)  # of the time that it lasts
-    assert seen.missed == pytest.approx(3.0 * H * 4.0 / 3.0 * 0.3 * half / (1.6 / H), rel=1e-2)
-
-
-@pytest.mark.parametrize("law", ["compliance", "link"])
-def test_a_force_misplaces_the_lower_end_by_its_course_inside_steps(law):
-    """C is the mean of what the law asks for on two steps on which p grows by 0.1 m each: it acts too early in both."""
-    stiffness, depth = 3.0, np.array([0.0, 0.1, 0.2])
-    steps = sinking(depth, stiffness * np.array([0.0, 0.05, 0.15]))
-    seen = observed(*pair(law=law, stiffness=stiffness, exponent=1.0), steps, [])
-    course = stiffness * 0.1 * H**2 * (1.0 / 4.0 - 1.0 / 6.0)  # ∫ (H − τ) C dτ
-    assert seen.missed == pytest.approx(0.0, abs=1e-15)
-    assert seen.misplaced == pytest.approx(2.0 * course / TOP / 0.2, rel=1e-9)
-    steps["contact_force"], steps["contact_force_rate"] = stiffness * np.array([0.0, 0.0, 0.1]), stiffness * 0.1 / H
-    assert observed(*pair(law=law, stiffness=stiffness, exponent=1.0), steps, []).misplaced < 1e-15
-
-
-@pytest.mark.filterwarnings("error")
-def test_an_elastic_stop_is_not_misplaced():
-    """It has no momentum either: the body that moves is the tip."""
-    scene, both = pair(law="compliance", stiffness=3.0, exponent=1.0)
-    both.lower = RigidWall(0.0)
-    steps = sinking(np.array([0.0, 0.1]), 1.0)
-    steps["y"] = steps["y_after"] = steps["z"] = steps["z_after"] = 0.0
-    steps["v_tip"] = steps["v_tip_after"] = -1.0
-    seen = observed(scene, both, steps, [])
-    assert (seen.misplaced, seen.momentum) == (0.0, TIP)
-
-
-def test_strokes_count_by_their_impulse_and_twice():
-    """The top has 1 kg·m/s: 2 N·s turns it round, 0.25 N·s counts a quarter of that of 1 N·s or more."""
-    kinds = [("impact", 0.0), ("separation", 0.0), ("stop_impact", 2.0), ("stop_impact", 0.25), ("seated", 0.0)]
-    steps = records(Phase(), z=np.ones(9))
-    steps["events"] = len(kinds)
-    events = [Event(H * n, EventKind(kind), impulse_foundation=impulse) for n, (kind, impulse) in enumerate(kinds)]
-    assert observed(*pair(), steps, events).contacts == 1.0 + 2.0 * 1.25
-    assert observed(*pair(), steps, []).contacts == 1.0

@@ -12,12 +12,10 @@ from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import shipped_scenes
 from springbeam.scene.resolution import (
     ALTERNATION,
-    JITTER,
-    LATE,
-    LATE_IF_MASSLESS,
+    LAG,
     MISMATCH,
     MISPLACED,
-    MISSED,
+    SHORT,
     STABLE,
     WAVE_LAG,
     fastest_frequency,
@@ -74,11 +72,10 @@ def test_one_radian_of_the_slowest_oscillation_is_the_limit(turn, resolved):
 def test_the_limits_of_the_mismatch_and_of_the_shortest_contact(degree, share, resolved):
     scene = with_changes(PAIR, coupling={"degree": degree})
     assert (not_resolved(scene, share * MISMATCH[degree]) is None) is resolved
-    assert (not_resolved(scene, 0.0, jitter=share * JITTER) is None) is resolved
     assert (not_resolved(scene, 0.0, alternation=share * ALTERNATION) is None) is resolved
     agreeing = {"coupling": {"scheme": "hermite", "degree": 2}}, {"beam": {"fidelity": "quasi_static"}}
     for given in (scene, *(with_changes(PAIR, **tables) for tables in agreeing)):
-        lasted = PAIR.coupling.H / share
+        lasted = SHORT * PAIR.coupling.H / share
         assert (not_resolved(given, 0.0, shortest_contact=lasted) is None) is resolved
 
 
@@ -150,15 +147,12 @@ STIFF = with_changes(
 )
 
 
-@pytest.mark.parametrize("contacts", [1, 5])
+@pytest.mark.parametrize("degree", [0, 1, 2])
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
-@pytest.mark.parametrize("found", [{"late": LATE[0] / 2.0, "pace": 2.0}, {"missed": MISSED}], ids=["late", "missed"])
-def test_a_contact_that_comes_late_or_misses_its_law_is_said(found, contacts, share, resolved):
-    """A body that crosses its way twice a second is then off by as much; each contact amplifies that."""
-    name, limit = next(iter(found.items()))
-    lost = not_resolved(STIFF, 0.0, **{**found, name: share * limit / contacts}, contacts=contacts)
-    assert (lost is None) is resolved
-    assert (not_resolved(STIFF, 0.0, misplaced=share * MISPLACED, contacts=contacts) is None) is resolved
+def test_ends_that_the_law_would_have_elsewhere_are_said(degree, share, resolved):
+    scene = with_changes(STIFF, coupling={"degree": degree})
+    told = not_resolved(scene, 0.0, misplaced=share * MISPLACED[degree])
+    assert (told is None) is resolved
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])
@@ -176,20 +170,20 @@ def test_a_step_makes_a_contact_late_as_gauss_collocation_does(degree):
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
 def test_steps_of_the_midpoint_rule_may_lag_behind_what_an_impact_sets_off(share, resolved):
     """n steps that turn it by x lag by n x³/12: 1 rad of the fastest waves is the limit, those that die out left out,
-    or 5 % of the way of a beam without inertia that moves at ω. The modal integrator and degree 2 do not lag."""
+    or 0.12 rad of a beam without inertia together with the spring. The modal integrator and degree 2 do not lag."""
 
     def said(omega, limit, other, **tables):
         turn = share * (12.0 * limit / (omega * PAIR.duration)) ** 0.5
         given = with_changes(PAIR, **tables, coupling={"degree": 0, "macro_step": turn / omega})
-        assert (not_resolved(given, 0.0, pace=omega) is None) is resolved
-        assert not_resolved(with_changes(given, **other), 0.0, pace=omega) is None
+        assert (not_resolved(given, 0.0) is None) is resolved
+        assert not_resolved(with_changes(given, **other), 0.0) is None
 
     for alpha in (0.0, 0.01):
         midpoint = {"n_elements": 10, "alpha_b": alpha, "integrator": "generalized_alpha"}
         waves = impact_frequency(with_changes(PAIR, beam=midpoint).beam)
         said(waves, WAVE_LAG, {"beam": {"integrator": "modal"}}, beam=midpoint)
     together = ((3.0 + 1.0 / tip_compliance(PAIR.beam)) / PAIR.spring.mass) ** 0.5
-    said(together, LATE_IF_MASSLESS[0], {"coupling": {"degree": 2}}, beam={"fidelity": "quasi_static"})
+    said(together, LAG, {"coupling": {"degree": 2}}, beam={"fidelity": "quasi_static"})
 
 
 @pytest.mark.parametrize(("size", "degree"), [(1e-3, 0), (1e-3, 2), (7.8125e-4, 2)])
@@ -198,10 +192,10 @@ def test_a_contact_that_is_not_resolved_is_said(size, degree):
     run = simulate(with_changes(STIFF, coupling={"macro_step": size, "degree": degree}))
     assert run.summary["resolved"] is False
     (warning,) = run.summary["warnings"]
-    assert "tip and lower end turn" in warning
+    assert "more than all of its way" in warning
     named = float(warning.split("macro_step <= ")[1].split()[0])
     omega = np.sqrt(1e8 * (modal_beam(STIFF.beam).inverse_tip_mass + 1.0))
-    assert (0.02, 0.2, 0.5)[degree] < named * omega < (0.6, 0.8, 2.5)[degree]
+    assert 0.02 < named * omega < 0.6
 
 
 def test_a_stiff_link_that_does_not_swing_has_nothing_to_resolve():

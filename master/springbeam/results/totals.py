@@ -107,17 +107,6 @@ def totals(
     }
 
 
-def pace(steps: np.ndarray) -> float:
-    """Return the largest speed of an end over its largest distance from its start [1/s], of the end with more of it."""
-    found = 0.0
-    for place, velocity in (("u_tip", "v_tip"), ("y", "z")):
-        way = float(np.abs(steps[place] - steps[place][:1]).max(initial=0.0))
-        if way > 0.0:
-            speeds = np.where(steps["size"] > 0.0, steps[velocity], steps[f"{velocity}_after"])
-            found = max(found, float(np.abs(speeds).max()) / way)
-    return found
-
-
 def shortest_contact(
     steps: np.ndarray, events: Iterable[Event], below: float, least: float, *, free_at_end: bool
 ) -> float:

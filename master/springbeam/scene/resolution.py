@@ -16,16 +16,14 @@ from .tables import ORDINARY_SCHEMES, Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
 TURN = 1.0
-#: By degree d of the force: a step that turns a contact by x rad makes it late by x^(2d + 2) over this of itself, as a
-#: Gauss collocation of d + 1 stages would (for d = 0 the midpoint rule).
+#: By degree d of the force: a step that turns spring and massless beam by x rad makes them late by x^(2d + 2) over this
+#: of itself, as a Gauss collocation of d + 1 stages would (for d = 0 the midpoint rule).
 COLLOCATION = (12.0, 720.0, 100800.0)
-#: Share of its way that an end may move, by degree, in the time by which all steps together make the contact late,
-#: times the number of contacts, each of which amplifies that; and where, without a beam's inertia, all that moves is.
-LATE, LATE_IF_MASSLESS = (0.15, 0.4, 0.6), (0.05, 0.05, 0.01)
-#: Impulse by which the force of a run may miss a soft law, over the momentum of a body, times the number of contacts.
-MISSED = 0.0125
-#: Share of its way by which the course of the force inside steps may misplace the lower end.
-MISPLACED = 0.01
+#: What all of them together may turn too little [rad].
+LAG = 0.12
+#: Share of its way that an end may be from where a soft law would have it, by degree of the force. At degree 0 that is
+#: known to some tenths of itself; at the others less well, since they leave out what the law feels of fast waves.
+MISPLACED = (0.006, 0.002, 0.001)
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
 #: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
 STABLE = 3.0
@@ -37,10 +35,9 @@ DIES_OUT = 0.15
 #: the motion is called unresolved, by degree (docs/accuracy.md has what it misses).
 MISMATCH = {0: 0.04, 1: 0.02, 2: 0.025}
 #: Impulse by which the force of a step goes up and down before ends part, over the momentum of a body.
-ALTERNATION = 0.0135
-#: Share of its way by which a row of joined ends may be off a smooth curve: where the phase of the vibration that does
-#: so is lost, the ends are off by twice that.
-JITTER = 0.0055
+ALTERNATION = 0.0115
+#: Macro steps that a contact must last for its end not to be decided by the force of one or two of them.
+SHORT = 1.35
 #: Share of the smaller momentum of both bodies that the force of a short contact may pass on: it is none to speak of.
 SHORT_IMPULSE = 0.1
 #: Velocity mismatch above which it is a vibration and no error.
@@ -49,6 +46,7 @@ VIBRATION = 0.2
 SETTLED = 2.5
 #: Share of the slowest period over which the contact force is averaged.
 WINDOW = 0.02
+_HIGHER = ", a higher coupling.degree allows longer ones"
 
 
 def not_resolved(
@@ -56,14 +54,8 @@ def not_resolved(
     mismatch: float,
     *,
     alternation: float = 0.0,
-    jitter: float = 0.0,
     shortest_contact: float = inf,
-    contact_frequency: float = 0.0,
-    late: float = 0.0,
-    missed: float = 0.0,
     misplaced: float = 0.0,
-    contacts: float = 1.0,
-    pace: float = 0.0,
 ) -> str | None:
     """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
 
@@ -77,24 +69,11 @@ def not_resolved(
         squares.
     alternation
         By how much the force goes up and down from step to step before ends part, as impulse over that momentum.
-    jitter
-        By how much the rows of joined ends go up and down about a smooth curve, over the smaller way of an end.
     shortest_contact
         How long the shortest contact, touch or rest on the foundation has lasted [s]; of a soft law it counts where the
         force is exchanged once per macro step.
-    contact_frequency
-        Of tip and lower end on a soft contact law at the deepest penetration reached [rad/s], 0 without one.
-    late
-        By which the steps make a soft contact late, all together [s].
-    missed
-        The impulse by which the force of the steps misses a soft law along the path of the ends, the root of the sum of
-        all steps' squares, over the smaller momentum of both bodies.
     misplaced
-        The distance by which that force misplaces the lower end, over the way of that.
-    contacts
-        How many amplify what is late.
-    pace
-        The largest speed of an end over how far it moves [1/s], of the faster end.
+        How far an end is from where a soft law would have it, over its way.
     """
     H = scene.coupling.macro_step
     if H is not None:  # steps that follow from tolerances are judged by their error
@@ -105,10 +84,7 @@ def not_resolved(
                     f"Velocities, forces and times of events are samples of a faster motion; coupling.macro_step <= "
                     f"{_rounded_down(TURN / omega)} resolves it{else_}"
                 )
-        if scene.massless and scene.contact.rigid:  # the ends are one oscillator, in its steps as in a soft contact's
-            contact_frequency = joined_frequency(scene)
-            late = scene.duration * lateness(scene, contact_frequency * H)
-        lost = _contact_lost(scene, contact_frequency, H, late * pace * contacts, missed * contacts, misplaced)
+        lost = _law_missed(scene, H, misplaced) or _lags(scene, H)
         if lost := lost or _unstable(scene, H) or _waves_lag(scene, H):
             return lost
     if mismatch > MISMATCH[scene.coupling.degree]:
@@ -122,17 +98,12 @@ def not_resolved(
             "not resolved: the force on joined ends goes up and down from step to step before they part, by "
             f"{100.0 * alternation:.2g} % of the momentum of a body; it decides when they do. {_remedy(scene)}"
         )
-    if jitter > JITTER:
-        return (
-            f"not resolved: joined ends go up and down from row to row by {100.0 * jitter:.2g} % of their way, samples "
-            f"of a faster vibration that the steps do not follow. {_remedy(scene)}"
-        )
     held = scene.contact.rigid or scene.coupling.scheme in ORDINARY_SCHEMES  # a force that does not see the contact end
-    if H is not None and held and shortest_contact < H:
+    if H is not None and held and shortest_contact < SHORT * H:
         return (
             f"not resolved: a contact lasts {shortest_contact / H:.2g} macro steps only, so that the force of one or "
             "two steps decides when it ends, and with it what follows; coupling.macro_step <= "
-            f"{_rounded_down(shortest_contact)} resolves it"
+            f"{_rounded_down(shortest_contact / SHORT)} resolves it"
         )
     return None
 
@@ -148,28 +119,34 @@ def _force_degree(scene: Scene) -> int:
     return scene.coupling.degree if scene.coupling.scheme == "energy" else 0
 
 
-def _contact_lost(scene: Scene, omega: float, H: float, moved: float, missed: float, misplaced: float) -> str | None:
-    """Return in words why steps of H [s] do not follow a contact of ``omega`` [rad/s]; ``None`` if they do.
+def _law_missed(scene: Scene, H: float, misplaced: float) -> str | None:
+    """Return in words why the forces of steps of H [s] miss a soft law too far; ``None`` if they do not.
 
-    ``moved`` is the share of its way that an end moves while it is late, ``missed`` the share of a momentum by which
-    the forces miss the law, ``misplaced`` the share of its way by which they misplace the lower end. Waves that the
-    steps do not follow let the last two fall with the square of H only.
+    Waves that the steps do not follow let ``misplaced`` fall with the square of H only.
     """
-    projected, degree = scene.coupling.scheme == "energy", _force_degree(scene)
-    limit = (LATE_IF_MASSLESS if scene.massless else LATE)[degree]
-    excess = max((moved / limit) ** (0.5 / (degree + 1)), max(missed / MISSED, misplaced / MISPLACED) ** 0.5)
+    excess = misplaced / MISPLACED[_force_degree(scene)]
     if excess <= 1.0:
         return None
-    raises = projected and degree + 1 < len(COLLOCATION) and (scene.beam is None or scene.beam.integrator == "modal")
-    higher = ", a higher coupling.degree allows longer ones" if raises else ""
-    where = "together" if scene.massless else "on the contact law at its deepest penetration"
-    beside = f", and the forces miss the law by {100.0 * missed:.2g} % of a momentum" if missed > MISSED else ""
-    if misplaced > MISPLACED:
-        beside += f", and misplace the lower end by {100.0 * misplaced:.2g} % of its way"
+    raises = scene.coupling.scheme == "energy" and scene.coupling.degree < 2
+    raises &= scene.beam is None or scene.beam.integrator == "modal"
+    far = f"about {100.0 * misplaced:.2g} %" if misplaced <= 1.0 else "more than all"
     return (
-        f"not resolved: tip and lower end turn {omega * H:.3g} rad in a macro step"
-        f" {where}{beside}. Velocities, forces and times of contact are samples of a "
-        f"faster motion; coupling.macro_step <= {_rounded_down(H / excess)} resolves it{higher}"
+        f"not resolved: what the forces of the steps miss of the contact law moves an end by {far} of its way. "
+        "Velocities, forces and times of contact are samples of a faster motion; coupling.macro_step <= "
+        f"{_rounded_down(H / sqrt(excess))} resolves it{_HIGHER if raises else ''}"
+    )
+
+
+def _lags(scene: Scene, H: float) -> str | None:
+    """Return in words why steps of H [s] do not follow spring and massless beam together; ``None`` if they do."""
+    omega, degree = joined_frequency(scene), _force_degree(scene)
+    lag = omega * scene.duration * lateness(scene, omega * H)
+    if lag <= LAG or not (scene.massless and scene.contact.rigid):
+        return None
+    return (
+        f"not resolved: tip and lower end turn {omega * H:.3g} rad in a macro step together, and in all "
+        f"{lag:.2g} rad too little; coupling.macro_step <= {_rounded_down(H / (lag / LAG) ** (0.5 / (degree + 1)))} "
+        f"resolves it{_HIGHER if degree < 2 else ''}"
     )
 
 

@@ -1,0 +1,71 @@
+"""How far the forces of steps that miss a soft law take the ends: beside what they are really off."""
+
+import numpy as np
+import pytest
+from bodies import DuffingBody, Upper
+
+from springbeam import load_scene, simulate, with_changes
+from springbeam.bodies.elements import PointMass
+from springbeam.contact.laws import law_of
+from springbeam.monolithic.semi_discrete import modal_beam
+from springbeam.run.misplaced import misplaced, tip_modes
+from springbeam.run.stepping import Pair
+from springbeam.scene import shipped_scenes
+
+SOFT = with_changes(load_scene("soft"), time={"t_end": 0.3}, beam={"n_elements": 10})
+LINK = {"law": "link", "stiffness": 2000.0}
+BOUNCING = {"law": "compliance", "stiffness": 3e4, "exponent": 1.5}
+#: What changes of `soft`.
+CASES = {
+    "link": {"contact": LINK},
+    "damped link": {"contact": {**LINK, "damping": 2.0}},
+    "beam of few modes": {"contact": LINK, "beam": {"n_modes": 3}},
+    "beam that creeps": {"contact": LINK, "beam": {"alpha_b": 0.5}},
+    "contact that opens": {"contact": BOUNCING, "stop": None},
+    "damped contact": {"contact": {**BOUNCING, "damping": 0.5}, "stop": None},
+    "strokes on the foundation": {"contact": LINK, "stop": {"position": -0.01, "restitution": 0.7}},
+    "elastic stop": {"contact": {**BOUNCING, "stiffness": 1e3}, "spring": None, "stop": {"position": 0.0}},
+}
+
+
+def both_ends(run, exact):
+    """What `misplaced` says, and the largest error of an end at a row, each over the end's way."""
+    scene, fine = run.scene, exact.at(run.time)
+    pair = Pair(scene, Upper(1.0), None if scene.spring is None else DuffingBody(scene.spring.mass))
+    said = misplaced(scene, pair, law_of(scene), run.steps, run.events)
+    names = [name for name in ("u_tip", "y") if name in run.columns]
+    return said, max(np.abs(run[name] - fine[name]).max() / np.abs(run[name] - run[name][0]).max() for name in names)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_ends_are_as_far_off_as_is_said(case):
+    """Both fall with H² at degree 0, and the estimate within a tenth at 2 ms; heavy damping it knows less well."""
+    scene, rel = with_changes(SOFT, **CASES[case]), 0.6 if case == "beam that creeps" else 0.1
+    exact = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": 2.5e-4}))
+    for degree, size in ((0, 2e-3), (0, 1e-3), (1, 2e-3)):
+        said, off = both_ends(simulate(with_changes(scene, coupling={"degree": degree, "macro_step": size})), exact)
+        assert said == pytest.approx(off, rel=rel, abs=1e-9 if degree == 0 else 1e-5)
+
+
+def test_masses_of_ones_own_are_free():
+    """Two of 1 and 2 kg that a link joins, one of them moving; degree 0 misses its frequency by (ωH)²/24."""
+    scene = with_changes(SOFT, contact={**LINK, "stiffness": 100.0}, stop=None, time={"t_end": 0.2})
+    scene = with_changes(scene, coupling={"degree": 0, "macro_step": 5e-3})
+    run = simulate(scene, upper=PointMass(1.0, velocity=-1.0), lower=PointMass(2.0))
+    own, pair = run.scene.model_copy(update={"upper": None, "lower": None}), Pair(scene, PointMass(1.0), PointMass(2.0))
+    said = misplaced(own, pair, law_of(scene), run.steps, run.events)
+    omega, t = np.sqrt(150.0), run.time
+    p, both = np.sin(omega * t) / omega, -t / 3.0
+    exact = {"u_tip": both - 2.0 * p / 3.0, "y": both + p / 3.0}
+    off = max(np.abs(run[name] - exact[name]).max() / np.abs(run[name]).max() for name in exact)
+    assert said == pytest.approx(off, rel=0.1)
+
+
+@pytest.mark.parametrize("changes", [{}, {"n_elements": 6}, {"reduced_integration": False}, {"n_modes": 4}], ids=str)
+@pytest.mark.parametrize("name", [name for name in shipped_scenes() if load_scene(name).beam is not None])
+def test_modes_are_those_of_the_mesh(name, changes):
+    beam = load_scene(name).beam.model_copy(update=changes)
+    exact, (omega, tip) = modal_beam(beam), tip_modes(beam)
+    same = slice(0, 4)
+    assert omega[same] == pytest.approx(exact.omega[same], rel=2e-2)
+    assert np.abs(tip[same]) == pytest.approx(np.abs(exact.tip[same]), rel=2e-2)
