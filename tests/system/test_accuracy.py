@@ -145,9 +145,8 @@ def test_impulses_are_part_of_the_promise(seed, number):
     ("seed", "number", "way", "words"),
     [
         (4, 13, "energy 2", "differ where they part or strike the foundation"),
-        (5, 8, "energy 0", "rad in a macro step on the contact law"),
-        (51, 15, "energy 2", "the forces miss the law by 2 % of a momentum"),
-        (62, 2, "energy 0", "go up and down from row to row by 0.61 % of their way"),
+        (5, 8, "energy 0", "moves an end by about"),
+        (51, 15, "energy 2", "moves an end by about"),
         (71, 3, "energy 1", "differ where they part or strike the foundation, in all by 2.7 %"),
         (72, 10, "energy 2", "a contact lasts 0.7 macro steps only"),
         (74, 10, "energy 2, H/4", "a contact lasts 0.96 macro steps only"),
@@ -155,11 +154,10 @@ def test_impulses_are_part_of_the_promise(seed, number):
     ],
 )
 def test_what_a_campaign_found_wrong_is_told(seed, number, way, words):
-    """At fixed steps an end is off by 3.7, 1.5, 1.8, 1.1, 6.3, 2.4, 2.7 and 12.6 %.
+    """At fixed steps an end is off by 3.7, 1.5, 1.8, 6.3, 2.4, 2.7 and 12.6 %.
 
-    Velocities that differ by 5 %, 0.2 rad a step, waves in a contact that turns 0.8 rad, a mismatch that never meets
-    an event, one of 1.3 % at any of 20 strokes, and one that is small by chance where a released tip parts or a short
-    contact ends, do not show it.
+    Velocities that differ by 5 %, 0.2 rad a step, waves in a contact that turns 0.8 rad, a mismatch of 1.3 % at any of
+    20 strokes, and one that is small by chance where a released tip parts or a short contact ends, do not show it.
     """
     coupling = dict(judge.WAYS[way])
     scene = judge.drawn(seed, number)

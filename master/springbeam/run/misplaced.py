@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from functools import cache, lru_cache
 from itertools import product
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -32,12 +32,8 @@ _MODES, _ELEMENTS = 20, 50
 _LOST = 1e3
 
 
-class Modes(NamedTuple):
-    """What the upper body is the sum of, modes of unit mass: (n,) each."""
-
-    stiffness: np.ndarray  #: ω² [1/s²]
-    damping: np.ndarray  #: 2 ζ ω [1/s]
-    tip: np.ndarray  #: displacement of the tip [1/√kg]
+#: ω² [1/s²], 2 ζ ω [1/s] and the displacement of the tip [1/√kg] of modes of unit mass, (n,) each.
+Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def misplaced(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray, events: Sequence[Event]) -> float:
@@ -59,16 +55,16 @@ def misplaced(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray, events:
     of_steps = [*np.repeat([step["size"] / parts, stiffness], parts, axis=1), kept.ravel(), *defect]
     first = int(np.argmax(defect[0] != 0.0))  # up to there nothing is off
     ways = [float(np.abs(steps[name] - steps[name][0]).max()) or inf for name in ("u_tip_after", "y_after")]
-    modes = _modes(scene, pair)
+    *_, tip = modes = _modes(scene, pair)
     moves = cache(lambda H: _moves(modes, H))
     # Errors of displacements and velocities of the modes, and of both ends.
-    x, u, y, z, found = np.zeros(2 * len(modes.tip)), 0.0, 0.0, 0.0, 0.0
+    x, u, y, z, found = np.zeros(2 * len(tip)), 0.0, 0.0, 0.0, 0.0
     for H, k, stays, missed, early, stiffer, rate in zip(*(v[first:].tolist() for v in of_steps), strict=True):
         # The midpoint rule; a force acts by its mean, and moves a free mass by ``shift``/m besides.
         half, shift, gap, (free, pushed, shifted, flexible) = 0.5 * H, 0.5 * H * H * (early - missed), y - u, moves(H)
         slow = 1.0 / (1.0 + half * (resists + half * k))
         x = free @ x + shift * shifted
-        u = float(modes.tip @ x[: len(modes.tip)])
+        u = float(tip @ x[: len(tip)])
         y -= shift * per_mass
         mean = slow * (z - half * k * y)
         follows = 0.5 * stiffer + rate / H
@@ -121,9 +117,9 @@ def _kept(scene: Scene, steps: np.ndarray, events: Sequence[Event]) -> np.ndarra
 def _modes(scene: Scene, pair: Pair) -> Modes:
     """Return the beam's modes; a body that is not our own is a free mass."""
     if scene.beam is None:
-        return Modes(np.zeros(1), np.zeros(1), np.full(1, pair.upper.mass**-0.5 if pair.upper.mass > 0.0 else 0.0))
+        return np.zeros(1), np.zeros(1), np.full(1, pair.upper.mass**-0.5 if pair.upper.mass > 0.0 else 0.0)
     omega, tip = tip_modes(scene.beam)
-    return Modes(omega**2, scene.beam.alpha_b * omega**2, tip)
+    return omega**2, scene.beam.alpha_b * omega**2, tip
 
 
 def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
@@ -132,7 +128,7 @@ def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, 
     Further what a constant force of 1 N adds to them, and 1 N·s² that moves a free mass before the step, (2n,) each,
     and how far 1 N moves the tip [m/N].
     """
-    stiffness, decay, tip = np.maximum(modes.stiffness, 1e-8 / H**2), 0.5 * modes.damping, modes.tip
+    stiffness, decay, tip = np.maximum(modes[0], 1e-8 / H**2), 0.5 * modes[1], modes[2]
     root = np.sqrt(decay**2 - stiffness * (1.0 + 1e-12j))  # never 0
     slower, faster = np.exp((root - decay) * H), np.exp(-(root + decay) * H)
     cosine, sine = (0.5 * (slower + faster)).real, (0.5 * (slower - faster) / root).real

@@ -73,7 +73,7 @@ def _at_events(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Eve
 
     The mismatch is the impulse μ |v_tip − z|, the root of the sum of all events' squares. Either end of the last step
     counts: the mismatch alternates, and where the step is cut it may be small by chance. Strikes less than a macro step
-    after another one are left out, and what happens at the start of a phase: they may be as slow as one likes. At
+    after another one are left out: they may be as slow as one likes. At
     degree 0 the force decides when ends part, as far as some steps before tell how much it alternates (`_alternation`).
     Both are over the momentum of the body that they would change the most.
     """
@@ -89,10 +89,7 @@ def _at_events(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Eve
     struck = strikes[counted]
     late = np.full(len(row), True)
     late[struck] = np.diff(steps["time"][row[struck]], prepend=-np.inf) > H
-    made = np.cumsum(steps["size"] > 0.0)
-    entered = np.diff(steps["phase"], prepend=steps["phase"][0]) != 0.0
-    since = np.maximum.accumulate(np.where(entered, made, 0))
-    kept = late & joined(steps)[before] & (made[row] > since[before])
+    kept = late & joined(steps)[before]
     row, before, struck = row[kept], before[kept], struck[kept]
     apart = np.abs([steps["v_tip"][row] - steps["z"][row], steps["v_tip_after"][before] - steps["z_after"][before]])
     seated = steps["phase"][before] >= 3.0

@@ -33,7 +33,7 @@ WAVE_LAG = 1.0
 DIES_OUT = 0.15
 #: Impulse by which joined ends disagree as they part or strike the foundation, over the momentum of a body, above which
 #: the motion is called unresolved, by degree (docs/accuracy.md has what it misses).
-MISMATCH = {0: 0.04, 1: 0.02, 2: 0.025}
+MISMATCH = {0: 0.03, 1: 0.02, 2: 0.025}
 #: Impulse by which the force of a step goes up and down before ends part, over the momentum of a body.
 ALTERNATION = 0.0115
 #: Macro steps that a contact must last for its end not to be decided by the force of one or two of them.
