@@ -457,7 +457,7 @@ def test_a_foreign_body_that_rests_on_the_stop_is_resumed_to_the_same_bits(fmu, 
     assert goes_on_to_the_same_bits(scene, run, tmp_path, 0.6)
 
 
-def test_commands(fmu, tmp_path):
+def test_commands(fmu, tmp_path, unpainted):
     names = dict.fromkeys(("integral", "integral_2", "impulse", *ENERGIES))
     scene = pair(fmu(), spring=names, contact={"damping": 0.0}, coupling={"degree": 0}, time={"t_end": 0.2})
     file = tmp_path / "linked.toml"
