@@ -78,19 +78,12 @@ void Flight::begin(double size) {
 
 /// Finds out, too, whether the top touches the tip.
 Expansion Flight::expand() {
-  Expansion motion(start_.y, start_.z, start_.depth, loads_, size_);
-  const auto extend = [&] {
+  for (touching_ = false;; touching_ = true) {
+    Expansion motion(start_.y, start_.z, start_.depth, loads_, size_);
     while (motion.highest <= least_order) motion_.extend(motion, touching_, loads_, size_);
-  };
-  touching_ = false;
-  extend();
-  if (parameters_.compliant() && direction(motion.depth) > 0.0) {
-    touching_ = true;
-    motion = Expansion(start_.y, start_.z, start_.depth, loads_, size_);
-    extend();
+    if (start_.released) motion.y[2] = 0.0;
+    if (touching_ || !parameters_.compliant() || direction(motion.depth) <= 0.0) return motion;
   }
-  if (start_.released) motion.y[2] = 0.0;
-  return motion;
 }
 
 Flight::Pace Flight::pace(const Expansion& motion) const {

@@ -27,9 +27,9 @@ void HeldContact::begin(const TipMessage& seen, bool initial, double y, const To
   now_.first = silent ? now_.given : seen;
   now_.tip = now_.first.displacement;
   now_.depth = y - now_.tip;
-  now_.said_next = free_of_first();
+  now_.said_next = now_.tip + size_ * now_.first.velocity;
   now_.force = 0.0;  // where the search starts: the force follows what is seen, not what was seen before it
-  send(silent ? 0.0 : solve(now_.depth, free_of_first(), top), free_of_first());
+  send(silent ? 0.0 : solve(now_.depth, now_.said_next, top), now_.said_next);
 }
 
 void HeldContact::advance(const TipMessage& seen, double y, const Top& top) {

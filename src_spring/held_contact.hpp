@@ -45,7 +45,6 @@ class HeldContact {
   double elastic(double y) const { return law_.elastic(y - now_.tip); }  ///< Φ' [N]
   double energy(double y) const { return law_.energy(y - now_.tip); }    ///< Φ [J]
   double dissipated() const { return now_.dissipated; }                  ///< by the contact since the start [J]
-  double tip() const { return now_.tip; }                                ///< u_tip now [m], as foreseen
   double size() const { return size_; }                                  ///< H [s]
   bool started() const { return now_.steps > 0.0; }                      ///< a step was made
 
@@ -83,7 +82,6 @@ class HeldContact {
   void compare(const TipMessage& seen);
   double solve(double start, double free, const Top& top) const;
   void send(double force, double free);  ///< the force over the next step; where the tip goes without it
-  double free_of_first() const { return now_.tip + size_ * now_.first.velocity; }
 
   Compliance law_;
   double yielding_, size_;

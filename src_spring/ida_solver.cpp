@@ -109,11 +109,12 @@ int IdaSolver::advance() {
   for (int i = 0; i < distances; ++i) rates[i] = distance(i).rate;
   while (s_ < 1.0) {
     if (steps() >= most_steps_) throw IdaError("it spans too much of the motion");
+    const double start = s_;
     const int code = IDASolve(ida_.get(), 1.0, &s_, Y_.get(), Yp_.get(), IDA_ONE_STEP);
     if (code == IDA_REP_RES_ERR || code == IDA_FIRST_RES_FAIL)
       fail("values leave the range of floating-point numbers", code);
     check(code, "IDASolve");
-    const double end = s_, start = last_step_start();
+    const double end = s_;
     double first = end;
     int fallen = -1;
     for (int i = 0; i < distances; ++i) {
@@ -132,13 +133,6 @@ int IdaSolver::advance() {
     if (fallen >= 0) return fallen;
   }
   return -1;
-}
-
-double IdaSolver::last_step_start() const {
-  double end = 0.0, size = 0.0;
-  check(IDAGetCurrentTime(ida_.get(), &end), "IDAGetCurrentTime");
-  check(IDAGetLastStep(ida_.get(), &size), "IDAGetLastStep");
-  return end - size;
 }
 
 void IdaSolver::interpolate(double s) {

@@ -68,7 +68,6 @@ class IdaSolver {
 
   Vector new_vector() const;
   Distance distance(int which) const { return system_->distance(which, s_, value()); }
-  double last_step_start() const;
   void interpolate(double s);
 
   int n_;

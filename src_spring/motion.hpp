@@ -43,9 +43,8 @@ class Motion {
   /// ÿ under F and the contact force C of the law inside. [m/s²]
   double acceleration(double y, double z, double force, double contact) const;
   double acceleration_by_displacement(double y, double contact_slope) const;  ///< ∂ÿ/∂y
-  double acceleration_by_velocity(double contact_slope) const {
-    return -(damping_ + contact_slope) / mass_;
-  }  ///< ∂ÿ/∂ẏ
+  /// ∂ÿ/∂ẏ
+  double acceleration_by_velocity(double contact_slope) const { return -(damping_ + contact_slope) / mass_; }
 
   /// Adds one coefficient to the motion; loads and size are those that it began with.
   void extend(Expansion& motion, bool touching, const Loads& loads, double size) const;

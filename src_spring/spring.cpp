@@ -36,13 +36,17 @@ class Spring::Step {
   Reached run(bool to_event) {
     state_.integral = state_.integral_2 = state_.stop_force = state_.stop_impulse = 0.0;
     state_.meeting = 0.0;
-    while (remaining() > 0.0 && !(to_event && ends())) {
-      arrive();
-      happened_ = false;
-      if (state_.seated != 0.0)
-        stay();
-      else
-        fly();
+    try {
+      while (remaining() > 0.0 && !(to_event && ends())) {
+        arrive();
+        happened_ = false;
+        if (state_.seated != 0.0)
+          stay();
+        else
+          fly();
+      }
+    } catch (const IdaError& error) {
+      fail(error.what(), spring_.flight_.displacement(), t_ + spring_.flight_.elapsed());
     }
     const Reached reached{remaining() > 0.0 ? t_ : size_, to_event && ends()};
     state_.stop_force = held_ / reached.size;
@@ -119,8 +123,10 @@ class Spring::Step {
   void fly() {
     const double gap = parameters_.stop_enabled ? state_.y - parameters_.stop_position : 1.0;
     Flight& flight = spring_.flight_;
-    const auto [event, y, z, integral, integral_2, dissipated] =
-        attempt({state_.y, state_.z, now_, remaining(), gap, depth_, released_, most_work - work_});
+    const Start start{state_.y, state_.z, now_, remaining(), gap, depth_, released_, most_work - work_};
+    const auto [event, y, z, integral, integral_2, dissipated] = flight.run(start);
+    state_.steps += static_cast<double>(flight.steps());
+    work_ += flight.steps() + work_of_start;
     state_.integral_2 += state_.integral * flight.elapsed() + integral_2;
     state_.integral += integral;
     state_.dissipated += dissipated;
@@ -134,18 +140,6 @@ class Spring::Step {
     released_ = false;
     meeting_ = event == Flight::Event::contact;
     happened_ = event != Flight::Event::none;
-  }
-
-  Flight::Reached attempt(const Start& start) {
-    Flight& flight = spring_.flight_;
-    try {
-      const auto reached = flight.run(start);
-      state_.steps += static_cast<double>(flight.steps());
-      work_ += flight.steps() + work_of_start;
-      return reached;
-    } catch (const IdaError& error) {
-      fail(error.what(), flight.displacement(), t_ + flight.elapsed());
-    }
   }
 
   /// Past the hilltop, a motion that nothing brings back reaches infinity in finite time, where the solver fails.

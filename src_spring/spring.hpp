@@ -7,7 +7,6 @@
 //     0 ≤ N ⊥ y − φ ≥ 0,   z⁺ = −e z⁻ at an impact. Impacts that die out end seated, y = φ, until N would be < 0.
 #pragma once
 
-#include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -60,15 +59,13 @@ class Spring {
   double velocity() const { return state_.z; }                          ///< z [m/s]
   double displacement_integral() const { return state_.integral; }      ///< ∫ y dτ over the last step [m·s]
   double displacement_integral_2() const { return state_.integral_2; }  ///< ∫∫ y dτ dτ over the last step [m·s²]
-  double stop_force() const { return state_.stop_force; }         ///< mean of N over the last step, law inside [N]
-  double stop_impulse() const { return state_.stop_impulse; }     ///< sum of stop impulses over the last step [N·s]
-  double dissipated_energy() const { return state_.dissipated; }  ///< by α_s and χ since the start [J]
-  double load_work() const { return state_.load_work; }           ///< of f_s and −m a since the start [J]
-  double impact_loss() const { return state_.impact_loss; }       ///< in stop impacts since the start [J]
-  bool seated() const { return state_.seated != 0.0; }            ///< held on the foundation by the law inside
-  std::int64_t ida_steps() const {
-    return static_cast<std::int64_t>(state_.steps);
-  }  ///< internal IDA steps since the start
+  double stop_force() const { return state_.stop_force; }           ///< mean of N over the last step, law inside [N]
+  double stop_impulse() const { return state_.stop_impulse; }       ///< sum of stop impulses over the last step [N·s]
+  double dissipated_energy() const { return state_.dissipated; }    ///< by α_s and χ since the start [J]
+  double load_work() const { return state_.load_work; }             ///< of f_s and −m a since the start [J]
+  double impact_loss() const { return state_.impact_loss; }         ///< in stop impacts since the start [J]
+  bool seated() const { return state_.seated != 0.0; }              ///< held on the foundation by the law inside
+  double ida_steps() const { return state_.steps; }                 ///< internal IDA steps since the start
   int impacts() const { return static_cast<int>(state_.impacts); }  ///< on the foundation inside, since the start
   double last_impact() const { return state_.last_impact; }         ///< when [s]; −1: there was none
   double kinetic_energy() const;                                    ///< ½ m z² [J]

@@ -36,22 +36,17 @@ fmi3Instance instantiate(const char* function, bool co_simulation, fmi3String na
   return nullptr;
 }
 
-/// How many values a variable has.
+/// How many values a variable has; none that is an element of an array.
 std::size_t size_of(unsigned reference) {
   const auto& variables = table().variables;
   return reference < variables.size() ? variables[reference].elements : 1;
 }
 
-/// @throws std::invalid_argument unless there are `n_values` values in all, or if an element stands for an array
+/// @throws std::invalid_argument unless there are `n_values` values in all
 void require_sizes(const fmi3ValueReference vr[], size_t n, const void* values, size_t n_values) {
   require_arrays(n, {{vr, "the array of value references"}, {values, "the array of values"}});
   std::size_t sum = 0;
-  for (size_t i = 0; i < n; ++i) {
-    if (size_of(vr[i]) == 0)
-      throw std::invalid_argument("value reference " + std::to_string(vr[i]) +
-                                  " does not exist: it is within an array");
-    sum += size_of(vr[i]);
-  }
+  for (size_t i = 0; i < n; ++i) sum += size_of(vr[i]);
   if (sum != n_values)
     throw std::invalid_argument("nValues = " + std::to_string(n_values) + ", but the variables have " +
                                 std::to_string(sum));

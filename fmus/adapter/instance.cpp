@@ -175,26 +175,24 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
 double Instance::difference(const Variable& of, unsigned known) {
   const Variable& by = table_.variables[known];
   const std::size_t place = place_[known];
-  const double x = values_[place][0];
-  const double change = 1e-6 * (x != 0.0 ? std::abs(x) : by.nominal);
+  const double x = values_[place][0], change = 1e-6 * (x != 0.0 ? std::abs(x) : by.nominal);
+  const std::pair here{x, of.get(*model_)};
   const auto put = [&](double value) {
     values_[place][0] = value;
     changed(place);
     ensure_built();
   };
-  // One side may be out of bounds, its own or those that other parameters set.
-  const auto beside = [&](double to, double& result) {
+  const auto beside = [&](double value) {
     try {
-      require_allowed(by, to);
-      put(to);
-      result = of.get(*model_);
-      return to;
+      require_allowed(by, value);
+      put(value);
+      return std::pair{value, of.get(*model_)};
     } catch (const std::invalid_argument&) {
-      return x;
+      return here;  // that side is out of bounds, its own or those that other parameters set
     }
   };
-  double above = of.get(*model_), below = above;
-  const double high = beside(x + change, above), low = beside(x - change, below);
+  const auto [high, above] = beside(x + change);
+  const auto [low, below] = beside(x - change);
   put(x);
   return finite(of, (above - below) / (high - low), too_large);
 }

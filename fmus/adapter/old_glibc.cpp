@@ -17,21 +17,17 @@
 // Hidden by -fvisibility and by the version script.
 #define HIDDEN extern "C"
 
+// `now` calls what `name` has been since 2.2.5.
+#define OLD(type, now, name, parameters, ...)             \
+  extern "C" type old_##name parameters;                  \
+  __asm__(".symver old_" #name "," #name "@GLIBC_2.2.5"); \
+  HIDDEN type now parameters { return old_##name(__VA_ARGS__); }
+
 // The versions before 2.29 differ in how they set errno only.
-extern "C" {
-double old_exp(double);
-double old_log(double);
-double old_log2(double);
-double old_pow(double, double);
-}
-__asm__(".symver old_exp,exp@GLIBC_2.2.5");
-__asm__(".symver old_log,log@GLIBC_2.2.5");
-__asm__(".symver old_log2,log2@GLIBC_2.2.5");
-__asm__(".symver old_pow,pow@GLIBC_2.2.5");
-HIDDEN double exp(double x) noexcept { return old_exp(x); }
-HIDDEN double log(double x) noexcept { return old_log(x); }
-HIDDEN double log2(double x) noexcept { return old_log2(x); }
-HIDDEN double pow(double x, double y) noexcept { return old_pow(x, y); }
+OLD(double, exp, exp, (double x) noexcept, x)
+OLD(double, log, log, (double x) noexcept, x)
+OLD(double, log2, log2, (double x) noexcept, x)
+OLD(double, pow, pow, (double x, double y) noexcept, x, y)
 
 #if __GLIBC_PREREQ(2, 32)
 // "There may be threads": reference counts stay atomic.
@@ -79,14 +75,10 @@ HIDDEN char* secure_getenv(const char*) noexcept { return nullptr; }
 
 #if __GLIBC_PREREQ(2, 38)
 // C23 reads "0b…" numbers; nothing here does.
-#define OLD_STRTO(type, name)                             \
-  extern "C" type old_##name(const char*, char**, int);   \
-  __asm__(".symver old_" #name "," #name "@GLIBC_2.2.5"); \
-  HIDDEN type __isoc23_##name(const char* s, char** e, int base) { return old_##name(s, e, base); }
-OLD_STRTO(long, strtol)
-OLD_STRTO(unsigned long, strtoul)
-OLD_STRTO(long long, strtoll)
-OLD_STRTO(unsigned long long, strtoull)
+OLD(long, __isoc23_strtol, strtol, (const char* s, char** e, int base), s, e, base)
+OLD(unsigned long, __isoc23_strtoul, strtoul, (const char* s, char** e, int base), s, e, base)
+OLD(long long, __isoc23_strtoll, strtoll, (const char* s, char** e, int base), s, e, base)
+OLD(unsigned long long, __isoc23_strtoull, strtoull, (const char* s, char** e, int base), s, e, base)
 #endif
 
 #endif

@@ -43,12 +43,12 @@ Snapshot deserialized(std::string_view bytes, std::size_t n_values) {
   std::vector<double> numbers(doubles.size() / sizeof(double));
   if (numbers.size() < progress_count + 3 * n_values) refuse("some are missing");
   std::memcpy(numbers.data(), doubles.data(), numbers.size() * sizeof(double));
-  const double *const progress = numbers.data(), *const values = progress + progress_count,
-                      *const numerics = values + 3 * n_values;
+  auto p = numbers.cbegin();
   Snapshot s;
-  s.progress = {static_cast<Phase>(static_cast<unsigned>(progress[0])), progress[1], progress[2], progress[3]};
-  for (const double* p = values; p != numerics; p += 3) s.values.push_back({p[0], p[1], p[2]});
-  s.numerics.assign(numerics, progress + numbers.size());
+  s.progress = {static_cast<Phase>(static_cast<unsigned>(p[0])), p[1], p[2], p[3]};
+  p += progress_count;
+  for (std::size_t i = 0; i < n_values; ++i, p += 3) s.values.push_back({p[0], p[1], p[2]});
+  s.numerics.assign(p, numbers.cend());
   return s;
 }
 

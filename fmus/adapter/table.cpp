@@ -59,11 +59,10 @@ std::string choice(const Choice& c) {
   return object({{"name", quoted(c.name)}, {"description", quoted(c.description)}, {"items", names(c.items)}});
 }
 
-std::string category(const LogCategory& c) {
-  return object({{"name", quoted(c.name)}, {"description", quoted(c.description)}});
-}
-
 std::string printed(const Table& t, const std::string& guid) {
+  const auto category = [](const LogCategory& c) {
+    return object({{"name", quoted(c.name)}, {"description", quoted(c.description)}});
+  };
   return object({{"identifier", quoted(t.identifier)},
                  {"title", quoted(t.title)},
                  {"description", quoted(t.description)},

@@ -152,19 +152,16 @@ class TableBuilder {
     return v;
   }
 
-  /// A result at the communication points, with its time derivative under the inputs that are set.
-  template <class Get, class Derivative>
-  Variable& output(const std::string& name, const std::string& unit, const std::string& description, Get get,
-                   Derivative derivative) {
+  /// A result at the communication points, with its time derivative under the inputs that are set: none if it changes
+  /// with the steps only.
+  template <class Get, class Derivative = double (*)(const M&)>
+  Variable& output(
+      const std::string& name, const std::string& unit, const std::string& description, Get get,
+      Derivative derivative = [](const M&) { return 0.0; }) {
     Variable& v = local(name, unit, description, get);
     v.causality = Causality::output;
     v.derivative = [derivative](const Model& m) { return static_cast<double>(derivative(static_cast<const M&>(m))); };
     return v;
-  }
-  /// One that changes with the steps only.
-  template <class Get>
-  Variable& output(const std::string& name, const std::string& unit, const std::string& description, Get get) {
-    return output(name, unit, description, get, [](const M&) { return 0.0; });
   }
 
   /// What can be read as an output, but is none: tools record and plot every output.

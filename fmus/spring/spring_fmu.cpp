@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -42,18 +41,14 @@ struct SpringModel final : fmi::Model {
   std::optional<HeldContact> held;
 
   void build(double tolerance) override {
-    Parameters p = parameters;
+    FmuParameters p = parameters;
     if (tolerance > 0.0) p.relative_tolerance = std::min(p.relative_tolerance, tolerance);
     held.reset();
-    if (p.compliant() && parameters.communication_step > 0.0) {
-      p.contact_law = spring::ContactLaw::external;
-      spring.emplace(p);  // checks the parameters
-      held.emplace(spring::Compliance(p.compliance_stiffness, p.compliance_exponent, p.compliance_damping), p.mass,
-                   parameters.communication_step,
-                   std::array<double, 2>{parameters.tip_response, parameters.tip_response_2});
-    } else {
-      spring.emplace(p);
-    }
+    const bool holds = p.compliant() && p.communication_step > 0.0;
+    if (holds) p.contact_law = spring::ContactLaw::external;
+    spring.emplace(p);  // checks the parameters
+    const spring::Compliance law(p.compliance_stiffness, p.compliance_exponent, p.compliance_damping);
+    if (holds) held.emplace(law, p.mass, p.communication_step, std::array{p.tip_response, p.tip_response_2});
   }
 
   void observe(bool initial) override {
@@ -113,15 +108,9 @@ struct SpringModel final : fmi::Model {
     return parameters.damping * spring->velocity() * spring->velocity() + by_contact;
   }
   double kinetic_power() const { return parameters.mass * spring->velocity() * spring->acceleration(); }
-  /// The loads [N], or with 1 their rate.
-  double load(std::size_t order = 0) const {
-    const spring::Inputs present = acting();
-    return present.external_force[order] - parameters.mass * present.base_acceleration[order];
-  }
+  double load_power() const { return spring::load_of(parameters, acting())[0] * spring->velocity(); }
   double jerk() const {
-    const spring::Inputs present = acting();
-    const double N = parameters.stop_enabled ? 0.0 : present.foundation_force[1];
-    return spring->jerk(load(1) + N - present.contact_force[1], held ? 0.0 : reaction_rate());
+    return spring->jerk(spring::Loads::from(parameters, acting()).force[1], held ? 0.0 : reaction_rate());
   }
   /// Per newton of an upward force that does not change C.
   double mobility() const { return spring->seated() ? 0.0 : 1.0 / parameters.mass; }
@@ -136,8 +125,7 @@ struct SpringModel final : fmi::Model {
     return held ? held_force_by_input() : -spring->reaction_slopes().force_by_depth;
   }
   double reaction_by_tip_velocity() const {
-    const bool read = spring->extrapolated() || !is_set(tip_displacement[1]);
-    return read ? -spring->reaction_slopes().force_by_rate : 0.0;
+    return is_set(tip_displacement[1]) ? 0.0 : -spring->reaction_slopes().force_by_rate;
   }
   double reaction_by_tip_rate() const {
     return is_set(tip_displacement[1]) ? -spring->reaction_slopes().force_by_rate : 0.0;
@@ -169,8 +157,8 @@ struct SpringModel final : fmi::Model {
   }
 
  private:
-  static constexpr std::int64_t most_trial_work = 250'000;  ///< of IDA's steps for one force, as for one step
-  static constexpr double rounding = 1e-6;                  ///< of communication_step
+  static constexpr double most_trial_work = 250'000.0;  ///< of IDA's steps for one force, as for one step
+  static constexpr double rounding = 1e-6;              ///< of communication_step
   /// A pair that is wired wrongly gains or loses energy, or has no contact, without a sign. After `most` steps in which
   /// that shows it is sure: a sudden load makes the tip miss in 2, a harmonic one from rest in up to 8.
   struct Fault {
@@ -259,11 +247,11 @@ struct SpringModel final : fmi::Model {
     for (auto* input : {&next.foundation_force, &next.external_force, &next.base_acceleration})
       (*input)[1] = (*input)[2] = 0.0;
     trial_failure_.clear();
-    return [this, start, next, work = std::int64_t{0}](double force) mutable {
+    return [this, start, next, work = 0.0](double force) mutable {
       constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
       if (work > most_trial_work) return unknown;
       next.contact_force = {force, 0.0, 0.0};
-      const std::int64_t before = spring->ida_steps();
+      const double before = spring->ida_steps();
       double reached = unknown;
       try {
         spring->step(held->size(), next);
@@ -450,7 +438,7 @@ fmi::Table fmi::make_table() {
   add.output("load_work", "J",
              "work of external_force and base_acceleration since the start, where it is 0, impacts and rest on the "
              "foundation inside included",
-             of(&Spring::load_work), [](M m) { return m.load() * m.spring->velocity(); });
+             of(&Spring::load_work), [](M m) { return m.load_power(); });
   add.local("impact_loss", "J", "energy lost in impacts on the foundation inside since the start",
             of(&Spring::impact_loss));
   add.output(
@@ -459,8 +447,7 @@ fmi::Table fmi::make_table() {
          "tools hide the messages that say what; restored states do not take it back",
          [](M m) { return m.warnings(); })
       .whole();
-  add.local("internal_steps", "", "steps that IDA took since the start",
-            [](const SpringModel& m) { return static_cast<double>(m.spring->ida_steps()); });
+  add.local("internal_steps", "", "steps that IDA took since the start", of(&Spring::ida_steps));
   return t;
 }
 

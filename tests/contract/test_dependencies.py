@@ -2,6 +2,8 @@
 
 import ctypes as ct
 
+import pytest
+
 AHEAD = {"contact_law": 2, "communication_step": 1e-3}
 # Base points: between them every declared dependency shows.
 BASES = {
@@ -30,6 +32,8 @@ BASES = {
         {**AHEAD, "displacement": 0.0},
     ],
 }
+#: At rest on the foundation, where no displacement below it can be tried.
+SEATED = {"beam": [], "spring": [{"stop_position": 0.3, "velocity": 0.0}]}
 COMMON = {
     "beam": {
         "young_modulus": 100.0,
@@ -168,7 +172,7 @@ def test_directional_derivatives_are_those_of_the_outputs(case):
     """Derivatives of every output by every continuous input, against differences: before the first step and after."""
     found = []
     change = {"beam": 1e-3, "spring": 1e-6}[case.name]
-    for base in BASES[case.name]:
+    for base in BASES[case.name] + SEATED[case.name]:
         k = case.running(**{**COMMON[case.name], **base})
         for step in (False, True):
             if step:
@@ -176,6 +180,29 @@ def test_directional_derivatives_are_those_of_the_outputs(case):
             found.append(sum(compare(k, case.outputs, name, change) for name in inputs(case)))
         k.free()
     assert sum(found) >= {"beam": 16, "spring": 12}[case.name]
+
+
+def test_a_direction_is_the_sum_of_its_inputs(case):
+    k, names = case.running(**COMMON[case.name]), {"beam": ("tip_force", "tip_load"), "spring": FORCES}[case.name]
+    output = {"beam": "tip_acceleration", "spring": "acceleration"}[case.name]
+    one, two, seed, found = ct.c_size_t(1), ct.c_size_t(2), (ct.c_double * 2)(2.0, -3.0), (ct.c_double * 1)()
+    arguments = (case.references(output), one, case.references(*names), two, seed, *k.counted(2), found, *k.counted(1))
+    assert k.call("GetDirectionalDerivative", *arguments) == 0
+    a, b = (k.partials([output], name)[1][0] for name in names)
+    assert found[0] == 2.0 * a - 3.0 * b != 0.0
+
+
+FORCES = ("contact_force", "external_force")
+
+
+@pytest.mark.parametrize("version", ["3.0"])
+def test_the_law_inside_follows_the_rate_of_the_tip(spring):
+    """C = k δ (1 + χ δ̇): ∂C/∂u̇ = −k δ χ."""
+    law = {"contact_law": 2, "compliance_stiffness": 100.0, "compliance_exponent": 1.0, "compliance_damping": 0.5}
+    k = spring.running(**law, displacement=0.1, tip_displacement=0.05)
+    assert k.derive("tip_displacement", 1, 0.2) == 0
+    assert k.partials(["reaction"], "der(tip_displacement)") == (0, [pytest.approx(-100.0 * 0.05 * 0.5)])
+    assert k.partials(["reaction"], "tip_velocity") == (0, [0.0])
 
 
 def test_directional_derivatives_at_the_start_are_those_of_the_outputs(case):

@@ -72,6 +72,16 @@ def test_without_event_mode_the_impulse_is_applied_where_the_step_ends(spring):
     assert k.outputs() == twin.outputs()
 
 
+def test_event_mode_keeps_the_derivatives_of_inputs(spring):
+    k, twin = started(spring, **FALLING), started(spring, **FALLING)
+    for one in (k, twin):
+        assert one.derive("external_force", 1, 3.0) == OK
+    handle(k)
+    for one in (k, twin):
+        one.step(0.0, 0.05)
+    assert k.outputs() == twin.outputs()
+
+
 @pytest.mark.parametrize("events", [True, False])
 def test_where_early_return_is_forbidden_steps_are_those_of_fmi_2(spring, fmus, events):
     k, old = started(spring, events=events, early=False, **FALLING), fmus["2.0"]["spring"].running(**FALLING)

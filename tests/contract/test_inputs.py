@@ -1,5 +1,7 @@
 """Inputs over a step: derivatives hold for one step, impulses act once; output derivatives."""
 
+import ctypes as ct
+
 import pytest
 
 OK, ERROR = 0, 3
@@ -27,6 +29,33 @@ def test_derivatives_hold_for_one_step_the_value_stays(case):
     for k in (once, told):
         k.step(0.05, 0.05)
     assert once.outputs() == told.outputs()
+
+
+def test_derivatives_that_are_set_in_one_call(case):
+    """Those of both orders together are as one by one; the second alone is gone after the step, too."""
+    together, apart = case.moving(), case.moving()
+    values = (ct.c_double * 2)(5.0, -7.0)
+    if case.version == "2.0":
+        force = case.references(case.force, case.force)
+        assert together.call("SetRealInputDerivatives", force, ct.c_size_t(2), (ct.c_int * 2)(1, 2), values) == OK
+    else:
+        names = case.references(f"der({case.force})", f"der({case.force},2)")
+        found = (ct.c_double * 2)()
+        assert together.access("SetFloat64", names, 2, values) == OK
+        assert together.access("GetFloat64", names, 2, found) == OK
+        assert list(found) == list(values)
+    assert apart.derive(case.force, 1, 5.0) == apart.derive(case.force, 2, -7.0) == OK
+    for k in (together, apart):
+        k.step(0.0, 0.05)
+    assert together.outputs() == apart.outputs()
+    assert apart.derive(case.force, 2, -7.0) == OK
+    assert together.derive(case.force, 2, -7.0) == OK
+    for k in (together, apart):
+        k.step(0.05, 0.05)
+    assert apart.derive(case.force, 2, 0.0) == OK  # it is 0 already
+    for k in (together, apart):
+        k.step(0.1, 0.05)
+    assert together.outputs() == apart.outputs()
 
 
 def test_an_impulse_acts_once_at_the_start_of_the_next_step(case):
@@ -91,6 +120,14 @@ def test_every_output_has_its_rate(case, variant):
         moving += rate != 0.0
     assert moving >= 6
     assert all(k.derivative(n)[0] == OK for n in case.outputs)
+
+
+def test_the_rate_of_the_acceleration_counts_all_rates_of_forces(spring):
+    k = spring.running(mass=2.0, linear_stiffness=0.0)
+    rates = {"external_force": 3.0, "foundation_force": 5.0, "contact_force": 11.0, "base_acceleration": 7.0}
+    for name, rate in rates.items():
+        assert k.derive(name, 1, rate) == OK
+    assert k.derivative("acceleration") == (OK, pytest.approx((3.0 + 5.0 - 11.0) / 2.0 - 7.0))
 
 
 @pytest.mark.parametrize("load", LOADS)

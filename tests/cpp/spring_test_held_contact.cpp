@@ -87,7 +87,7 @@ TEST_P(HeldContactRebound, IsElasticAtAnyStep) {
     ASSERT_LT(steps, 1000);
     touching += c.contact.force() > 0.0;
     c.step();
-    EXPECT_NEAR(c.contact.tip(), c.tip.x, 1e-14 * (1 + std::abs(c.tip.x)));
+    EXPECT_NEAR(c.contact.state().tip, c.tip.x, 1e-14 * (1 + std::abs(c.tip.x)));
     EXPECT_NEAR(c.energy(), before, 1e-11 * before) << steps;
   }
   EXPECT_GT(touching, 0);
@@ -152,7 +152,7 @@ TEST(HeldContact, ZerosBeforeTheFirstStepAreNoMessage) {
   EXPECT_EQ(untold.contact.force(), 0.0);
   untold.step();
   EXPECT_EQ(untold.top.v, 0.0);
-  EXPECT_NEAR(untold.contact.tip(), H * v, 1e-18);
+  EXPECT_NEAR(untold.contact.state().tip, H * v, 1e-18);
   // From then on energy is conserved: what came in is the work that the force of the first step did not do.
   const double after = untold.energy();
   EXPECT_NEAR(after, 0.5 * m_tip * v * v + Compliance(1e6, 1.5).energy(-H * v), 1e-14);

@@ -109,6 +109,18 @@ TEST(IdaSolver, DistanceThatDipsWithinOneInternalStep) {
   EXPECT_LT(solver.s(), 3.14159265358979323846 / 6.0);
 }
 
+// Rising at the start: the same dip of sin ωs, where the rate of the last step's start counts, not that at s = 0.
+TEST(IdaSolver, DistanceThatRisesFirstAndDipsLater) {
+  const Cosine system(6.0, -1.0 + 1e-8);
+  IdaSolver solver(2);
+  start_cosine(solver, system, 6.0);
+  solver.initial_value()[0] = solver.initial_derivative()[1] = 0.0;
+  solver.initial_value()[1] = solver.initial_derivative()[0] = 6.0;
+  solver.start(system, 1e-13, 1e-7, 100000);
+  ASSERT_EQ(solver.advance(), 0);
+  EXPECT_NEAR(solver.s(), (1.5 * 3.14159265358979323846 - std::sqrt(2e-8)) / 6.0, 2e-7);
+}
+
 // Above the level at its lowest: no fall, on to the end.
 TEST(IdaSolver, MinimumAboveTheLevelIsNoFall) {
   const Cosine system(6.0, -1.0 - 1e-9);

@@ -327,6 +327,20 @@ TEST(SpringStep, WorkIsBounded) {
   expect(failure(b, 1.0, pressed), {"1 s fails", "spans too much", "smaller step size"});
 }
 
+// y = z₀(1 − e^{−γτ})/γ over 50/γ, which no Taylor polynomial of the start resolves: y and its integrals.
+TEST(SpringStep, IntegralsOfAMotionThatDampingRules) {
+  const double rate = 50.0, z = 2.0, decayed = -std::expm1(-rate);
+  Parameters p;
+  p.linear_stiffness = 0.0;
+  p.damping = rate;
+  p.velocity = z;
+  Spring s(p);
+  s.step(1.0, {});
+  EXPECT_NEAR(s.displacement(), z / rate * decayed, 1e-12);
+  EXPECT_NEAR(s.displacement_integral(), z / rate * (1.0 - decayed / rate), 1e-12);
+  EXPECT_NEAR(s.displacement_integral_2(), z / rate * (0.5 - 1.0 / rate + decayed / rate / rate), 1e-12);
+}
+
 TEST(SpringStep, TooSmallAStepSaysSo) {
   Spring s(softening());
   s.step(1e-99, {});

@@ -174,6 +174,29 @@ TEST(SpringStop, AGrazingImpactWithinOneStepCounts) {
   }
 }
 
+// From rest, under −a + b τ: within the first internal step, of 1/8, the top is δ below the stop about τ = 2a/b = 1/12.
+TEST(SpringStop, AGrazingImpactAfterAStartAtRestCounts) {
+  const double a = 6.0, b = 24.0 * a, dip = 1e-9;
+  Spring s(ball(2.0 / 3.0 * a * a * a / (b * b) - dip, 0.0, 1.0));
+  Inputs inputs = weight(a);
+  inputs.external_force[1] = b;
+  s.step(1.0, inputs);
+  EXPECT_NEAR(s.stop_impulse(), 2.0 * std::sqrt(2 * a * dip), 1e-3 * std::sqrt(a * dip));
+}
+
+// A top that falls at 1 m/s leaves the tip 0.1 mm above the stop, which it then strikes within the same internal step.
+TEST(SpringStop, TheEarlierOfTwoEventsInOneInternalStepCounts) {
+  Parameters p = ball(0.1, -1.0, 1.0);
+  p.contact_law = ContactLaw::normal_compliance;
+  p.compliance_stiffness = 1e-9;
+  p.compliance_exponent = 1.0;
+  Spring s(p);
+  Inputs inputs;
+  inputs.tip_displacement[0] = 1e-4;
+  EXPECT_NEAR(s.step_to_event(1.0, inputs, 0.0, true).size, 0.0999, 1e-9);
+  EXPECT_EQ(s.impacts(), 0);
+}
+
 // y = (τ − a)²(τ − b)² − δ comes down on the stop twice, near a and b: in one step the first is seen, too. From there
 // it rises above the second.
 TEST(SpringStop, TheFirstOfTwoGrazingImpactsCounts) {
