@@ -73,9 +73,8 @@ class Fmu:
     def __init__(self, name: str | None, path: Path, parameters: Mapping[str, Value], start_time: float) -> None:
         self.path, self._own = path, name is not None
         self._name = path.stem if name is None else name
-        self._messages: list[str] = []
-        self._worst = 0  #: status of the calls that have failed for good
-        self._refused = False  #: whether a step was not made
+        self._message = ""  #: the last that the FMU has logged
+        self._worst = 0  #: status of the calls that have failed
         #: Whether anything happened since the state was marked.
         self.moved = False
         #: doStep calls, and how often the state was set back.
@@ -157,7 +156,7 @@ class Fmu:
     @property
     def faultless(self) -> bool:
         """Whether every call so far did what it was asked for."""
-        return not self._closed and self._worst <= WARNING and not self._refused
+        return not self._closed and self._worst <= WARNING
 
     def bound(self, name: str, *arguments: Any) -> Call:
         """Return a function with its arguments, as FMPy's FMU does. Raises FmuError if the library lacks it."""
@@ -212,7 +211,7 @@ class Fmu:
             self._slave.setFMUState(self._start)
         self.moved, self.steps, self.rewinds = False, 0, 0
         self.clock, self.do_step = self._at_start
-        self._messages.clear()
+        self._message = ""
 
     def stepping(self, clock: Any) -> None:
         """Let `do_step` make steps as the first two numbers of ``clock`` say."""
@@ -225,7 +224,7 @@ class Fmu:
         time = self.clock[0]
         if status not in (DISCARD, ERROR):
             raise self.failed(status, f"cannot step at t = {time:.9g} s")
-        self._refused = True
+        self._worst = max(self._worst, status)
         cause = self._cause(f"{self._slave.PREFIX}DoStep returned {_STATUS[status]}")
         if status == DISCARD:
             try:
@@ -275,8 +274,8 @@ class Fmu:
 
     def _log(self, status: int, text: bytes | None) -> None:
         if status > 0:
-            self._messages = [*self._messages[-3:], (text or b"").decode("utf-8", "replace")]
+            self._message = (text or b"").decode("utf-8", "replace")
 
     def _cause(self, otherwise: Exception | str) -> str:
-        messages, self._messages = self._messages, []
-        return messages[-1] if messages else str(otherwise)
+        message, self._message = self._message, ""
+        return message or str(otherwise)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from ..scene.partners import ForeignFmu
 from . import force
@@ -20,6 +20,7 @@ from .abilities import Abilities
 from .end_loaded import EndLoaded
 from .fmu import Fmu
 from .fmu_bodies import FmuBody
+from .functions import OK
 from .protocol import NO_FORCE, ROUNDED_IMPULSE, BodyFailed, Energies, FmuError, Force, Motion
 
 #: Corrections of a holding force; the velocity that it may leave, and the displacement, over those without it.
@@ -95,7 +96,12 @@ class ForeignBody(FmuBody, EndLoaded):
         self._upward = 1.0 if upper else -1.0
         self.state = ForeignState(Motion(0.0, 0.0, 0.0, 0.0), time=start_time)
         self._size = 0.0  #: of the step that is being made [s]
+        if not self.abilities.state:
+            fmu.get_state, fmu.set_state = lambda: OK, self._refuse_to_repeat
         super().__init__(fmu)
+
+    def _refuse_to_repeat(self) -> NoReturn:
+        raise BodyFailed(f"{self.fmu.path}: a step had to be repeated, and its state cannot be restored")
 
     def _prepare(self, fmu: Fmu) -> None:
         spec = self._spec
@@ -123,19 +129,6 @@ class ForeignBody(FmuBody, EndLoaded):
 
     def _mass(self) -> float:
         return self._spec.mass or self._found.mass
-
-    def mark(self) -> None:
-        if self.abilities.state:
-            super().mark()
-        else:
-            self.fmu.moved = False
-            self._marked = self.state
-
-    def rewind(self) -> None:
-        if self.fmu.moved:
-            if not self.abilities.state:
-                raise BodyFailed(f"{self.fmu.path}: a step had to be repeated, and its state cannot be restored")
-            super().rewind()
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         up, sign, start = self._upward, self._spec.force_sign, self.state.motion
@@ -173,23 +166,20 @@ class ForeignBody(FmuBody, EndLoaded):
         self.state = self.state._replace(received=received)
 
     def _take(self, told: tuple[float, ...]) -> Motion:
-        motion = self._made_up(told)
-        self.state = self.state._replace(motion=motion, told=told, pending=0.0)
-        return motion
-
-    def _made_up(self, told: tuple[float, ...]) -> Motion:
-        """Return the motion with what the FMU does not tell of it."""
-        size = self._size
-        by_name = dict[str | None, float](zip(self._MOTION, told, strict=False))
+        """See `FmuBody._take`; what the FMU does not tell of its motion is made up for."""
+        size, by_name = self._size, dict[str | None, float](zip(self._MOTION, told, strict=False))
         w, v, once, twice = (by_name.get(name) for name in self._spec.named(self._spec.MOTION))
         assert w is not None
-        if size == 0.0:
-            return Motion(w, self._found.velocity if v is None else v, once or 0.0, twice or 0.0)
         w0, v0 = self.state.motion[:2]
-        if v is None:
-            v0 = v = (w - w0) / size
-        first, second = moments(w0, v0, w, v, size)
-        return Motion(w, v, first if once is None else once, second if twice is None else twice)
+        if size == 0.0:
+            v, first, second = self._found.velocity if v is None else v, 0.0, 0.0
+        else:
+            if v is None:
+                v0 = v = (w - w0) / size
+            first, second = moments(w0, v0, w, v, size)
+        motion = Motion(w, v, first if once is None else once, second if twice is None else twice)
+        self.state = self.state._replace(motion=motion, told=told, pending=0.0)
+        return motion
 
     def energies(self) -> Energies:
         if not self.abilities.energies:

@@ -19,7 +19,7 @@ from fmpy.model_description import ModelDescription
 from typing_extensions import Self
 
 #: Values of fmi2Status and fmi3Status.
-WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
+OK, WARNING, DISCARD, ERROR, FATAL = 0, 1, 2, 3, 4
 #: A function with its arguments, which returns its status.
 Call = Callable[[], int]
 #: Takes the status and the text of a message of an FMU.

@@ -19,7 +19,6 @@ from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import Any, ClassVar
 
-from ..scene import Load
 from ..scene.partners import ForeignFmu
 from .end_loaded import EndLoaded
 from .foreign import Findings
@@ -115,6 +114,16 @@ def _forwarded(name: str, doing: str) -> Callable[..., Any]:
     return lambda body, *arguments: body._ask(doing, name, *arguments)
 
 
+def _later(name: str) -> Callable[..., None]:
+    """Return the method ``name`` of `EndLoaded`, which a body in another process does as well, before its next call."""
+
+    def method(body: IsolatedBody, *arguments: Any) -> None:
+        getattr(EndLoaded, name)(body, *arguments)
+        body._waiting.append((name, *arguments))
+
+    return method
+
+
 class IsolatedBody(EndLoaded):
     """A `springbeam.bodies.foreign.ForeignBody` in a process of its own; parameters as of that."""
 
@@ -140,6 +149,8 @@ class IsolatedBody(EndLoaded):
         self.state = tuple(state)
         return value
 
+    mark, rewind = _later("mark"), _later("rewind")
+    expect_loads, set_loads = _later("expect_loads"), _later("set_loads")
     apply_impulse = _forwarded("apply_impulse", "taking an impulse")
     holding_force = _forwarded("holding_force", "a trial step")
     save = _forwarded("save", "saving its state")
@@ -148,22 +159,6 @@ class IsolatedBody(EndLoaded):
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         self._ask(f"its step at t = {time:.9g} s", "advance", time, size, contact, foundation)
         return self.state[0]
-
-    def mark(self) -> None:
-        self._waiting.append(("mark",))
-        super().mark()
-
-    def rewind(self) -> None:
-        self._waiting.append(("rewind",))
-        super().rewind()
-
-    def expect_loads(self, loads: Sequence[Load]) -> None:
-        super().expect_loads(loads)
-        self._waiting.append(("expect_loads", loads))
-
-    def set_loads(self, forces: Sequence[Force]) -> None:
-        super().set_loads(forces)
-        self._waiting.append(("set_loads", forces))
 
     def join(self, velocity: float) -> None:
         if not self.abilities.velocity:

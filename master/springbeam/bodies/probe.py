@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from ..scene.partners import ForeignFmu
-from .abilities import Abilities
 from .foreign import Findings, moments
 from .isolated import IsolatedBody
 from .protocol import NO_FORCE, FmuError, Force, StepRefused
@@ -51,22 +50,14 @@ class Bench:
         #: What is upward for the force C.
         self.upward = 1.0 if upper else -1.0
         self._made = partial(_TriedBody, spec, upper, start_time)
-        self._body = self._made(None)
-        self.sizes = [H * share for share in _SIZES] if self.abilities.any_size else [H]
-
-    @property
-    def abilities(self) -> Abilities:
-        """What it can do, as far as is known."""
-        return self._body.abilities
+        #: The present instance; its ``abilities`` are those that are known.
+        self.body = self._made(None)
+        self.sizes = [H * share for share in _SIZES] if self.body.abilities.any_size else [H]
 
     def renew(self, **abilities: Any) -> None:
         """Take a new instance, which is taken to have other ``abilities``."""
-        self.close()
-        self._body = self._made(Findings(replace(self.abilities, **abilities)))
-
-    def close(self) -> None:
-        """Free the instance."""
-        self._body.close()
+        self.body.close()
+        self.body = self._made(Findings(replace(self.body.abilities, **abilities)))
 
     def run(self, size: float, forces: Sequence[Force], impulse: float = 0.0) -> np.ndarray:
         """Make a step of ``size`` [s] under each force C, after an ``impulse``.
@@ -74,9 +65,9 @@ class Bench:
         Return rows at the start and after each step, shape (n + 1, 6): the motion, the sum of the energies that are
         told, and the work done on the end.
         """
-        if self._body.steps > 0 and not self.abilities.state:
+        if self.body.steps > 0 and not self.body.abilities.state:
             self.renew()
-        body = self._body
+        body = self.body
         body.rewind()
         rows = [[*body.motion(), sum(body.energies()), body.received]]
         if impulse:
@@ -99,7 +90,7 @@ class Bench:
         """Return ``inertia`` of a step's size [s] as that goes to 0, from the shortest steps that tell it."""
         found = None
         for size in reversed(self.sizes):
-            told = [inertia(size * share) for share in ((1.0, 0.5, 0.25) if self.abilities.any_size else (1.0,))]
+            told = [inertia(size * share) for share in ((1.0, 0.5, 0.25) if self.body.abilities.any_size else (1.0,))]
             column = [value for value in told if value is not None]
             if len(column) < len(told):
                 continue
@@ -142,12 +133,12 @@ def _examined(_changed: int | None, spec: str, upper: bool, start_time: float, H
     try:
         return _examine(bench)
     finally:
-        bench.close()
+        bench.body.close()
 
 
 def _examine(bench: Bench) -> Findings:
     spec, H = bench.spec, bench.sizes[0]
-    promised = bench.abilities.slopes
+    promised = bench.body.abilities.slopes
     bench.renew(slopes=0)
     _check_state(bench)
     mass = _mass(bench)
@@ -157,14 +148,14 @@ def _examine(bench: Bench) -> Findings:
     bench.fault(*bench.wrong(partial(_wrong_outputs, bench, mass * length)))
     if promised:
         _try_slopes(bench, mass * length)
-    if bench.abilities.impulse and bench.abilities.velocity:
+    if bench.body.abilities.impulse and bench.body.abilities.velocity:
         mass = _check_impulse(bench, spec.mass or mass, length / H)
-    velocity = v if bench.abilities.velocity else _velocity(bench)
-    return Findings(bench.abilities, mass, velocity, H, tuple(bench.faults))
+    velocity = v if bench.body.abilities.velocity else _velocity(bench)
+    return Findings(bench.body.abilities, mass, velocity, H, tuple(bench.faults))
 
 
 def _check_state(bench: Bench) -> None:
-    if not bench.abilities.state:
+    if not bench.body.abilities.state:
         return
     H, push = bench.sizes[0], (1.0, 0.0, 0.0)
     first = bench.run(H, [push, push])
@@ -235,7 +226,7 @@ def _try_slopes(bench: Bench, impetus: float) -> None:
     due = (0.5, 1.0 / 3.0) if bench.spec.velocity else (1.0 / 3.0, 1.0 / 6.0)
 
     def unfollowed(size: float) -> dict[str, str]:
-        order, force = bench.abilities.slopes, impetus / size**2
+        order, force = bench.body.abilities.slopes, impetus / size**2
         held = bench.change(size, (force, 0.0, 0.0))
         grown = bench.change(size, (0.0, force / size, 0.0) if order == 1 else (0.0, 0.0, 2.0 * force / size**2))
         share = grown / held if held else 0.0
@@ -282,7 +273,7 @@ def _velocity(bench: Bench) -> float:
     """Return the velocity at the start [m/s] from displacements."""
     h = bench.sizes[min(2, len(bench.sizes) - 1)]
     x0, whole = bench.run(h, [NO_FORCE])[:, 0]
-    if not bench.abilities.any_size:
+    if not bench.body.abilities.any_size:
         return float(whole - x0) / h
     half = bench.run(0.5 * h, [NO_FORCE])[1, 0]
     return float(4.0 * half - whole - 3.0 * x0) / h
