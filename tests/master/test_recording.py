@@ -231,16 +231,18 @@ def test_a_kill_at_any_byte_leaves_all_blocks_but_the_last(tmp_path, monkeypatch
     monkeypatch.setattr(file_recorder, "_append", noted)
     kept = [block(5, t_end=0.1), block(4, t_end=0.2, begin=5), block(12, t_end=0.9, begin=9)]
     recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path / "whole"))
-    done = [0]
+    headers = {path.name: header for path, header in recorder._headers.items()}
+    done = [sum(len(header) for header in headers.values())]  # before these are written the directory has no summary
     for records in kept:
         recorder.keep(*records)
         done.append(sum(len(content) for _, content in writes))
     recorder.close()
-    headers = {path.name: header for path, header in recorder._headers.items()}
     whole, killed = load_trajectory(tmp_path / "whole"), Path(shutil.copytree(tmp_path / "whole", tmp_path / "killed"))
     borders = {*done, *np.cumsum([len(content) for _, content in writes])}
-    for at in sorted(borders.union(np.random.default_rng(1).integers(done[-1], size=200))):
-        files, left = dict(headers), at
+    for at in sorted(
+        at for at in borders.union(np.random.default_rng(1).integers(*done[:: len(kept)], size=200)) if at >= done[0]
+    ):
+        files, left = dict.fromkeys(headers, b""), at
         for name, content in writes:
             files[name] += content[:left]
             left -= min(left, len(content))
@@ -337,6 +339,7 @@ def swapped(old, new):
             r"events\.csv: 28 events, 30 bel",
         ),
         ("events.csv", swapped(b"impact", b"bang"), r"events\.csv: line 2: not an event"),
+        ("events.csv", swapped(b"impact,", b"impact,,"), r"events\.csv: line 2: not an event"),
         ("events.csv", swapped(b"0.5", b"five"), r"events\.csv: line 2: .*five"),
         ("events.csv", swapped(b"time,", b"t,"), r"events\.csv: line 1"),
         ("events.csv", lambda content: b"", r"events\.csv: empty"),

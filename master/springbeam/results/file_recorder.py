@@ -7,12 +7,12 @@ is killed loses no more than that. Rows, ``trajectory.csv``, are made from the r
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from pydantic_core import to_json
@@ -173,23 +173,19 @@ class FileRecorder(Recorder):
         self._reserve_summary()
 
     def _begin(self) -> None:
-        """Write the files with their headers, which then replace earlier results."""
+        """Remove earlier results and write the files with their headers, once the disk has room for them."""
         if self._files:
             return
         try:
-            for path, header in self._headers.items():
-                _part(path).write_bytes(header)
             self._reserve_summary()
         except OSError:
-            for path in (*self._headers, self.directory.summary):
-                with suppress(OSError):
-                    _part(path).unlink()
+            _part(self.directory.summary).unlink(missing_ok=True)
             raise
         for file in self.directory.results():
             file.unlink()
-        for path in self._headers:
-            os.replace(_part(path), path)
         self._open()
+        for path, header in self._headers.items():
+            _append(self._files[path], header)
         # Last: where there is a summary, there is a run that can be loaded.
         self._write_summary({"status": "running"})
         self._reserve_summary()
@@ -224,16 +220,24 @@ def save(run: Trajectory, directory: str | Path, *, replace: bool) -> Path:
 
 def write_rows(directory: RunDirectory, rows: Iterable[Mapping[str, np.ndarray]]) -> None:
     """Replace ``trajectory.csv`` by columns, block after block. Raises OSError; the file is then as before."""
-    part = _part(directory.trajectory)
+    with replaced(directory.trajectory) as file:
+        for number, columns in enumerate(rows):
+            if number == 0:
+                file.write(_line(list(columns)))
+            file.write(_lines(zip(*(values.tolist() for values in columns.values()), strict=True)))
+
+
+@contextmanager
+def replaced(path: Path) -> Iterator[BinaryIO]:
+    """Open a file that takes the place of ``path`` once it is written; if that fails, the file is as before."""
+    part = _part(path)
     try:
         with part.open("wb") as file:
-            for number, columns in enumerate(rows):
-                if number == 0:
-                    file.write(_line(list(columns)))
-                file.write(_lines(zip(*(values.tolist() for values in columns.values()), strict=True)))
-        os.replace(part, directory.trajectory)
-    except OSError:
-        part.unlink(missing_ok=True)
+            yield file
+        os.replace(part, path)
+    except BaseException:
+        with suppress(OSError):
+            part.unlink()
         raise
 
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from itertools import chain
+from collections.abc import Iterator, Sequence
 from math import inf
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from ..scene import scene_from_dict
 from .directory import ResultsUnreadable, RunDirectory
 from .recording import trajectory_of
 from .steps import steps_of
-from .trajectory import EVENT_COLUMNS, PHASES, SHAPE_COLUMNS, Event, EventKind, Trajectory, shapes_of
+from .trajectory import EVENT_COLUMNS, PHASES, SHAPE_COLUMNS, Event, Trajectory, shapes_of
 
 
 def load_trajectory(directory: str | Path) -> Trajectory:
@@ -56,10 +56,11 @@ def read_run(run: RunDirectory) -> Trajectory:
     events = list(load_events(run.path))
     shapes = None
     if run.shapes.exists():
-        table = _read_table(run.shapes, SHAPE_COLUMNS)
-        shapes = np.column_stack([table[name] for name in SHAPE_COLUMNS])
+        shapes = _read_table(run.shapes, SHAPE_COLUMNS).view("f8").reshape(-1, len(SHAPE_COLUMNS))
     if len(steps) == 0 and run.trajectory.exists():  # it left no records: a reference
-        return Trajectory(scene, _read_table(run.trajectory), events, summary=summary, **shapes_of(shapes))
+        table = _read_table(run.trajectory)
+        columns = {name: np.ascontiguousarray(table[name]) for name in table.dtype.names or ()}
+        return Trajectory(scene, columns, events, summary=summary, **shapes_of(shapes))
     # A run that was killed may have written what belongs to records that it has not.
     last, known = (steps["time"][-1], int(steps["events"][-1])) if len(steps) else (-inf, 0)
     if known > len(events):
@@ -88,60 +89,45 @@ def load_summary(directory: str | Path) -> dict[str, Any]:
 def load_events(directory: str | Path) -> Iterator[Event]:
     """Read the events of a run directory, one at a time."""
     path = RunDirectory(directory).events
-    _, lines = _complete_lines(path, EVENT_COLUMNS)
-    for number, line in enumerate(lines, start=2):
-        fields = line.rstrip("\n").split(",")
+    for number, line in enumerate(_complete_lines(path, EVENT_COLUMNS)[1:], start=2):
         try:
-            given = {name: text for name, text in zip(EVENT_COLUMNS, fields, strict=True) if text}
-            kind = EventKind(given.pop("kind"))
-            yield Event(kind=kind, **{name: float(text) for name, text in given.items()})
-        except (KeyError, TypeError, ValueError) as error:
-            said = f"not an event: {line.strip()[:60]!r}: {error}"
+            fields = zip(EVENT_COLUMNS, line.split(","), strict=True)
+            yield msgspec.convert({name: text for name, text in fields if text}, Event, strict=False)
+        except ValueError as error:
+            said = f"not an event: {line[:60]!r}: {error}"
             raise ResultsUnreadable(f"{path}: line {number}: {said}") from None
 
 
-def _complete_lines(path: Path, columns: tuple[str, ...] | None = None) -> tuple[tuple[str, ...], Iterator[str]]:
-    """Return the header, which must be ``columns`` if given, and the lines after it that end in a newline.
+def _complete_lines(path: Path, columns: Sequence[str] = ()) -> list[str]:
+    """Return the lines that end in a newline, at least the header, which must be ``columns`` if given.
 
     A byte that is no text makes its line unreadable, not the file.
     """
-
-    def lines() -> Iterator[str]:
-        with path.open(encoding="utf-8", errors="replace", newline="\n") as file:
-            yield from (line for line in file if line.endswith("\n"))
-
     try:
-        everything = lines()
-        header = next(everything, None)
+        lines = path.read_bytes().decode(errors="replace").split("\n")[:-1]
     except OSError as error:
         raise ResultsUnreadable(f"{path}: {error.strerror}") from error
-    if header is None:
+    if not lines:
         raise ResultsUnreadable(f"{path}: empty")
-    found = tuple(header.rstrip("\n").split(","))
-    if columns not in (None, found):
+    if columns and lines[0] != ",".join(columns):
         raise ResultsUnreadable(f"{path}: line 1: not the columns of {path.name}")
-    return found, everything
+    return lines
 
 
-def _read_table(path: Path, columns: tuple[str, ...] | None = None) -> dict[str, np.ndarray]:
-    header, lines = _complete_lines(path, columns)
-    if "time" not in header:
+def _read_table(path: Path, columns: Sequence[str] = ()) -> np.ndarray:
+    """Return the rows of a file, shape (n,), as records of its columns."""
+    header, *lines = _complete_lines(path, columns)
+    if "time" not in (names := header.split(",")):
         raise ResultsUnreadable(f"{path}: line 1: no column time")
-    kinds = [(name, "U8" if name == "phase" else "f8") for name in header]
-    first = next(lines, None)
-    if first is None:
-        table = np.empty(0, dtype=kinds)
-    else:
-        try:
-            table = np.loadtxt(chain([first], lines), dtype=kinds, delimiter=",", comments=None, ndmin=1)
-        except ValueError as error:
-            why, _, _ = str(error).partition(";")  # what follows is for who calls numpy
-            raise ResultsUnreadable(f"{path}: after the header: {why}") from None
-    found = {name: np.ascontiguousarray(table[name]) for name in header}
-    for name, values in found.items():
-        if name == "phase":
-            if unknown := set(values.tolist()).difference(PHASES):
-                raise ResultsUnreadable(f"{path}: {unknown.pop()!r} is no phase; phases are {', '.join(PHASES)}")
-        elif not np.isfinite(values).all():
+    kinds = np.dtype([(name, "U8" if name == "phase" else "f8") for name in names])
+    try:
+        table = np.loadtxt(lines, kinds, delimiter=",", comments=None, ndmin=1) if lines else np.empty(0, kinds)
+    except ValueError as error:
+        why, _, _ = str(error).partition(";")  # what follows is for who calls numpy
+        raise ResultsUnreadable(f"{path}: after the header: {why}") from None
+    for name in names:
+        if name != "phase" and not np.isfinite(table[name]).all():
             raise ResultsUnreadable(f"{path}: {name} holds a number that is not finite")
-    return found
+    if "phase" in names and (unknown := set(table["phase"].tolist()).difference(PHASES)):
+        raise ResultsUnreadable(f"{path}: {unknown.pop()!r} is no phase; phases are {', '.join(PHASES)}")
+    return table

@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import os
-from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from ..bodies.stateful import RunState
-from ..results.file_recorder import FileRecorder, Written
+from ..results.file_recorder import FileRecorder, Written, replaced
 from ..scene import Scene, scene_from_dict
 
 if TYPE_CHECKING:  # a command that only reads a checkpoint loads no FMU
@@ -43,17 +42,10 @@ class Checkpoint:
     def write(self, path: Path) -> None:
         """Replace the file ``path``. Raises OSError; the file is then as before."""
         content = msgspec.msgpack.encode(self, enc_hook=lambda scene: scene.model_dump(exclude_none=True))
-        scratch = path.with_name(path.name + ".part")
-        try:
-            with scratch.open("wb") as file:
-                file.write(_title(content) + b"\n" + content)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(scratch, path)
-        except BaseException:
-            with suppress(OSError):
-                scratch.unlink()
-            raise
+        with replaced(path) as file:
+            file.write(_title(content) + b"\n" + content)
+            file.flush()
+            os.fsync(file.fileno())
 
     @classmethod
     def read(cls, path: Path) -> Checkpoint:
