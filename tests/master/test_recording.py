@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 from runs import PAIR, SCENES, a_trajectory, block
 
 from springbeam.results import file_recorder
@@ -306,7 +307,6 @@ def test_a_run_that_goes_on_is_exported_up_to_its_last_block(tmp_path):
 
 @pytest.mark.parametrize("scene", [PAIR, SCENES["spring"]])
 def test_tables_are_exported_as_parquet(tmp_path, scene):
-    parquet = pytest.importorskip("pyarrow.parquet")
     run = filed(tmp_path / "run", block(30, scene), scene=scene)
     files = export(tmp_path / "run", "parquet")
     assert [file.name for file in files] == list(PARQUET[: 2 + (scene.beam is not None)])
@@ -451,7 +451,7 @@ def test_numbered_directories_are_new_each_time_also_in_parallel(tmp_path):
     ("damage", "message"),
     [
         (lambda file: file.unlink(), "missing"),
-        (lambda file: file.write_bytes(file.read_bytes()[:-1]), "fewer than the"),
+        (lambda file: file.write_bytes(file.read_bytes()[:-1]), r"\d+ bytes, \d+ bytes were written"),
     ],
     ids=["missing", "cut"],
 )
@@ -505,7 +505,7 @@ def test_rows_that_find_no_room_lose_no_record(tmp_path):
     recorder.keep(*block(240))
     with room(20_000), pytest.raises(OSError, match="File too large"):
         recorder.finish({"status": "done"})
-    assert not (tmp_path / "run" / "trajectory.csv").exists()
+    assert not list((tmp_path / "run").glob("trajectory.csv*"))  # nor a part of it
     assert len(load_trajectory(tmp_path / "run")) == 240
     assert load_summary(tmp_path / "run")["status"] == "done"
 

@@ -55,7 +55,7 @@ def export(
     directory: RunArgument,
     form: Annotated[
         Literal["csv", "parquet"],
-        typer.Option("--format", help="csv: trajectory.csv anew. parquet: rows, events and shapes (needs pandas)."),
+        typer.Option("--format", help="csv: trajectory.csv anew. parquet: rows, events and shapes."),
     ] = "csv",
 ) -> None:
     """Write the tables of a run from its records (steps.bin), also of one that was killed or still runs.
@@ -65,10 +65,7 @@ def export(
     from ..results.export import export as write
 
     with bad_input_reported():
-        try:
-            files = write(results_directory(directory), form)
-        except ImportError as error:
-            fail(BAD_INPUT, f"--format {form}: {error}; pip install -e '.[data]' in the checkout of springbeam")
+        files = write(results_directory(directory), form)
     for file in files:
         typer.echo(file)
 

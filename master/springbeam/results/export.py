@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
@@ -22,12 +21,10 @@ def export(directory: str | Path, form: Literal["csv", "parquet"]) -> list[Path]
     ------
     ResultsUnreadable
         If the run left no records, or another file than ``trajectory.csv`` was cut.
-    ImportError
-        If pandas or pyarrow is missing.
     """
     run = RunDirectory(directory)
     summary = load_summary(run.path)
-    refuse_cut(run, summary, rows=False)
+    refuse_cut(run, summary.get("files", {}), rows=False)
     trajectory = read_run(run)
     if not run.steps.exists() or run.steps.stat().st_size < 8 * len(STEP_COLUMNS):
         raise ResultsUnreadable(f"{run.steps}: no records in it: of a reference, or of a run that has made no step yet")
@@ -36,11 +33,13 @@ def export(directory: str | Path, form: Literal["csv", "parquet"]) -> list[Path]
         if "files" in summary:
             write_summary(run, {**summary, "files": run.sizes()})
         return [run.trajectory]
-    pandas = import_module("pandas")
-    events = pandas.DataFrame([vars(event) for event in trajectory.events], columns=EVENT_COLUMNS)
-    tables = {PARQUET[0]: pandas.DataFrame(trajectory.columns), PARQUET[1]: events}
+    from pyarrow import Table, float64, parquet, schema, string, table  # it takes its time to load
+
+    kinds = schema([(name, string() if name == "kind" else float64()) for name in EVENT_COLUMNS])
+    events = Table.from_pylist([vars(event) for event in trajectory.events], kinds)
+    tables = {PARQUET[0]: table(trajectory.columns), PARQUET[1]: events}
     if trajectory.shapes is not None:
-        tables[PARQUET[2]] = pandas.DataFrame(trajectory.shape_table(), columns=SHAPE_COLUMNS)
-    for name, table in tables.items():
-        table.to_parquet(run.path / name, engine="pyarrow", index=False)
+        tables[PARQUET[2]] = table(dict(zip(SHAPE_COLUMNS, trajectory.shape_table().T, strict=True)))
+    for name, rows in tables.items():
+        parquet.write_table(rows, run.path / name)
     return [run.path / name for name in tables]

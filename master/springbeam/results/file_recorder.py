@@ -20,8 +20,8 @@ from pydantic_core import to_json
 from ..scene import Scene
 from .columns import blocks
 from .dense import rows_at
-from .directory import ResultsUnreadable, RunDirectory
-from .reading import load_events, read_run
+from .directory import RunDirectory
+from .reading import load_events, read_run, refuse_cut
 from .recording import Recorder, with_scene
 from .steps import STEP
 from .trajectory import EVENT_COLUMNS, SHAPE_COLUMNS, Event, Trajectory
@@ -159,11 +159,7 @@ class FileRecorder(Recorder):
             If another process is writing them.
         """
         self.directory.claim()
-        found = self.directory.sizes()
-        for path in self._headers:
-            if found.get(path.name, 0) < (size := saved.files[path.name]):
-                there = f"{found[path.name]} bytes" if path.name in found else "missing"
-                raise ResultsUnreadable(f"{path}: {there}, fewer than the {size} bytes once written")
+        refuse_cut(self.directory, saved.files, longer=True)
         self._open()
         self._interval = saved.interval
         for path, file in self._files.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -27,18 +27,20 @@ def load_trajectory(directory: str | Path) -> Trajectory:
         If a file is missing, is not what a run writes, or not what this one has written.
     """
     run = RunDirectory(directory)
-    refuse_cut(run, load_summary(run.path))
+    refuse_cut(run, load_summary(run.path).get("files", {}))
     return read_run(run)
 
 
-def refuse_cut(run: RunDirectory, summary: dict[str, Any], *, rows: bool = True) -> None:
-    """Raise ResultsUnreadable if a file is not as long as ``summary``, that of a run that has ended, says.
+def refuse_cut(run: RunDirectory, written: Mapping[str, int], *, rows: bool = True, longer: bool = False) -> None:
+    """Raise ResultsUnreadable if a file is not as long as it was ``written`` [bytes].
 
-    ``rows`` says whether ``trajectory.csv`` counts, which the records can replace.
+    ``rows`` says whether ``trajectory.csv`` counts, which the records can replace, ``longer`` whether files may have
+    become longer.
     """
     found = run.sizes()
-    for name, size in summary.get("files", {}).items():
-        if found.get(name) != size and (rows or name != run.trajectory.name):
+    for name, size in written.items():
+        whole = found.get(name) == size or (longer and found.get(name, 0) > size)
+        if not whole and (rows or name != run.trajectory.name):
             remedy = f"; springbeam export {run.path} writes it again" if name == run.trajectory.name else ""
             there = f"{found[name]} bytes" if name in found else "missing"
             raise ResultsUnreadable(f"{run.path / name}: {there}, {size} bytes were written{remedy}")

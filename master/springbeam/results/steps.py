@@ -52,24 +52,17 @@ _APART = (0.0, 3.0)
 def steps_of(content: bytes | bytearray) -> np.ndarray:
     """Return the records in ``content``, an incomplete last one left out. Raises ValueError for one not finite."""
     steps: np.ndarray = np.frombuffer(content, STEP, len(content) // STEP.itemsize).copy()
-    if (found := first_not_finite(steps)) is not None:
-        row, column = found
-        raise ValueError(f"{column} = {steps[column][row]} in the step to t = {steps['time'][row]!s} s: not finite")
+    finite = np.isfinite(steps.view("<f8").reshape(len(steps), len(STEP_COLUMNS)))
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0].tolist()
+        said = f"{STEP_COLUMNS[column]} = {steps[row][column]} in the step to t = {steps['time'][row]!s} s"
+        raise ValueError(f"{said}: not finite")
     if (
         not np.isin(steps["phase"], range(len(PHASE_NAMES))).all()
         or (np.diff(steps["events"], prepend=0.0) < 0.0).any()
     ):
         raise ValueError("not records of steps")
     return steps
-
-
-def first_not_finite(steps: np.ndarray) -> tuple[int, str] | None:
-    """Return the first record with a number that is not finite, and which; ``None`` if there is none."""
-    finite = np.isfinite(steps.view("<f8").reshape(len(steps), len(STEP_COLUMNS)))
-    if finite.all():
-        return None
-    row, column = np.argwhere(~finite)[0]
-    return int(row), STEP_COLUMNS[column]
 
 
 def joined(steps: np.ndarray) -> np.ndarray:
