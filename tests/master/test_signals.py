@@ -6,7 +6,7 @@ from runs import a_trajectory
 from scipy.integrate import quad
 
 from springbeam.scene import Load, SceneError
-from springbeam.signals.driven import response
+from springbeam.signals.driven import repeating, response
 from springbeam.signals.expressions import Expression, function_of, signal
 from springbeam.signals.shock import shock_spectrum
 
@@ -48,6 +48,14 @@ def test_a_formula_whose_part_did_not_happen_has_no_value():
 def test_a_function_that_is_not_there_is_refused(text):
     with pytest.raises(SceneError, match=text):
         function_of(text)
+
+
+@pytest.mark.parametrize(("count", "found"), [(31, (6, 3)), (30, None)])
+def test_a_motion_repeats_itself_after_three_periods_if_it_does_so_eight_times(count, found):
+    """24 periods of the drive after the first point that is within 1 % of the last ones in turn."""
+    points = np.array([[0.3 * (k % 3), 0.5 + 0.004 * np.cos(k)] for k in range(count)])
+    points[5, 1] = 0.53
+    assert repeating(points) == found
 
 
 def test_the_response_to_a_chirp_is_that_of_whole_pairs_of_its_turns():

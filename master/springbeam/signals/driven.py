@@ -75,12 +75,21 @@ def settled(run: Trajectory) -> Settled | None:
     times, points = poincare(run, 1.0 / drive.frequency, drive.start)
     late = run.time >= 0.5 * (run.time[0] + run.time[-1])
     scale = np.array([float(np.ptp(run[name][late])) for name in _point(run)])
-    for multiple in range(1, _LONGEST + 1) if (scale > 0.0).all() else ():
+    found = repeating(points / scale) if (scale > 0.0).all() else None
+    return None if found is None else Settled(float(times[found[0]]), 1.0 / drive.frequency, found[1])
+
+
+def repeating(points: np.ndarray) -> tuple[int, int] | None:
+    """Return from which of the ``points`` (n, 2) on they repeat themselves, and after how many; ``None`` if not.
+
+    They are points once a period of the drive, over the range of the motion.
+    """
+    for multiple in range(1, _LONGEST + 1):
         alike = np.tile(points[-multiple:], (len(points) // multiple + 1, 1))[-len(points) :]
-        off = np.flatnonzero((np.abs(points - alike) > _ALIKE * scale).any(axis=1))
+        off = np.flatnonzero((np.abs(points - alike) > _ALIKE).any(axis=1))
         since = int(off[-1]) + 1 if len(off) else 0
-        if len(times) - 1 - since >= _PERIODS * multiple:
-            return Settled(float(times[since]), 1.0 / drive.frequency, multiple)
+        if len(points) - 1 - since >= _PERIODS * multiple:
+            return since, multiple
     return None
 
 
