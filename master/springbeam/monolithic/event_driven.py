@@ -12,18 +12,20 @@ from __future__ import annotations
 
 import time as clock
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
-from itertools import takewhile
+from collections.abc import Iterable, Sequence
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar, newton
+from numpy.polynomial import legendre
+from scipy.optimize import brentq, newton
 
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError
 from .exponential import ExponentialPropagator, LinearForm, Segment
-from .hybrid_system import HybridSystem, ReferenceFailure
+from .hybrid_system import NOISE, HybridSystem, ReferenceFailure
 from .laws import Phase, Watch, law_of
+from .oscillators import GAUSS, STAGES
 from .quasi_static import QuasiStaticForm, QuasiStaticSystem
 from .rows import Rows
 from .semi_discrete import modal_beam
@@ -283,66 +285,54 @@ class EventLocator:
     def first(self, segment: Segment) -> tuple[Watch, float] | None:
         """Return the earliest event in a segment and when, after its start [s]; ``None`` if there is none."""
         motion = self._system.motion(self._phase, segment.states)
-        first: tuple[Watch, float] | None = None
-        for watch in self._watched:
-            tau = self._crossing(segment, watch, watch.function(motion))
-            if tau is not None and (first is None or tau < first[1]):
-                first = (watch, tau)
-        return first
+        crossings = [(watch, self._crossing(segment, watch, watch.function(motion))) for watch in self._watched]
+        return min(((watch, tau) for watch, tau in crossings if tau is not None), key=itemgetter(1), default=None)
 
     def _crossing(self, segment: Segment, watch: Watch, values: np.ndarray) -> float | None:
-        noise = self._system.noise(watch.unit, segment.states[0])
+        """Return where a function, whose ``values`` at the nodes are given, first falls through zero."""
 
         def g(tau: float) -> float:
             return float(watch.function(self._system.motion(self._phase, segment.state(tau))))
 
-        for k in range(len(values)):
-            if watch.name not in self._armed:
-                if values[k] > noise:
-                    self._armed.add(watch.name)
-                elif values[k] < -noise and k > 0:
-                    return _early_crossing(g, segment.nodes[k], noise)
-            elif values[k] < 0.0:
-                low, high = segment.nodes[k - 1], segment.nodes[k]
-                if k == 0 or g(low) <= 0.0:
-                    return float(low if k > 0 else 0.0)
-                if k == len(values) - 1 and values[k] >= -noise:
-                    return float(high)
-                return _root(g, low, high)
-            elif 0 < k < len(values) - 1:
-                bottom = _dip(g, segment.nodes[k - 1 : k + 2], values[k - 1 : k + 2], noise)
-                if bottom is not None:
-                    return _root(g, segment.nodes[k - 1], bottom)
-        return None
+        noise = self._system.noise(watch.unit, segment.states[0])
+        turns, there = _turns(segment.size, values)
+        close = np.abs(there) <= _CLOSE * np.ptp(values)
+        there[close] = [g(tau) for tau in turns[close]]
+        order = np.argsort(np.r_[segment.nodes, turns])
+        times, values = np.r_[segment.nodes, turns][order], np.r_[values, there][order]
+        clear = np.abs(values) > noise
+        if watch.name not in self._armed:
+            begin = int(np.argmax(clear))
+            if values[begin] <= noise:
+                return 0.0 if values[begin] < -noise else None
+            self._armed.add(watch.name)
+            times, values, clear = times[begin:], values[begin:], clear[begin:]
+        if not np.any(below := clear & (values < 0.0)):
+            return None
+        k = int(np.argmax(below))
+        low, high = float(times[max(k - 1, 0)]), float(times[k])
+        if (
+            g(low) <= 0.0 or g(high) >= 0.0
+        ):  # what the nodes have and the exact state differ by less than either's error
+            return low if g(low) <= 0.0 else high
+        # A root at a segment's very start needs no more than the rounding of the segment.
+        return float(brentq(g, low, high, xtol=1e-16 * high, rtol=8.9e-16, maxiter=200))
 
 
-def _dip(g: Callable[[float], float], nodes: np.ndarray, values: np.ndarray, noise: float) -> float | None:
-    """Return where ``g`` is lowest if it dips below zero between three nodes at which it is not; else ``None``.
+#: A turn whose value is a smaller share of how much the nodes vary is looked at exactly.
+_CLOSE = 1e-6
+#: Takes values at the nodes of a segment to the Legendre coefficients of the polynomial through them.
+_TO_LEGENDRE = np.linalg.inv(legendre.legvander(2.0 * np.r_[0.0, GAUSS.nodes, 1.0] - 1.0, STAGES + 1))
 
-    The parabola through them tells whether to look: it misses a smooth minimum by less than it varies.
+
+def _turns(size: float, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return where in a segment of ``size`` [s] the polynomial through ``values`` turns, and its values there.
+
+    Nothing where these are far above zero: a smooth minimum lies below the nodes by less than they vary.
     """
-    (x0, x1, x2), (g0, g1, g2) = nodes.tolist(), values.tolist()
-    left, right = (g1 - g0) / (x1 - x0), (g2 - g1) / (x2 - x1)
-    curvature = (right - left) / (x2 - x0)
-    if min(g0, g1, g2) < 0.0 or curvature <= 0.0:
-        return None
-    turn = 0.5 * (x0 + x1 - left / curvature)
-    bottom = g0 + (turn - x0) * (left + (turn - x1) * curvature)
-    if not x0 < turn < x2 or bottom > max(g0, g1, g2) - min(g0, g1, g2):
-        return None
-    found = minimize_scalar(g, bounds=(x0, x2), method="bounded", options={"xatol": 1e-9 * (x2 - x0)})
-    return float(found.x) if found.fun < -noise else None
-
-
-def _root(g: Callable[[float], float], low: float, high: float) -> float:
-    if g(high) >= 0.0:  # the dense output and the exact state differ by less than either's error
-        return float(high)
-    # A root at a segment's very start needs no more than the rounding of the segment.
-    return float(brentq(g, low, high, xtol=1e-16 * high, rtol=8.9e-16, maxiter=200))
-
-
-def _early_crossing(g: Callable[[float], float], first: float, noise: float) -> float:
-    """Return where a function falls to zero that starts there, is positive, and is negative at the first node."""
-    nearer = takewhile(lambda tau: abs(g(tau)) > noise, (first * 0.5**k for k in range(1, 61)))
-    low = next((tau for tau in nearer if g(tau) > 0.0), None)
-    return 0.0 if low is None else _root(g, low, 2.0 * low)
+    if np.min(values) > np.ptp(values):
+        return np.empty(0), np.empty(0)
+    series = _TO_LEGENDRE @ values
+    turns = legendre.legroots(legendre.legder(legendre.legtrim(series, 0.1 * NOISE * np.max(np.abs(series)))))
+    x = turns.real[(turns.imag == 0.0) & (np.abs(turns.real) < 1.0)]
+    return 0.5 * size * (1.0 + x), np.asarray(legendre.legval(x, series))

@@ -25,6 +25,8 @@ from ..scene.statics import SHAPE_POINTS
 
 #: Up to this many unknowns all modes are computed, also where few are wanted.
 _DENSE_SIZE = 400
+#: What lies in a space but for this share adds nothing to it.
+_DEPENDENT = 1e-10
 
 
 @dataclass(frozen=True)
@@ -238,8 +240,9 @@ def modal_beam(beam: Beam) -> ModalBeam:
     u = x, θ = 0, whatever the loads and starts are; Rayleigh–Ritz in it.
     """
     discrete = assemble(beam)
-    space = _augmented_space(discrete, beam) if beam.modes_kept < discrete.size else np.eye(discrete.size)
-    omega, basis = _rayleigh_ritz(discrete, space)
+    omega, basis = _rayleigh_ritz(
+        discrete, _augmented_space(discrete, beam) if beam.modes_kept < discrete.size else None
+    )
     return ModalBeam(
         omega=omega,
         tip=basis[discrete.tip].copy(),
@@ -267,7 +270,7 @@ def _rotations_as_displacements(discrete: SemiDiscreteBeam) -> sp.csc_matrix:
 
 def _lowest_modes(discrete: SemiDiscreteBeam, count: int) -> np.ndarray:
     if discrete.size <= _DENSE_SIZE or 2 * count > discrete.size:
-        return _rayleigh_ritz(discrete, np.eye(discrete.size))[1][:, :count]
+        return _rayleigh_ritz(discrete)[1][:, :count]
     # Without units of length and time: no wanted eigenvalue of K⁻¹M far below 1.
     D = _rotations_as_displacements(discrete)
     K, M = D @ discrete.K @ D, D @ discrete.M @ D
@@ -278,28 +281,23 @@ def _lowest_modes(discrete: SemiDiscreteBeam, count: int) -> np.ndarray:
 
 def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
     D = _rotations_as_displacements(discrete)
-    solve = spla.factorized(D @ discrete.K @ D)
-    modes = _lowest_modes(discrete, beam.n_modes)
-    uniform = discrete.nodal(*points(beam))
-    extra = [D @ solve(D @ discrete.tip_vector), D @ solve(D @ uniform), discrete.slope_shape]
-    space = [column / np.sqrt(column @ (discrete.M @ column)) for column in modes.T]
-    for shape in extra:
-        residual = shape / np.sqrt(shape @ (discrete.M @ shape))
-        W = np.array(space).T
-        shares = []
-        for _ in range(3):  # repeated, because one projection leaves cancellation errors
-            residual = residual - W @ (W.T @ (discrete.M @ residual))
-            shares.append(np.sqrt(residual @ (discrete.M @ residual)))
-            residual /= shares[-1]
-        if shares[0] > 1e-10:  # otherwise the shape already lies in the space
-            space.append(residual)
-    return np.asarray(np.array(space).T)
+    loads = np.column_stack([discrete.tip_vector, discrete.nodal(*points(beam))])
+    static = D @ spla.splu(D @ discrete.K @ D).solve(D @ loads)
+    return np.column_stack([_lowest_modes(discrete, beam.n_modes), static, discrete.slope_shape])
 
 
-def _rayleigh_ritz(discrete: SemiDiscreteBeam, space: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return frequencies and modes in a space, given by its columns."""
-    L = np.linalg.cholesky(space.T @ (discrete.M @ space))
-    orthonormal = scipy.linalg.solve_triangular(L, space.T, lower=True).T
+def _rayleigh_ritz(discrete: SemiDiscreteBeam, space: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Return frequencies and modes in a space, given by its columns, or of all; columns that depend on others count
+    once."""
+    band = min(2 * discrete.degree + 1, discrete.size - 1)
+    # M = UᵀU; in the coordinates Uq lengths and angles are those of the kinetic energy.
+    U = scipy.linalg.cholesky_banded([np.pad(discrete.M.diagonal(k), (k, 0)) for k in range(band, -1, -1)])
+    within = np.eye(discrete.size)
+    if space is not None:
+        columns = sp.diags([U[band - k, k:] for k in range(band + 1)], range(band + 1)) @ space
+        q, r, _ = scipy.linalg.qr(columns / np.linalg.norm(columns, axis=0), mode="economic", pivoting=True)
+        within = q[:, np.abs(np.diag(r)) > _DEPENDENT]
+    orthonormal = scipy.linalg.solve_banded((0, band), U, within)
     omega, vectors = singular_modes(discrete.B @ orthonormal)
     return omega, orthonormal @ vectors
 
