@@ -124,6 +124,8 @@ def test_samples_of_three_axes_are_drawn_over_each():
         [-4, -3, -2, -1, 0],
         [0, 1, 4, 9, 16],
     ]
+    assert {ax.lines[0].get_linestyle() for ax in panels} == {"None"}  # neighbours on one axis differ in the others
+    assert drawn(1)[0].lines[0].get_linestyle() == "-"
 
 
 def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_doubled_period(tmp_path):

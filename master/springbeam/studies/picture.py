@@ -105,7 +105,7 @@ def multiples(rows: Rows, scales: Sequence[Scale], values: Mapping[str, str], ti
         where = "".join(f", {key.rpartition('.')[2]} = {_short(value)}" for key, value in fixed.items())
         every = column(singly(rows, name), name)  # panels of one column share its colours
         ends = np.nanmin(every), np.nanmax(every)
-        scale = _panel(figure, ax, singly(mine, name), scales[:2] if of_grid else pick, name, ends)
+        scale = _panel(figure, ax, singly(mine, name), scales[:2] if of_grid else pick, name, ends, len(scales) == 1)
         drawn.append((ax, f"{words}{where}", scale.get_offset_text()))
     figure.draw_without_rendering()  # which decides by what the numbers of a scale are multiplied
     for ax, words, factor in drawn:
@@ -115,9 +115,12 @@ def multiples(rows: Rows, scales: Sequence[Scale], values: Mapping[str, str], ti
 
 
 def _panel(
-    figure: Figure, ax: Axes, rows: Rows, scales: Sequence[Scale], name: str, ends: tuple[float, float]
+    figure: Figure, ax: Axes, rows: Rows, scales: Sequence[Scale], name: str, ends: tuple[float, float], alone: bool
 ) -> YAxis:
-    """Draw a column over one or two axes; return the scale of its values, whose colours go from end to end."""
+    """Draw a column over one or two axes; return the scale of its values, whose colours go from end to end.
+
+    Values are joined over an axis that is ``alone``; else neighbours on it differ in others.
+    """
     values = column(rows, name)
     if len(scales) == 2:
         drawn = cells(ax, rows, scales[0], scales[1], values, cmap="cividis", vmin=ends[0], vmax=ends[1])
@@ -125,7 +128,7 @@ def _panel(
     (scale,) = scales
     places, levels = scale.places([row[scale.name] for row in rows])
     order, failed = np.argsort(places, kind="stable"), np.isnan(values)
-    joined = "none" if scale.words or len(set(places)) < len(places) else "-"
+    joined = "-" if alone and not scale.words and len(set(places)) == len(places) else "none"
     ax.plot(places[order], values[order], marker=".", linestyle=joined, color=BLUE, linewidth=1.0)
     if failed.any():
         low = ax.get_ylim()[0]
