@@ -15,7 +15,7 @@ from typing import Annotated
 
 import typer
 
-from . import checks, look, run, scenes, spectrum, studies
+from . import checks, look, run, scenes, studies
 from .common import STOPPED, Command, Group
 
 _WHAT = "A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs."
@@ -75,7 +75,7 @@ def _common(
 _COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Scenes": (scenes.scenes, scenes.keys, scenes.new),
     "Run": (run.run, studies.resume, studies.sweep),
-    "Look": (look.report, look.animate, look.export, look.compare, spectrum.spectrum, studies.fit),
+    "Look": (look.report, look.animate, look.export, look.compare, look.spectrum, studies.fit),
     "Choose scheme and accuracy": (scenes.predict, studies.tradeoff, studies.converge),
     "Check": (studies.crosscheck, checks.verify, studies.stability, checks.doctor),
 }

@@ -26,8 +26,7 @@ from .common import (
 )
 from .frame import Frame, carry_out, study_command
 from .run import carry_out as carry_out_run
-from .run import picked
-from .summary import picked_in_words
+from .run import picked, picked_in_words
 
 if TYPE_CHECKING:
     from ..studies.study import Study

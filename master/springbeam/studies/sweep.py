@@ -1,12 +1,16 @@
 """Many runs of one scene: a row of metrics per run, errors as rows.
 
 The rows depend on the design alone: not on the number of workers, nor on the order in which they finish.
+
+Over the amplitude and the duration of a pulse a sweep shows the damage boundary of a product: which pulses bring a
+number of it to its limit. A pulse is told by its peak and by the velocity that it changes, ∫ a dt. At each duration the
+critical peak is that at which the metric first reaches its limit, linear between the amplitudes swept.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,9 +18,8 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from ..scene import Scene
+from ..scene import Load, Scene, SceneError
 from ..scene.reference import unit_of
-from .boundary import boundary, in_words, limit_of, pulse_axes
 from .design import Axis, Sampling, compatible, design, parse_axis
 from .metrics import PRINCIPAL, USUAL, heading, known, named
 from .study import Findings, Pictures, Row, Study
@@ -27,6 +30,8 @@ STATUSES = ("done", "stopped", "refused", "lost")
 _FIRST_ROWS = 10
 #: A metric that varies less, relative to its largest value, is constant.
 _ROUNDING = 1e-12
+#: Points of the integral of a pulse.
+_POINTS = 20_001
 
 
 class Sweep(Study):
@@ -88,7 +93,7 @@ class Sweep(Study):
         document: dict[str, Any] = {"runs": {status: counts[status] for status in STATUSES}}
         if self.boundary:
             document["boundary"] = self._critical(records)
-            lines += in_words(document["boundary"], self.boundary)
+            lines += _told(document["boundary"], self.boundary)
         return Findings(document, [Text(line) for line in lines] + ([self._first(records)] if self.metric else []))
 
     def _first(self, records: Mapping[str, Row]) -> Table:
@@ -146,3 +151,69 @@ def _labelled(axis: Axis) -> str:
     table, _, key = axis.name.rpartition(".")
     unit = unit_of(table, key)
     return f"{axis.name} [{unit}]" if unit != "–" else axis.name
+
+
+# -- damage boundary --------------------------------------------------------------------------------------------------
+
+
+def limit_of(text: str, own: Sequence[str] = ()) -> tuple[str, float]:
+    """Read ``METRIC=LIMIT``, what must not be reached, the metric being one of ``own`` or known.
+
+    Raises SceneError for anything else.
+    """
+    metric, _, value = text.rpartition("=")
+    try:
+        limit = float(value)
+    except ValueError:
+        limit = 0.0
+    if not limit > 0.0:
+        raise SceneError(f"--boundary {text}: must be METRIC=LIMIT with a limit above 0, as in max_clamp_moment=0.3")
+    return metric.strip() if metric.strip() in own else named(metric.strip())[0], limit
+
+
+def pulse_axes(scene: Scene, axes: Sequence[Axis]) -> tuple[Load, str, str]:
+    """Return the pulse that a sweep varies, and the names of the axes of its amplitude and its duration.
+
+    Raises SceneError if the sweep is over anything else.
+    """
+    names = {axis.name for axis in axes}
+    table = next(iter(names)).rpartition(".")[0]
+    amplitude, duration = f"{table}.amplitude", f"{table}.duration"
+    if names != {amplitude, duration} or not table.startswith("loads."):
+        raise SceneError("--boundary: takes --vary loads.0.amplitude=… and --vary loads.0.duration=… of one pulse")
+    load = scene.loads[int(table.partition(".")[2])]
+    if load.duration is None:
+        raise SceneError(f'--boundary: the load is no pulse; its signal is "{load.signal}", without a duration')
+    return load, amplitude, duration
+
+
+def boundary(
+    load: Load, amplitude: str, duration: str, rows: Iterable[Mapping[str, Any]], metric: str, limit: float
+) -> list[dict[str, float]]:
+    """Return the critical pulses by duration; none at durations whose runs stay below the limit.
+
+    ``rows`` are those of the sweep, ``amplitude`` and ``duration`` the names of its axes. A critical pulse has its
+    ``duration`` [s], its ``peak``, in the load's unit, and its ``velocity_change``, the integral of the load.
+    """
+    known, found = [row for row in rows if row[metric] is not None], []
+    for length in sorted({row[duration] for row in known}):
+        pairs = sorted((abs(row[amplitude]), abs(row[metric])) for row in known if row[duration] == length)
+        peaks, values = np.array([(0.0, 0.0), *pairs]).T
+        if k := int(np.argmax(values >= limit)):
+            peak = float(np.interp(limit, values[k - 1 : k + 1], peaks[k - 1 : k + 1]))
+            pulse = load.model_copy(update={"amplitude": 1.0, "duration": length, "start": 0.0})
+            mean = float(pulse.value((np.arange(_POINTS) + 0.5) * length / _POINTS).mean())
+            found.append({"duration": length, "velocity_change": peak * mean * length, "peak": peak})
+    return found
+
+
+def _told(found: Sequence[Mapping[str, float]], limit: str) -> list[str]:
+    """Return what the boundary says: both of its sides."""
+    if not found:
+        return [f"boundary  {limit} is not reached in any run that has a value of it"]
+    slowest, least = (min(found, key=lambda pulse: pulse[side]) for side in ("velocity_change", "peak"))
+    return [
+        f"boundary  {limit} is reached from a velocity change of {slowest['velocity_change']:.4g} on "
+        f"(in {slowest['duration']:.4g} s)",
+        f"          and from a peak of {least['peak']:.4g} on (in {least['duration']:.4g} s)",
+    ]
