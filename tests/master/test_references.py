@@ -1,6 +1,7 @@
 """The references: what the paper reports of Algorithm 1, exact solutions, extended precision, and scipy."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,10 @@ from scenes import kinds, soft
 from scipy.integrate import quad
 
 from springbeam.monolithic import algorithm1, event_driven
-from springbeam.monolithic.laws import law_of
+from springbeam.monolithic.event_driven import first_event
+from springbeam.monolithic.exponential import Segment
+from springbeam.monolithic.laws import Phase, Watch, law_of
+from springbeam.monolithic.oscillators import GAUSS
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.scene import Beam, load_scene, with_changes
 from springbeam.studies import exact, verify
@@ -267,6 +271,39 @@ def test_a_spring_that_runs_away_is_a_failure_of_the_reference():
     unchecked = scene.model_copy(update={"lower": scene.spring.model_copy(update={"initial_velocity": 5.0})})
     with pytest.raises(event_driven.ReferenceFailure):
         event_driven.simulate(unchecked, sample_times=[0.0])
+
+
+def wave(tau, bottom):
+    """Zero at ``bottom``, where the polynomial through the nodes of a step is 2e-8 (0.5) or −3e-9 (0.43)."""
+    return 1.0 - np.cos(6.0 * (tau - bottom))
+
+
+@pytest.mark.parametrize(
+    ("function", "expected"),
+    [
+        (lambda tau: 0.37 - tau, 0.37),
+        (lambda tau: 1.0 - tau / 0.37 + 2.0 * tau**2, None),
+        (lambda tau: (tau - 0.5) ** 2 - 1e-8, 0.4999),
+        (lambda tau: wave(tau, 0.5) - 1e-10, 0.5 - np.sqrt(2e-10) / 6.0),
+        (lambda tau: wave(tau, 0.43) + 1e-10, None),
+        (lambda tau: tau * (1e-3 - tau), 1e-3),  # rises, and falls before the first node
+        (lambda tau: tau - 5e-16, None),  # of rounding
+        (lambda tau: -1e3 * tau, 0.0),
+        (lambda tau: -1.0 - tau, 0.0),
+        (lambda tau: 1.0 - tau - 1e-16, None),  # at the very end, and not yet below it
+    ],
+)
+def test_an_event_is_where_its_function_first_falls_below_rounding(function, expected):
+    """Sizes of a step that are not 1 scale the time."""
+    for size in (1.0, 0.01):
+        nodes = size * np.r_[0.0, GAUSS.nodes, 1.0]
+        system = SimpleNamespace(motion=lambda _, X: X[..., 0] / size, noise=lambda *_: 1e-15)  # noqa: B023
+        segment = Segment(nodes, nodes[:, None], lambda tau: np.array([tau]))
+        later = Watch("later", lambda tau: 0.9 - tau, "m")
+        found = first_event(system, Phase("free"), [Watch("it", function, "m"), later], segment)
+        assert (found[0].name, found[1] / size) == (
+            ("later", pytest.approx(0.9)) if expected is None else ("it", pytest.approx(expected, abs=1e-11))
+        )
 
 
 def test_a_dip_between_nodes_is_not_missed():

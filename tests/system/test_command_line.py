@@ -7,6 +7,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,6 @@ from typer.testing import CliRunner
 
 from springbeam.bodies.archive import fmu_directory
 from springbeam.cli import app
-from springbeam.cli.run import _ProgressBar
 from springbeam.results.reading import load_summary
 from springbeam.scene import load_scene, reference, scene_keys, shipped_scenes, with_changes
 from springbeam.scene.reading import tomllib
@@ -85,7 +85,7 @@ def place(tmp_path_factory):
         printed("run", "soft", "--no-plots", "--out", "done")
         Path("curve.csv").write_text("time,y\n0.1,0.49\n0.5,0.32\n0.9,0.01\n", encoding="utf-8")
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(_ProgressBar, "__call__", Interrupt(40))
+            patch.setattr("springbeam.cli.run._progress", lambda *_, **__: nullcontext(Interrupt(40)))
             assert command("run", "soft", "--checkpoint", "1000", "--no-plots", "--out", "cut").exit_code == 3
         yield Path.cwd()
 
@@ -194,7 +194,6 @@ FORCING = ("NO_COLOR", "FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS")
 def test_what_is_not_for_a_terminal_has_no_colours():
     script = """
 from springbeam.cli import app
-from springbeam.cli.run import _ProgressBar
 for line in ("--help", "scenes", "run sotf", "rnu"):
     try:
         app(line.split())

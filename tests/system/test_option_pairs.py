@@ -1,6 +1,7 @@
 """Every pair of options of a run: it ends well, with complete files, or is refused by one clear error."""
 
 import json
+from contextlib import nullcontext
 from itertools import combinations
 from pathlib import Path
 
@@ -9,7 +10,6 @@ import tomli_w
 from commands import Interrupt, command
 from scenes import completed
 
-from springbeam.cli.run import _ProgressBar
 from springbeam.results.reading import load_trajectory
 from springbeam.run.ledger import bounds
 from springbeam.scene import with_changes
@@ -77,7 +77,7 @@ def test_a_pair_runs_or_is_refused(tmp_path, monkeypatch, pair):
     output = ["--no-plots"] + ["--json"] * ("json" in pair)
     if "resume" in pair:
         interrupt = Interrupt(6)
-        monkeypatch.setattr(_ProgressBar, "__call__", lambda *_: interrupt())
+        monkeypatch.setattr("springbeam.cli.run._progress", lambda *_, **__: nullcontext(lambda *_: interrupt()))
     result = command(*arguments, *output)
 
     if result.exit_code == 2:

@@ -7,6 +7,7 @@ import json
 import os
 import tempfile
 import warnings
+from contextlib import nullcontext
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,6 @@ from commands import Interrupt, command
 from hypothesis import HealthCheck, event, given, seed, settings
 from hypothesis import strategies as st
 
-from springbeam.cli.run import _ProgressBar
 from springbeam.results.reading import load_trajectory
 from springbeam.studies.stability.cells import PARAMETERS, scene_dict
 
@@ -62,7 +62,7 @@ def test_a_random_scene_is_done_or_stops_by_name(tables):
         path.write_text(tomli_w.dumps(tables))
         with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patch:
             # Adaptive steps may be small, and bouncing without end.
-            patch.setattr(_ProgressBar, "__call__", Interrupt(MOST_STEPS))
+            patch.setattr("springbeam.cli.run._progress", lambda *_, **__: nullcontext(Interrupt(MOST_STEPS)))
             warnings.simplefilter("error")  # numpy's, of overflow
             result = command("run", path, "--out", out, "--no-plots")
         event(f"exit code {result.exit_code}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from itertools import islice
 from math import inf
 from pathlib import Path
@@ -24,6 +24,7 @@ from ..results.reading import load_events, load_summary, load_trajectory
 from ..results.totals import in_words
 from ..results.trajectory import Event, Trajectory, rounded
 from ..run.checkpoint import Checkpoint
+from ..run.outcome import Progress
 from ..scene import Scene, load_scene
 from ..scene.suspicions import implausible
 from .common import (
@@ -221,7 +222,7 @@ def _run_into(
 
     t_end = recorder.scene.time.t_end
 
-    with recorder, _ProgressBar(t_end, quiet=quiet) as progress:
+    with recorder, _progress(t_end, quiet=quiet) as progress:
         try:
             if made is not None:
                 recorder.write(made)
@@ -245,36 +246,21 @@ def _run_into(
             return f"{what} (reached t = {reached:.9g} s of {t_end:g} s); what was computed is in {directory.path}{how}"
 
 
-class _ProgressBar:
-    """Shows simulated time, phase and speed on stderr, if that is a terminal."""
+@contextmanager
+def _progress(t_end: float, *, quiet: bool) -> Iterator[Progress]:
+    """Show simulated time, phase and speed on stderr, if that is a terminal."""
+    state, left = TextColumn("{task.fields[state]}"), TimeRemainingColumn()
+    with progress_bar(BarColumn(bar_width=20), TaskProgressColumn(), state, left, quiet=quiet) as bar:
+        task = bar.add_task("", total=t_end, state="starting")
+        start = shown = monotonic()
 
-    def __init__(self, t_end: float, *, quiet: bool) -> None:
-        self._bar = progress_bar(
-            BarColumn(bar_width=20),
-            TaskProgressColumn(),
-            TextColumn("{task.fields[state]}"),
-            TimeRemainingColumn(),
-            quiet=quiet,
-        )
-        self._t_end = t_end
-        self._task = self._bar.add_task("", total=t_end, state="starting")
-        self._start = self._shown = monotonic()
+        def show(time: float, phase: str, macro_steps: int) -> None:
+            nonlocal shown
+            if not bar.disable and (now := monotonic()) - shown >= _REFRESH_SECONDS:
+                shown, speed = now, macro_steps / (now - start)
+                bar.update(task, completed=time, state=f"t = {time:.4g}/{t_end:g} s  {phase:<7}{speed:7.0f} steps/s")
 
-    def __enter__(self) -> _ProgressBar:
-        self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
-
-    def __call__(self, time: float, phase: str, macro_steps: int) -> None:
-        now = monotonic()
-        if self._bar.disable or now - self._shown < _REFRESH_SECONDS:
-            return
-        self._shown = now
-        speed = macro_steps / (now - self._start)
-        state = f"t = {time:.4g}/{self._t_end:g} s  {phase:<7}{speed:7.0f} steps/s"
-        self._bar.update(self._task, completed=time, state=state)
+        yield show
 
 
 # -- in words ----------------------------------------------------------------------------------------------------------

@@ -28,7 +28,6 @@ from .laws import Phase, Watch, law_of
 from .oscillators import GAUSS, STAGES
 from .quasi_static import QuasiStaticForm, QuasiStaticSystem
 from .rows import Rows
-from .semi_discrete import modal_beam
 from .transitions import HybridState
 
 __all__ = ["ReferenceFailure", "refuse", "simulate"]
@@ -39,6 +38,10 @@ _AT_ONCE = 20
 _MOST_EVENTS = 100_000
 #: Rows of a scene that gives tolerances instead of a macro step.
 _SAMPLES = 1000
+#: A turn whose value is a smaller share of how much the nodes vary is looked at exactly.
+_CLOSE = 1e-6
+#: Takes values at the nodes of a segment to the Legendre coefficients of the polynomial through them.
+_TO_LEGENDRE = np.linalg.inv(legendre.legvander(2.0 * np.r_[0.0, GAUSS.nodes, 1.0] - 1.0, STAGES + 1))
 
 
 def simulate(
@@ -103,9 +106,10 @@ def refuse(scene: Scene) -> None:
 
 class _Run:
     def __init__(self, scene: Scene, velocity_perturbation: float, t_end: float | None) -> None:
-        self.scene, self.system = scene, _system(scene)
+        self.scene, self.system, self._form = scene, HybridSystem(scene), LinearForm
+        if scene.massless:
+            self.system, self._form = QuasiStaticSystem(scene), QuasiStaticForm
         self.t_end = scene.time.t_end if t_end is None else min(t_end, scene.time.t_end)
-        self._form = QuasiStaticForm if isinstance(self.system, QuasiStaticSystem) else LinearForm
         self._forms: dict[Phase, LinearForm] = {}
         self.counts = {"steps": 0, "phases": 0}
         time, X = initial(self.system, velocity_perturbation)
@@ -128,7 +132,7 @@ class _Run:
             target = min(self._due[0] if self._due else self.t_end, self._kink)
             segment = self._propagator.advance(max(target - state.time, 1e-16 * self.t_end), 4.0 * np.spacing(target))
             self.counts["steps"] += 1
-            found = self._locator.first(segment)
+            found = first_event(self.system, state.phase, self._watched, segment)
             if found is None:
                 reach, end = segment.size, self._phase_start + self._propagator.elapsed
                 for exact in (self._kink, target):
@@ -185,7 +189,7 @@ class _Run:
         return len(self._happened) >= at_once and self._happened[-at_once] == self.state.time
 
     def _begin_phase(self) -> None:
-        self._locator = EventLocator(self.system, self.state.phase, self.state.watched())
+        self._watched = self.state.watched()
         self._begin_piece()
 
     def _begin_piece(self) -> None:
@@ -200,12 +204,6 @@ class _Run:
     def _summary(self, wall_time: float) -> dict[str, Any]:
         counts = {**self.counts, "events": len(self.state.events)}
         return {"reference": "event_driven", "wall_time": wall_time, "counts": counts}
-
-
-def _system(scene: Scene) -> HybridSystem:
-    if scene.massless:
-        return QuasiStaticSystem(scene)
-    return HybridSystem(scene, None if scene.beam is None else modal_beam(scene.beam))
 
 
 def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
@@ -272,57 +270,37 @@ def _at_rest(s: HybridSystem) -> np.ndarray:
     return X
 
 
-class EventLocator:
-    """Watches one phase from its start on.
+def first_event(
+    s: HybridSystem, phase: Phase, watched: Iterable[Watch], segment: Segment
+) -> tuple[Watch, float] | None:
+    """Return the event of a phase that comes first in a segment, and when, after its start [s]; ``None`` without one.
 
-    A function that starts at zero, as after its own event, is watched from where it first exceeds rounding.
+    A function that starts at zero, as after its own event, counts from where it exceeds rounding.
     """
-
-    def __init__(self, system: HybridSystem, phase: Phase, watched: Iterable[Watch]) -> None:
-        self._system, self._phase, self._watched = system, phase, list(watched)
-        self._armed: set[str] = set()  #: names of the functions that have exceeded rounding
-
-    def first(self, segment: Segment) -> tuple[Watch, float] | None:
-        """Return the earliest event in a segment and when, after its start [s]; ``None`` if there is none."""
-        motion = self._system.motion(self._phase, segment.states)
-        crossings = [(watch, self._crossing(segment, watch, watch.function(motion))) for watch in self._watched]
-        return min(((watch, tau) for watch, tau in crossings if tau is not None), key=itemgetter(1), default=None)
-
-    def _crossing(self, segment: Segment, watch: Watch, values: np.ndarray) -> float | None:
-        """Return where a function, whose ``values`` at the nodes are given, first falls through zero."""
-
-        def g(tau: float) -> float:
-            return float(watch.function(self._system.motion(self._phase, segment.state(tau))))
-
-        noise = self._system.noise(watch.unit, segment.states[0])
-        turns, there = _turns(segment.size, values)
-        close = np.abs(there) <= _CLOSE * np.ptp(values)
-        there[close] = [g(tau) for tau in turns[close]]
-        order = np.argsort(np.r_[segment.nodes, turns])
-        times, values = np.r_[segment.nodes, turns][order], np.r_[values, there][order]
-        clear = np.abs(values) > noise
-        if watch.name not in self._armed:
-            begin = int(np.argmax(clear))
-            if values[begin] <= noise:
-                return 0.0 if values[begin] < -noise else None
-            self._armed.add(watch.name)
-            times, values, clear = times[begin:], values[begin:], clear[begin:]
-        if not np.any(below := clear & (values < 0.0)):
-            return None
-        k = int(np.argmax(below))
-        low, high = float(times[max(k - 1, 0)]), float(times[k])
-        if (
-            g(low) <= 0.0 or g(high) >= 0.0
-        ):  # what the nodes have and the exact state differ by less than either's error
-            return low if g(low) <= 0.0 else high
-        # A root at a segment's very start needs no more than the rounding of the segment.
-        return float(brentq(g, low, high, xtol=1e-16 * high, rtol=8.9e-16, maxiter=200))
+    motion = s.motion(phase, segment.states)
+    crossings = [(watch, _crossing(s, phase, watch, segment, watch.function(motion))) for watch in watched]
+    return min(((watch, tau) for watch, tau in crossings if tau is not None), key=itemgetter(1), default=None)
 
 
-#: A turn whose value is a smaller share of how much the nodes vary is looked at exactly.
-_CLOSE = 1e-6
-#: Takes values at the nodes of a segment to the Legendre coefficients of the polynomial through them.
-_TO_LEGENDRE = np.linalg.inv(legendre.legvander(2.0 * np.r_[0.0, GAUSS.nodes, 1.0] - 1.0, STAGES + 1))
+def _crossing(s: HybridSystem, phase: Phase, watch: Watch, segment: Segment, values: np.ndarray) -> float | None:
+    """Return where a function, whose ``values`` at the nodes are given, first falls through zero."""
+
+    def g(tau: float) -> float:
+        return float(watch.function(s.motion(phase, segment.state(tau))))
+
+    turns, there = _turns(segment.size, values)
+    close = np.abs(there) <= _CLOSE * np.ptp(values)
+    there[close] = [g(tau) for tau in turns[close]]
+    order = np.argsort(np.r_[segment.nodes, turns])
+    times, values = np.r_[segment.nodes, turns][order], np.r_[values, there][order]
+    below = np.flatnonzero(values < -s.noise(watch.unit, segment.states[0]))
+    if not len(below):
+        return None
+    low, high = float(times[max(below[0] - 1, 0)]), float(times[below[0]])
+    if g(low) <= 0.0 or g(high) >= 0.0:  # what the nodes have and the exact state differ by less than either's error
+        return low if g(low) <= 0.0 else high
+    # A root at a segment's very start needs no more than the rounding of the segment.
+    return float(brentq(g, low, high, xtol=1e-16 * high, rtol=8.9e-16, maxiter=200))
 
 
 def _turns(size: float, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

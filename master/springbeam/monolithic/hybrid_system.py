@@ -22,7 +22,7 @@ import numpy as np
 
 from ..scene import Scene, Spring, Stop
 from .laws import Motion, Phase, law_of
-from .semi_discrete import Loads, ModalBeam
+from .semi_discrete import Loads, ModalBeam, modal_beam
 
 #: What rounding leaves of a sum that is exactly zero, as a share of its terms.
 NOISE = 16.0 * float(np.finfo(float).eps)
@@ -33,10 +33,11 @@ class ReferenceFailure(RuntimeError):
 
 
 class HybridSystem:
-    """Equations of motion, energies and interface forces of a scene, phase by phase; ``beam`` is its beam's modes."""
+    """Equations of motion, energies and forces of a scene, phase by phase; of its own beam's modes, or of ``beam``."""
 
-    def __init__(self, scene: Scene, beam: ModalBeam | None) -> None:
-        self.scene, self.law, self.beam = scene, law_of(scene), beam
+    def __init__(self, scene: Scene, beam: ModalBeam | None = None) -> None:
+        self.scene, self.law = scene, law_of(scene)
+        self.beam = modal_beam(scene.beam) if beam is None and scene.beam is not None else beam
         self.has_spring = scene.spring is not None
         #: Without a spring its terms vanish; a tip above no wall then is joined to an end that has no mass.
         self.spring = scene.spring or Spring(mass=1.0, linear_stiffness=0.0)

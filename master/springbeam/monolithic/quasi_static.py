@@ -98,7 +98,7 @@ class QuasiStaticForm(LinearForm):
                 "external_force": spring.external_force + float(system.load[0]),
             }
             spring = spring.model_copy(update=added)
-        alone = HybridSystem(system.scene.model_copy(update={"upper": None, "lower": spring}), None)
+        alone = HybridSystem(system.scene.model_copy(update={"upper": None, "lower": spring}))
         super().__init__(alone, Phase("free", phase.seated))
         self._pair, self._pair_phase = system, phase
         self._relaxing = not joined and system.alpha_b > 0.0

@@ -67,9 +67,7 @@ class SemiDiscreteBeam:
     @property
     def tip_vector(self) -> np.ndarray:
         """e, with eᵀq = u(L)."""
-        e = np.zeros(self.size)
-        e[self.tip] = 1.0
-        return e
+        return np.asarray(np.eye(1, self.size, self.tip)[0])
 
     def interpolated(self, fractions: np.ndarray, of_u: int, *, slopes: bool = False) -> sp.csr_matrix:
         """Return the (k, 2N) matrix that takes q to θ or, with ``of_u`` = 1, u at k ``fractions`` of the length.

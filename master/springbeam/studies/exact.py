@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
+from scipy.linalg import block_diag, expm
 from scipy.special import beta, ellipk, lambertw
 
 from ..scene import Beam, Scene, scene_from_dict
@@ -115,19 +115,12 @@ def linked(scene: Scene, M: np.ndarray, K: np.ndarray, q: np.ndarray, v: np.ndar
     assert scene.beam is not None
     assert scene.spring is not None
     spring, law, n = scene.spring, scene.contact, len(M) + 1
-    mass, damping, stiffness = (np.zeros((n, n)) for _ in range(3))
-    mass[:-1, :-1], damping[:-1, :-1], stiffness[:-1, :-1] = M, scene.beam.alpha_b * K, K
-    mass[-1, -1], damping[-1, -1], stiffness[-1, -1] = spring.mass, spring.damping, spring.linear_stiffness
-    g = np.zeros(n)
-    g[-1], g[-2] = 1.0, -1.0
-    damping += law.damping * np.outer(g, g)
-    stiffness += law.stiffness * np.outer(g, g)
-    start = np.append(q, spring.equilibrium), np.append(v, spring.initial_velocity)
-    size = 2 * n + 1
-    A = np.zeros((size, size))  # of displacements, velocities and 1
-    A[:n, n : 2 * n] = np.eye(n)
-    load = np.zeros((n, 1))
-    load[-1] = spring.external_force
-    A[n : 2 * n] = -np.linalg.solve(mass, np.hstack([stiffness, damping, -load]))
-    states = np.array([expm(A * t) @ np.concatenate([*start, [1.0]]) for t in times])
-    return states[:, [n - 2, n - 1]]
+    joint = np.pad([[1.0, -1.0], [-1.0, 1.0]], (n - 2, 0))  # gᵀg
+    mass = block_diag(M, spring.mass)
+    damping = block_diag(scene.beam.alpha_b * K, spring.damping) + law.damping * joint
+    stiffness = block_diag(K, spring.linear_stiffness) + law.stiffness * joint
+    load = np.append(np.zeros(n - 1), spring.external_force)[:, None]
+    rates = np.linalg.solve(mass, np.hstack([-stiffness, -damping, load]))
+    A = np.vstack([np.eye(n, 2 * n + 1, n), rates, np.zeros(2 * n + 1)])  # of displacements, velocities and 1
+    start = np.concatenate([q, [spring.equilibrium], v, [spring.initial_velocity, 1.0]])
+    return np.array([(expm(A * t) @ start)[[n - 2, n - 1]] for t in times])

@@ -18,7 +18,6 @@ from scipy.integrate import solve_ivp
 from ..monolithic.event_driven import initial
 from ..monolithic.hybrid_system import HybridSystem, ReferenceFailure
 from ..monolithic.laws import Phase, Watch
-from ..monolithic.semi_discrete import modal_beam
 from ..monolithic.transitions import HybridState
 from ..scene import Scene
 
@@ -47,7 +46,7 @@ class Rival:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._system = HybridSystem(scene, None if scene.beam is None else modal_beam(scene.beam))
+        self._system = HybridSystem(scene)
         self._phases: dict[Phase, _Phase] = {}
 
     def solve(

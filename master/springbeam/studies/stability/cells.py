@@ -6,7 +6,6 @@ at rest. Every cell is a scene of its own; the same seed gives the same cells.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -100,34 +99,27 @@ AT_REST: dict[str, Any] = {
 }
 
 
-@dataclass(frozen=True)
-class Slice:
-    """Two axes over their ranges, everything else at rest but for ``fixed``."""
-
-    name: str
-    x: str
-    y: str
-    fixed: dict[str, Any] = field(default_factory=dict)
-
-
-SLICES = (
-    Slice("energy 0", "macro_step", "stiffness"),
-    Slice("energy 2", "macro_step", "stiffness", {"coupling": ("transmission", "energy", 2)}),
-    Slice("hermite 2", "macro_step", "mass", {"coupling": ("transmission", "hermite", 2)}),
-    Slice("jacobi 0", "macro_step", "contact_stiffness", {"coupling": ("compliance", "jacobi", 0)}),
-    Slice("compliance energy", "macro_step", "contact_stiffness", {"coupling": ("compliance", "energy", 0)}),
-    Slice("compliance energy 2", "macro_step", "contact_stiffness", {"coupling": ("compliance", "energy", 2)}),
-    Slice(
-        "damped compliance energy 2", "contact_damping", "contact_stiffness", {"coupling": ("compliance", "energy", 2)}
+#: Two axes over their ranges by the name of the slice, and what else is not at rest.
+SLICES: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "energy 0": ("macro_step", "stiffness", {}),
+    "energy 2": ("macro_step", "stiffness", {"coupling": ("transmission", "energy", 2)}),
+    "hermite 2": ("macro_step", "mass", {"coupling": ("transmission", "hermite", 2)}),
+    "jacobi 0": ("macro_step", "contact_stiffness", {"coupling": ("compliance", "jacobi", 0)}),
+    "compliance energy": ("macro_step", "contact_stiffness", {"coupling": ("compliance", "energy", 0)}),
+    "compliance energy 2": ("macro_step", "contact_stiffness", {"coupling": ("compliance", "energy", 2)}),
+    "damped compliance energy 2": (
+        "contact_damping",
+        "contact_stiffness",
+        {"coupling": ("compliance", "energy", 2)},
     ),
-    Slice("link energy 1", "macro_step", "contact_stiffness", {"coupling": ("link", "energy", 1)}),
-    Slice("tie energy 2", "macro_step", "mass", {"coupling": ("tie", "energy", 2)}),
-    Slice("compliance exponents", "exponent", "contact_stiffness", {"coupling": ("compliance", "energy", 0)}),
-    Slice("hardening", "speed", "k2", {"k2_kind": "hardening", "coupling": ("transmission", "energy", 1)}),
-    Slice("shear", "shear_ratio", "alpha_b", {"coupling": ("transmission", "energy", 1)}),
-    Slice("stop", "stop_depth", "restitution", {"coupling": ("transmission", "energy", 2), "alpha_s": 0.1}),
-    Slice("quasi-static", "macro_step", "stiffness", {"fidelity": "quasi_static", "external_force": 1.0}),
-)
+    "link energy 1": ("macro_step", "contact_stiffness", {"coupling": ("link", "energy", 1)}),
+    "tie energy 2": ("macro_step", "mass", {"coupling": ("tie", "energy", 2)}),
+    "compliance exponents": ("exponent", "contact_stiffness", {"coupling": ("compliance", "energy", 0)}),
+    "hardening": ("speed", "k2", {"k2_kind": "hardening", "coupling": ("transmission", "energy", 1)}),
+    "shear": ("shear_ratio", "alpha_b", {"coupling": ("transmission", "energy", 1)}),
+    "stop": ("stop_depth", "restitution", {"coupling": ("transmission", "energy", 2), "alpha_s": 0.1}),
+    "quasi-static": ("macro_step", "stiffness", {"fidelity": "quasi_static", "external_force": 1.0}),
+}
 
 
 def sampled_cells(count: int, seed: int) -> list[dict[str, Any]]:
@@ -140,10 +132,10 @@ def slice_cells(resolution: int) -> list[dict[str, Any]]:
     """Return ``resolution``² cells of each of `SLICES`, both ends of the ranges included."""
     grids = {axis.name: axis.grid(resolution) for axis in PARAMETERS if axis.low != axis.high} if resolution else {}
     return [
-        {"slice": s.name, **AT_REST, **s.fixed, s.x: x, s.y: y}
-        for s in SLICES
-        for x in grids.get(s.x, ())
-        for y in grids.get(s.y, ())
+        {"slice": name, **AT_REST, **fixed, across: x, up: y}
+        for name, (across, up, fixed) in SLICES.items()
+        for x in grids.get(across, ())
+        for y in grids.get(up, ())
     ]
 
 

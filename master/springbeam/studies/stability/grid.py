@@ -104,20 +104,21 @@ class Grid(Study):
         from ..picture import Scale, cells, column, panels
 
         rows, figures = self.rows(records), Pictures()
-        slices = [s for s in SLICES if any(row["slice"] == s.name for row in rows)]
+        slices = [name for name in SLICES if any(row["slice"] == name for row in rows)]
         looks: dict[str, dict[str, Any]] = {
             "classes": {"cmap": ListedColormap(_COLOURS), "vmin": -0.5, "vmax": len(CLASSES) - 0.5},
             "residuals": {"cmap": matplotlib.colormaps["cividis"], "norm": LogNorm(*_RESIDUALS, clip=True)},
         }
         for what, look in looks.items() if slices else ():
             figure, axes = panels(len(slices), 4, (4.2, 3.6), f"Slices through the extremes: {what}")
-            for ax, s in zip(axes, slices, strict=True):
-                mine = [row for row in rows if row["slice"] == s.name]
+            for ax, name in zip(axes, slices, strict=True):
+                mine = [row for row in rows if row["slice"] == name]
+                x, y = (Scale(parameter, parameter, words=True) for parameter in SLICES[name][:2])
                 values = np.maximum(column(mine, "residual"), _RESIDUALS[0])
                 if what == "classes":
                     values = np.array([CLASSES.index(row["kind"]) for row in mine], dtype=float)
-                drawn = cells(ax, mine, Scale(s.x, s.x, words=True), Scale(s.y, s.y, words=True), values, **look)
-                ax.set(title=s.name, facecolor=STONE)  # where nothing was run
+                drawn = cells(ax, mine, x, y, values, **look)
+                ax.set(title=name, facecolor=STONE)  # where nothing was run
                 ax.tick_params(labelsize="small")
                 ax.tick_params(axis="x", labelrotation=30)
             bar = figure.colorbar(drawn, ax=axes, shrink=0.6)
