@@ -332,6 +332,18 @@ def test_the_order_of_the_frequencies_is_twice_the_degree(degree, n, reduced):
     assert np.all(np.abs(judged - 2 * degree) < 0.08 * degree)
 
 
+@pytest.mark.parametrize("n_modes", [1, 8])
+def test_a_beam_of_few_modes_starts_and_answers_static_forces_as_that_of_all(n_modes):
+    """Three shapes beside the modes: those of a tip force and of a uniform load, and the start u = x."""
+    given = beam(4.0, 9.0, n_elements=30, n_modes=n_modes, distributed_load=-2.0)
+    few, every = modal_beam(given), modal_beam(given.model_copy(update={"n_modes": 0}))
+    assert len(few.omega) == n_modes + 3
+    for force in ("tip", "load"):
+        expected, found = (m.basis @ (getattr(m, force) / m.omega**2) for m in (every, few))
+        np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
+    np.testing.assert_allclose(few.basis @ few.slope_shape, assemble(given).slope_shape, atol=1e-12)
+
+
 @pytest.mark.parametrize(("metre", "second"), [(1e-9, 1.0), (1.0, 1e-9), (1e3, 1.0)])
 def test_units_do_not_matter(metre, second):
     """Rotations are then far larger than displacements: the sparse modes of a beam of micrometres were lost."""
