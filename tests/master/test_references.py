@@ -338,6 +338,8 @@ def test_a_beam_of_few_modes_starts_and_answers_static_forces_as_that_of_all(n_m
     given = beam(4.0, 9.0, n_elements=30, n_modes=n_modes, distributed_load=-2.0)
     few, every = modal_beam(given), modal_beam(given.model_copy(update={"n_modes": 0}))
     assert len(few.omega) == n_modes + 3
+    shears = beam(1e14, 9.0, n_elements=30, n_modes=n_modes)  # u = x is what a tip force makes of it
+    assert len(modal_beam(shears).omega) == n_modes + 2
     for force in ("tip", "load"):
         expected, found = (m.basis @ (getattr(m, force) / m.omega**2) for m in (every, few))
         np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())

@@ -99,6 +99,11 @@ AT_REST: dict[str, Any] = {
 }
 
 
+#: Of the axes that slices have; others are numbers.
+UNITS = {
+    "macro_step": "s", "stiffness": "N", "mass": "kg", "k2": "N/m³", "contact_stiffness": "N/mᵖ",
+    "contact_damping": "s/m", "alpha_b": "s", "speed": "m/s", "stop_depth": "m",
+}  # fmt: skip
 #: Two axes over their ranges by the name of the slice, and what else is not at rest.
 SLICES: dict[str, tuple[str, str, dict[str, Any]]] = {
     "energy 0": ("macro_step", "stiffness", {}),

@@ -20,7 +20,7 @@ from ...pictures.drawing import BLACK, BLUE, GREEN, ORANGE, SKY, STONE
 from ...scene import SceneError
 from ..study import Findings, Pictures, Row, Study
 from ..tables import table
-from .cells import COUPLINGS, SLICES, sampled_cells, scene_dict, slice_cells
+from .cells import COUPLINGS, SLICES, UNITS, sampled_cells, scene_dict, slice_cells
 from .outcome import CLASSES, ended, run_cell
 
 #: Of `CLASSES`; residuals outside are drawn in the colours of the ends.
@@ -113,7 +113,8 @@ class Grid(Study):
             figure, axes = panels(len(slices), 4, (4.2, 3.6), f"Slices through the extremes: {what}")
             for ax, name in zip(axes, slices, strict=True):
                 mine = [row for row in rows if row["slice"] == name]
-                x, y = (Scale(parameter, parameter, words=True) for parameter in SLICES[name][:2])
+                labels = {parameter: f"{parameter} [{UNITS.get(parameter, '–')}]" for parameter in SLICES[name][:2]}
+                x, y = (Scale(parameter, label, words=True) for parameter, label in labels.items())
                 values = np.maximum(column(mine, "residual"), _RESIDUALS[0])
                 if what == "classes":
                     values = np.array([CLASSES.index(row["kind"]) for row in mine], dtype=float)
