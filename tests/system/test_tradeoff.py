@@ -194,3 +194,9 @@ def test_the_implicit_methods_get_the_jacobian(method):
         step = 1e-6 * np.eye(82)[k]
         column = (phase.rhs(0.0, X + step) - phase.rhs(0.0, X - step)) / 2e-6
         assert phase.jacobian(0.0, X)[:, k] == pytest.approx(column, rel=1e-6, abs=1e-4 * np.abs(column).max())
+
+
+def test_bounces_that_die_out_end_no_comparison():
+    """The last of them are microseconds apart: another one comes first if the initial velocity changes a little."""
+    scene = with_changes(load_scene("beam-on-stop"), beam={"n_elements": 20})
+    assert Tradeoff.of(scene).scene.time.t_end == 1.0

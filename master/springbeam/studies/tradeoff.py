@@ -25,7 +25,7 @@ from ..run.runner import simulate
 from ..scene import Scene, SceneError, with_changes
 from ..scene.resolution import mesh_frequency, slowest_frequency
 from ..scene.tables import ALL_MODES_UP_TO
-from .comparison import comparable_until
+from .comparison import SHORT_SHARE, comparable_until
 from .design import RIGID, SOFT
 from .metrics import costs, errors, motion_errors, worst
 from .rivals import TOLERANCES, Rival
@@ -42,8 +42,6 @@ _TIMED_ONCE = 3.0
 _TIMES = 401
 #: Methods whose steps are stable up to a few radians of the fastest mode, and how many radians they are let go [rad].
 _EXPLICIT, _MOST_TURNS = ("DOP853", "LSODA"), 1e5
-#: Contacts shorter than this share of the time are no evidence either way.
-_SHORT = 2e-3
 #: Relative errors for which the cheapest configuration is named.
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8)
 
@@ -157,7 +155,7 @@ class Tradeoff(Study):
             **costs(run),
             "unknowns": 0 if scene.beam is None else scene.beam.modes_kept,
             "cost_macro_steps": int(run.summary.get("macro_steps", 0)),
-            **errors(run, reference, _SHORT * (self.times[-1] - self.times[0])),
+            **errors(run, reference, SHORT_SHARE * (self.times[-1] - self.times[0])),
         }
 
     def _by_scipy(self, case: Row) -> Row:
