@@ -40,12 +40,14 @@ def a_trajectory(scene=PAIR, n=400, events=(), **columns):
     for i, name in enumerate(columns_of(scene)):
         made.setdefault(name, 1e-2 * np.sin((i + 3.0) * t))
     made |= {"time": t, "phase": np.where(np.sin(20.0 * t) > 0.0, "tied", "free")} | columns
-    shapes, inner = None, {}
-    if scene.beam is not None:
-        shapes = (t, np.outer(np.sin(9.0 * t), SHAPE_POINTS**2))
-        inner = dict.fromkeys(("bending_moment", "shear_force"), np.zeros_like(shapes[1]))
+    shapes = None if scene.beam is None else shape_table(t, np.outer(np.sin(9.0 * t), SHAPE_POINTS**2))
     ordered = {name: made[name] for name in columns_of(scene)}
-    return Trajectory(scene, ordered, list(events), shapes, {}, **inner)
+    return Trajectory(scene, ordered, list(events), shapes)
+
+
+def shape_table(t, deflection):
+    """Deflections along the beam at the times ``t``, without moments and shear forces."""
+    return np.column_stack([t, deflection, np.zeros((len(t), 42))])
 
 
 def block(n=300, scene=PAIR, t_end=3.0, begin=0):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from matplotlib.axes import Axes
 from matplotlib.image import imread
-from runs import EVERY_EVENT, ODD_COLUMNS, PAIR, SCENES, a_trajectory
+from runs import EVERY_EVENT, ODD_COLUMNS, PAIR, SCENES, a_trajectory, shape_table
 
 from springbeam import Event, with_changes
 from springbeam.pictures import plots, timeline
@@ -49,7 +49,7 @@ def test_a_scene_gets_the_pictures_of_what_it_has(tmp_path, unpainted, has):
 def test_a_run_that_stopped_at_once_is_drawn_from_its_second_row_on(tmp_path, unpainted, rows, drawn):
     whole = a_trajectory()
     columns = {name: values[:rows] for name, values in whole.columns.items()}
-    short = dataclasses.replace(whole, columns=columns, shapes=tuple(values[:rows] for values in whole.shapes))
+    short = dataclasses.replace(whole, columns=columns, shape_table=whole.shape_table[:rows])
     assert [path.name for path in plot_run(short, tmp_path)] == drawn
 
 
@@ -102,7 +102,7 @@ SAID = {
 def test_shapes_too_far_apart_for_the_motion_say_so(what):
     picture, columns, shapes, words, there = SAID[what]
     run = a_trajectory(**columns)
-    figure = figure_of(run if shapes is None else dataclasses.replace(run, shapes=(T, shapes)), picture)
+    figure = figure_of(run if shapes is None else dataclasses.replace(run, shape_table=shape_table(T, shapes)), picture)
     assert any(words in " ".join(text.split()) for text in texts(figure)) is there
     if what == "flips":
         assert {curve[-1, 1] for curve in figure.axes[0].collections[0].get_segments()} == {-1.0, 1.0}

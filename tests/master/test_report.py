@@ -175,7 +175,7 @@ def test_the_page_opens_with_the_scene_the_motion_and_the_results():
 def test_frames_are_the_recorded_shapes_with_the_spring_of_the_same_time():
     run = a_trajectory()
     times = run.time[::3]
-    sparse = dataclasses.replace(run, shapes=(times, run.shapes[1][::3]))
+    sparse = dataclasses.replace(run, shape_table=run.shape_table[::3])
     motion = shown(sparse).data["motion"]
     assert "motion-beam" not in motion["parts"]
     assert motion["time"] == pytest.approx(times, rel=1e-8)
@@ -237,9 +237,9 @@ def test_every_chart_of_a_run_that_is_not_resolved_carries_the_mark():
 @pytest.mark.parametrize("scene", [PAIR, SCENES["no beam"]], ids=["pair", "spring"])
 def test_a_run_that_stopped_at_once_has_a_page(scene, rows):
     whole = a_trajectory(scene)
-    shapes = None if whole.shapes is None else (whole.shapes[0][:rows], whole.shapes[1][:rows])
+    shapes = None if whole.shape_table is None else whole.shape_table[:rows]
     columns = {name: values[:rows] for name, values in whole.columns.items()}
-    found = shown(dataclasses.replace(whole, columns=columns, shapes=shapes, summary={"status": "stopped"}))
+    found = shown(dataclasses.replace(whole, columns=columns, shape_table=shapes, summary={"status": "stopped"}))
     assert (("slider" in found.ids), found.data is None) == (rows == 2, rows < 2)
     assert "stopped" in found["warnings"]
 

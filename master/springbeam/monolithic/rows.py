@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..results.trajectory import Event, Trajectory, columns_of, shapes_of
+from ..results.trajectory import Event, Trajectory, columns_of
 from ..scene import Scene
 from .laws import Phase
 from .semi_discrete import ModalBeam, assemble, constant_forces, points, unit_forces
@@ -97,7 +97,7 @@ def finished(
     summary["largest_relative_energy_residual"] = largest / scale if scale > 0.0 else 0.0
     ordered = {name: columns[name] for name in (*columns_of(scene), *extra) if name in columns}
     table = None if shapes is None else np.column_stack([columns["time"], shapes])
-    return Trajectory(scene, ordered, events, summary=summary, **shapes_of(table))
+    return Trajectory(scene, ordered, events, summary=summary, shape_table=table)
 
 
 class Clamp:

@@ -31,7 +31,7 @@ from .columns import columns
 from .extremes import Extremes
 from .paths import Path
 from .steps import joined
-from .trajectory import Event, Trajectory, shapes_of
+from .trajectory import Event, Trajectory
 
 #: Fields that are linear between rows, and do not change with an event.
 _LINEAR = (
@@ -52,12 +52,12 @@ def at(run: Trajectory, times: Any) -> Trajectory:
     are known, and for a run that has no steps.
     """
     found = rows_at(run, times)
-    table = run.shape_table()
-    if not len(table):
+    table = run.shape_table
+    if table is None or not len(table):
         return found
     there = np.column_stack([np.interp(found.time, table[:, 0], column) for column in table.T])
     there[:, 0] = found.time
-    return replace(found, **shapes_of(there))
+    return replace(found, shape_table=there)
 
 
 def rows_at(run: Trajectory, times: Any) -> Trajectory:

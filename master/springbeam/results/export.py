@@ -38,8 +38,8 @@ def export(directory: str | Path, form: Literal["csv", "parquet"]) -> list[Path]
     kinds = schema([(name, string() if name == "kind" else float64()) for name in EVENT_COLUMNS])
     events = Table.from_pylist([vars(event) for event in trajectory.events], kinds)
     tables = {PARQUET[0]: table(trajectory.columns), PARQUET[1]: events}
-    if trajectory.shapes is not None:
-        tables[PARQUET[2]] = table(dict(zip(SHAPE_COLUMNS, trajectory.shape_table().T, strict=True)))
+    if trajectory.shape_table is not None:
+        tables[PARQUET[2]] = table(dict(zip(SHAPE_COLUMNS, trajectory.shape_table.T, strict=True)))
     for name, rows in tables.items():
         parquet.write_table(rows, run.path / name)
     return [run.path / name for name in tables]

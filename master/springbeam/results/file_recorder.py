@@ -109,7 +109,9 @@ class FileRecorder(Recorder):
     def write(self, run: Trajectory) -> None:
         """Write a finished run, also one by a reference, which has columns only."""
         recorded = run.steps is not None
-        self.keep(np.empty(0, STEP) if run.steps is None else run.steps, run.events, run.shape_table())
+        steps = np.empty(0, STEP) if run.steps is None else run.steps
+        shapes = np.empty((0, len(SHAPE_COLUMNS))) if run.shape_table is None else run.shape_table
+        self.keep(steps, run.events, shapes)
         self.finish(
             {name: run.summary[name] for name in run.summary.keys() - {"scene", "files"}}, None if recorded else run
         )

@@ -15,7 +15,7 @@ from ..scene import scene_from_dict
 from .directory import ResultsUnreadable, RunDirectory
 from .recording import trajectory_of
 from .steps import steps_of
-from .trajectory import EVENT_COLUMNS, PHASES, SHAPE_COLUMNS, Event, Trajectory, shapes_of
+from .trajectory import EVENT_COLUMNS, PHASES, SHAPE_COLUMNS, Event, Trajectory
 
 
 def load_trajectory(directory: str | Path) -> Trajectory:
@@ -62,7 +62,7 @@ def read_run(run: RunDirectory) -> Trajectory:
     if len(steps) == 0 and run.trajectory.exists():  # it left no records: a reference
         table = _read_table(run.trajectory)
         columns = {name: np.ascontiguousarray(table[name]) for name in table.dtype.names or ()}
-        return Trajectory(scene, columns, events, summary=summary, **shapes_of(shapes))
+        return Trajectory(scene, columns, events, summary=summary, shape_table=shapes)
     # A run that was killed may have written what belongs to records that it has not.
     last, known = (steps["time"][-1], int(steps["events"][-1])) if len(steps) else (-inf, 0)
     if known > len(events):

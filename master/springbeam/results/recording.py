@@ -14,7 +14,7 @@ import numpy as np
 from ..scene import Scene
 from .columns import blocks
 from .steps import STEP
-from .trajectory import SHAPE_COLUMNS, Event, Trajectory, shapes_of
+from .trajectory import SHAPE_COLUMNS, Event, Trajectory
 
 
 class Recorder(ABC):
@@ -100,7 +100,7 @@ def trajectory_of(
     made = list(blocks(scene, steps))
     columns = {name: np.concatenate([block[name] for block in made]) for name in made[0]}
     inside = steps if steps["size"].any() else None
-    return Trajectory(scene, columns, events, summary=summary, steps=inside, **shapes_of(shapes))
+    return Trajectory(scene, columns, events, summary=summary, steps=inside, shape_table=shapes)
 
 
 def with_scene(summary: Mapping[str, Any], scene: Scene) -> dict[str, Any]:

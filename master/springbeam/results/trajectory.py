@@ -114,14 +114,6 @@ class Event:
         object.__setattr__(self, "kind", EventKind(self.kind))
 
 
-def shapes_of(table: np.ndarray | None) -> dict[str, Any]:
-    """Return what a `Trajectory` has of a table of shapes, (n, 64): its ``shapes``, moments and shear forces."""
-    if table is None:
-        return {}
-    deflection, moment, shear = (part.copy() for part in np.split(table[:, 1:], 3, axis=1))
-    return {"shapes": (table[:, 0].copy(), deflection), "bending_moment": moment, "shear_force": shear}
-
-
 EVENT_COLUMNS = tuple(Event.__dataclass_fields__)
 
 
@@ -157,20 +149,16 @@ def rounded(value: float, scale: float) -> str:
 class Trajectory:
     """Columns as numpy arrays under the names of `COLUMNS`: ``trajectory["y"]`` or ``trajectory.y``.
 
-    ``shapes`` holds ``(time, deflection)`` with ``deflection`` of shape (n, 21) [m], or ``None`` without a beam;
-    ``bending_moment`` [N·m], positive where it bends the beam upwards, and ``shear_force`` [N], upward on the part
-    before it, are those of the same times and places.
+    ``shape_table`` has the numbers of `SHAPE_COLUMNS`, shape (n, 64); it is ``None`` without a beam.
     """
 
     scene: Scene
     columns: dict[str, np.ndarray]
     events: list[Event] = field(default_factory=list)
-    shapes: tuple[np.ndarray, np.ndarray] | None = None
+    shape_table: np.ndarray | None = None
     summary: dict[str, Any] = field(default_factory=dict)
     #: What lies between the rows, a step per row (`springbeam.results.steps.STEP`); ``None`` without such data.
     steps: np.ndarray | None = None
-    bending_moment: np.ndarray | None = None
-    shear_force: np.ndarray | None = None
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.columns[name]
@@ -214,11 +202,23 @@ class Trajectory:
         """Return the units of the columns that have one."""
         return {name: unit for name, unit in columns_of(self.scene).items() if unit and name in self.columns}
 
-    def shape_table(self) -> np.ndarray:
-        """Return the numbers of `SHAPE_COLUMNS`, shape (n, 64); without a beam none."""
-        if self.shapes is None or self.bending_moment is None or self.shear_force is None:
-            return np.empty((0, len(SHAPE_COLUMNS)))
-        return np.column_stack([*self.shapes, self.bending_moment, self.shear_force])
+    @property
+    def shapes(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Times [s], shape (n,), and deflections along the beam then [m], (n, 21); ``None`` without a beam."""
+        return None if self.shape_table is None else (self.shape_table[:, 0], self._along(0))
+
+    @property
+    def bending_moment(self) -> np.ndarray | None:
+        """Bending moments [N·m] at the times and places of the shapes, positive where they bend the beam upwards."""
+        return None if self.shape_table is None else self._along(1)
+
+    @property
+    def shear_force(self) -> np.ndarray | None:
+        """Shear forces [N] at the times and places of the shapes, upward on the part before the place."""
+        return None if self.shape_table is None else self._along(2)
+
+    def _along(self, part: int) -> np.ndarray:
+        return np.split(np.asarray(self.shape_table)[:, 1:], 3, axis=1)[part]
 
     def felt(self) -> Trajectory:
         """Return the run without its start, where the beam leans or turns there as its clamp does not let it.
@@ -229,15 +229,8 @@ class Trajectory:
         straight = beam is not None and (beam.initial_deflection_slope, beam.initial_velocity_slope) != (0.0, 0.0)
         if not straight or not later.any():
             return self
-        found = replace(self, columns={name: values[later] for name, values in self.columns.items()})
-        if self.shapes is not None:
-            times, shapes = self.shapes
-            first = int(np.searchsorted(times, self.time[0], side="right"))
-            found.shapes = times[first:], shapes[first:]
-            for name in ("bending_moment", "shear_force"):
-                values = getattr(self, name)
-                setattr(found, name, None if values is None else values[first:])
-        return found
+        columns, table = {name: values[later] for name, values in self.columns.items()}, self.shape_table
+        return replace(self, columns=columns, shape_table=None if table is None else table[table[:, 0] > self.time[0]])
 
     def at(self, times: Any) -> Trajectory:
         """Return the run at any ``times`` [s], shape (n,), with the same columns (`springbeam.results.dense`).
@@ -273,13 +266,9 @@ class Trajectory:
         }
         coordinates = {"time": variables.pop("time")}
         if self.shapes is not None and self.scene.beam is not None:
-            along = {"deflection": (self.shapes[1], "m"), "bending_moment": (self.bending_moment, "N·m")}
-            along["shear_force"] = (self.shear_force, "N")
-            variables |= {
-                name: (("shape_time", "x"), values, {"units": unit})
-                for name, (values, unit) in along.items()
-                if values is not None
-            }
+            along = {"deflection": "m", "bending_moment": "N·m", "shear_force": "N"}
+            for part, (name, unit) in enumerate(along.items()):
+                variables[name] = (("shape_time", "x"), self._along(part), {"units": unit})
             coordinates["shape_time"] = ("shape_time", self.shapes[0], {"units": "s"})
             coordinates["x"] = ("x", SHAPE_POINTS * self.scene.beam.length, {"units": "m"})
         dataset: Dataset = _of_extra("xarray").Dataset(variables, coordinates, {"title": self.scene.title})
