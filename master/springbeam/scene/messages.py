@@ -55,7 +55,8 @@ def filled(scene: Scene, text: str, **numbers: Any) -> str:
 class Rule(NamedTuple):
     """When something is told of a scene, and what; `filled` explains ``text``.
 
-    ``when`` and ``numbers`` get the scene. Of a rule for loads they get scene and load, and ``{load.key}`` is its key.
+    ``when`` and ``numbers`` get the scene, and what of it the rule is for. If ``when`` returns a dict, these are the
+    numbers. ``{load.key}`` is a key of the load that the rule is for.
     """
 
     when: Callable[..., object]
@@ -63,15 +64,18 @@ class Rule(NamedTuple):
     numbers: Callable[..., Mapping[str, Any]] = lambda *of: {}
 
 
-def told(scene: Scene, rules: Iterable[Rule], of_loads: Sequence[Rule] = ()) -> Iterator[str]:
-    """Yield what ``rules`` tell of ``scene``, and ``of_loads`` of each of its loads."""
+def told(scene: Scene, rules: Iterable[Rule], *of: Any) -> Iterator[str]:
+    """Yield what ``rules`` tell of ``scene``, and of what in it they are for."""
     for rule in rules:
-        if rule.when(scene):
-            yield filled(scene, rule.text, **rule.numbers(scene))
+        if found := rule.when(scene, *of):
+            yield filled(scene, rule.text, **(found if isinstance(found, dict) else rule.numbers(scene, *of)))
+
+
+def told_of_loads(scene: Scene, rules: Sequence[Rule]) -> Iterator[str]:
+    """Yield what ``rules`` tell of each load of ``scene``."""
     for number, load in enumerate(scene.loads):
-        for rule in of_loads:
-            if rule.when(scene, load):
-                yield filled(scene, rule.text.replace("{load.", f"{{loads.{number}."), **rule.numbers(scene, load))
+        here = [rule._replace(text=rule.text.replace("{load.", f"{{loads.{number}.")) for rule in rules]
+        yield from told(scene, here, load)
 
 
 def explain(error: Any) -> str:

@@ -8,8 +8,10 @@ its limits. Frequencies are those of the beam, not of its mesh, so that asking c
 from __future__ import annotations
 
 from math import inf, pi, sqrt
+from typing import Any, NamedTuple
 
 from .linearised import spring_frequency, spring_stiffness
+from .messages import Rule, told
 from .scene import Scene
 from .statics import bending_stiffness, locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
 from .tables import ORDINARY_SCHEMES, Beam
@@ -49,6 +51,15 @@ WINDOW = 0.02
 _HIGHER = ", a higher coupling.degree allows longer ones"
 
 
+class _Seen(NamedTuple):
+    """What a run shows of its resolution, as parameters of `not_resolved`."""
+
+    mismatch: float
+    alternation: float
+    shortest_contact: float
+    misplaced: float
+
+
 def not_resolved(
     scene: Scene,
     mismatch: float,
@@ -75,37 +86,11 @@ def not_resolved(
     misplaced
         How far an end is from where a soft law would have it, over its way.
     """
-    H = scene.coupling.macro_step
-    if H is not None:  # steps that follow from tolerances are judged by their error
-        for name, omega, else_ in slow_oscillations(scene):
-            if omega * H > TURN:
-                return (
-                    f"not resolved: the slowest oscillation of the {name} turns {omega * H:.3g} rad in a macro step. "
-                    f"Velocities, forces and times of events are samples of a faster motion; coupling.macro_step <= "
-                    f"{_rounded_down(TURN / omega)} resolves it{else_}"
-                )
-        lost = _law_missed(scene, H, misplaced) or _lags(scene, H)
-        if lost := lost or _unstable(scene, H) or _waves_lag(scene, H):
-            return lost
-    if mismatch > MISMATCH[scene.coupling.degree]:
-        return (
-            f"not resolved: the joined ends' velocities differ where they part or strike the foundation, in all by "
-            f"{100.0 * mismatch:.2g} % of the momentum of a body; what they do then depends on it. "
-            f"{_remedy(scene)}"
-        )
-    if alternation > ALTERNATION:
-        return (
-            "not resolved: the force on joined ends goes up and down from step to step before they part, by "
-            f"{100.0 * alternation:.2g} % of the momentum of a body; it decides when they do. {_remedy(scene)}"
-        )
-    held = scene.contact.rigid or scene.coupling.scheme in ORDINARY_SCHEMES  # a force that does not see the contact end
-    if H is not None and held and shortest_contact < SHORT * H:
-        return (
-            f"not resolved: a contact lasts {shortest_contact / H:.2g} macro steps only, so that the force of one or "
-            "two steps decides when it ends, and with it what follows; coupling.macro_step <= "
-            f"{_rounded_down(shortest_contact / SHORT)} resolves it"
-        )
-    return None
+    seen = _Seen(mismatch, alternation, shortest_contact, misplaced)
+    of_steps = (
+        () if scene.coupling.adaptive else _OF_STEPS
+    )  # those that follow from tolerances are judged by their error
+    return next(told(scene, (*of_steps, *_OF_ENDS), seen), None)
 
 
 def lateness(scene: Scene, turn: float) -> float:
@@ -119,34 +104,49 @@ def _force_degree(scene: Scene) -> int:
     return scene.coupling.degree if scene.coupling.scheme == "energy" else 0
 
 
-def _law_missed(scene: Scene, H: float, misplaced: float) -> str | None:
-    """Return in words why the forces of steps of H [s] miss a soft law too far; ``None`` if they do not.
+def _too_fast(scene: Scene, seen: _Seen) -> dict[str, Any]:
+    """Return what turns too far in a macro step, nothing if all is slower."""
+    H = scene.coupling.H
+    found = (
+        {"name": name, "turn": omega * H, "size": _rounded_down(TURN / omega), "otherwise": otherwise}
+        for name, omega, otherwise in slow_oscillations(scene)
+        if omega * H > TURN
+    )
+    return next(found, {})
+
+
+def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
+    """Return how far the forces of the steps miss a soft law, nothing if they keep close to it.
 
     Waves that the steps do not follow let ``misplaced`` fall with the square of H only.
     """
-    excess = misplaced / MISPLACED[_force_degree(scene)]
-    if excess <= 1.0:
-        return None
+    excess = seen.misplaced / MISPLACED[_force_degree(scene)]
     raises = scene.coupling.scheme == "energy" and scene.coupling.degree < 2
     raises &= scene.beam is None or scene.beam.integrator == "modal"
-    far = f"about {100.0 * misplaced:.2g} %" if misplaced <= 1.0 else "more than all"
     return (
-        f"not resolved: what the forces of the steps miss of the contact law moves an end by {far} of its way. "
-        "Velocities, forces and times of contact are samples of a faster motion; coupling.macro_step <= "
-        f"{_rounded_down(H / sqrt(excess))} resolves it{_HIGHER if raises else ''}"
+        {}
+        if excess <= 1.0
+        else {
+            "far": f"about {100.0 * seen.misplaced:.2g} %" if seen.misplaced <= 1.0 else "more than all",
+            "size": _rounded_down(scene.coupling.H / sqrt(excess)),
+            "higher": _HIGHER if raises else "",
+        }
     )
 
 
-def _lags(scene: Scene, H: float) -> str | None:
-    """Return in words why steps of H [s] do not follow spring and massless beam together; ``None`` if they do."""
-    omega, degree = joined_frequency(scene), _force_degree(scene)
+def _lags(scene: Scene, seen: _Seen) -> dict[str, Any]:
+    """Return by how much steps make spring and massless beam together late, nothing if they follow them."""
+    omega, degree, H = joined_frequency(scene), _force_degree(scene), scene.coupling.H
     lag = omega * scene.duration * lateness(scene, omega * H)
-    if lag <= LAG or not (scene.massless and scene.contact.rigid):
-        return None
     return (
-        f"not resolved: tip and lower end turn {omega * H:.3g} rad in a macro step together, and in all "
-        f"{lag:.2g} rad too little; coupling.macro_step <= {_rounded_down(H / (lag / LAG) ** (0.5 / (degree + 1)))} "
-        f"resolves it{_HIGHER if degree < 2 else ''}"
+        {}
+        if lag <= LAG or not (scene.massless and scene.contact.rigid)
+        else {
+            "turn": omega * H,
+            "lag": lag,
+            "size": _rounded_down(H / (lag / LAG) ** (0.5 / (degree + 1))),
+            "higher": _HIGHER if degree < 2 else "",
+        }
     )
 
 
@@ -156,37 +156,23 @@ def _struck(scene: Scene) -> Beam | None:
     return scene.beam if meets and not scene.massless else None
 
 
-def _unstable(scene: Scene, H: float) -> str | None:
-    """Return in words why steps of H [s] are too long for `hermite`, as far as is known; ``None`` if they are not."""
-    beam = _struck(scene)
-    if beam is None or scene.coupling.scheme != "hermite":
-        return None
-    fastest = lasting_frequency(beam)  # damped waves are stable in far longer steps
-    if fastest * H <= STABLE:
-        return None
-    return (
-        f'not resolved: with [coupling] scheme = "hermite" the fastest mode of the beam turns {fastest * H:.3g} rad in '
-        f"a macro step. Above {STABLE:g} rad the scheme may be unstable and miss short contacts; take a macro_step of "
-        f'{STABLE / fastest:.2g} s, or scheme = "energy"'
-    )
+def _unstable(scene: Scene, seen: _Seen) -> dict[str, Any]:
+    """Return what the fastest mode turns where steps are too long for `hermite`, as far as is known; nothing if not."""
+    beam, H = _struck(scene), scene.coupling.H
+    fastest = 0.0 if beam is None else lasting_frequency(beam)  # damped waves are stable in far longer steps
+    beyond = scene.coupling.scheme == "hermite" and fastest * H > STABLE
+    return {"turn": fastest * H, "size": STABLE / fastest} if beyond else {}
 
 
-def _waves_lag(scene: Scene, H: float) -> str | None:
-    """Return in words why generalized-α in steps of H [s] does not follow what an impact sets off; ``None`` if it does.
+def _waves_lag(scene: Scene, seen: _Seen) -> dict[str, Any]:
+    """Return by how much generalized-α makes waves of an impact late, nothing if it follows them.
 
     It leaves no mismatch of velocities that would tell.
     """
-    beam = _struck(scene)
-    if beam is None or beam.integrator == "modal" or not scene.contact.rigid:
-        return None
-    lag = scene.duration / H * (impact_frequency(beam) * H) ** 3 / 12.0
-    if lag <= WAVE_LAG:
-        return None
-    return (
-        f"not resolved: generalized-α turns the fastest waves that an impact sets off {lag:.2g} rad too little in all; "
-        f"coupling.macro_step <= {_rounded_down(H * sqrt(WAVE_LAG / lag))} resolves them, beam.alpha_b > 0 lets them "
-        'die out, and beam.integrator = "modal" is exact'
-    )
+    beam, H = _struck(scene), scene.coupling.H
+    fastest = 0.0 if beam is None or beam.integrator == "modal" or not scene.contact.rigid else impact_frequency(beam)
+    lag = scene.duration / H * (fastest * H) ** 3 / 12.0
+    return {"lag": lag, "size": _rounded_down(H * sqrt(WAVE_LAG / lag))} if lag > WAVE_LAG else {}
 
 
 def force_window(scene: Scene, stiffness: float = 0.0) -> float:
@@ -215,17 +201,16 @@ def peak_force_doubt(scene: Scene) -> str | None:
     At a rigid impact the force at an instant grows with the mesh. Its mean over a window settles where the window is
     longer than `SETTLED` periods of the fastest wave kept (``docs/contact.md`` has the numbers).
     """
-    beam = _struck(scene)
+    return next(told(scene, (_MESH_DECIDES,)), None)
+
+
+def _settling(scene: Scene) -> dict[str, float]:
+    """Return the window of the peak force and a longer one in which it settles, nothing if the mesh does not count."""
+    beam, window = _struck(scene), force_window(scene)
     if beam is None or not scene.contact.rigid:
-        return None
-    window, fastest = force_window(scene), min(shear_frequency(beam), fastest_frequency(beam))
-    if window * fastest >= SETTLED * 2.0 * pi:
-        return None
-    longer = 1.05 * SETTLED * 2.0 * pi / fastest
-    return (
-        f'the peak contact force, a mean over {window:.2g} s, depends on the mesh: law = "{scene.contact.law}" is '
-        f"rigid. contact.force_window >= {longer:.2g} s, more elements or more modes settle it"
-    )
+        return {}
+    needed = SETTLED * 2.0 * pi / min(shear_frequency(beam), fastest_frequency(beam))
+    return {"window": window, "longer": 1.05 * needed} if window < needed else {}
 
 
 def slow_oscillations(scene: Scene) -> list[tuple[str, float, str]]:
@@ -246,24 +231,107 @@ def slow_oscillations(scene: Scene) -> list[tuple[str, float, str]]:
 
 
 def _remedy(scene: Scene) -> str:
-    beam, H = scene.beam, scene.coupling.macro_step
-    if scene.contact.impact != "inelastic":
-        return f'contact.impact = "{scene.contact.impact}" leaves the difference in; "inelastic" does not'
-    if H is None:
-        return "Smaller tolerances resolve the motion"
-    if beam is None or beam.fidelity == "quasi_static":
-        return f"A coupling.macro_step below {H:g} s resolves the motion"
+    return next(told(scene, _REMEDIES))
+
+
+def _fewer(scene: Scene) -> dict[str, str]:
+    """Return the step that resolves the modes kept, and what else would help."""
+    beam, H = scene.beam, scene.coupling.H
+    assert beam is not None
     fewer = modes_below(beam, 0.25 * TURN / H)  # the loads' static shapes, kept as well, are up to twice as fast
-    modes = f", beam.n_modes = {fewer} keeps what this step resolves" if fewer > 0 else ""
-    higher = ", so may a higher coupling.degree" if beam.integrator == "modal" and scene.coupling.degree < 2 else ""
-    return (
-        f"coupling.macro_step <= {_rounded_down(TURN / fastest_frequency(beam))} resolves the modes kept{higher}{modes}"
-    )
+    raises = beam.integrator == "modal" and scene.coupling.degree < 2
+    return {
+        "size": _rounded_down(TURN / fastest_frequency(beam)),
+        "modes": f", beam.n_modes = {fewer} keeps what this step resolves" if fewer > 0 else "",
+        "higher": ", so may a higher coupling.degree" if raises else "",
+    }
 
 
 def _rounded_down(size: float) -> str:
     """Return ``size`` [s] in two digits, rounded down."""
     return f"{0.95 * size:.1e} s"
+
+
+# -- what is told ---------------------------------------------------------------------------------------------------
+
+#: How steps of one length may fail; the first that holds is told.
+_OF_STEPS = (
+    Rule(
+        _too_fast,
+        "not resolved: the slowest oscillation of the {name} turns {turn:.3g} rad in a macro step. Velocities, forces "
+        "and times of events are samples of a faster motion; coupling.macro_step <= {size} resolves it{otherwise}",
+    ),
+    Rule(
+        _law_missed,
+        "not resolved: what the forces of the steps miss of the contact law moves an end by {far} of its way. "
+        "Velocities, forces and times of contact are samples of a faster motion; coupling.macro_step <= {size} "
+        "resolves it{higher}",
+    ),
+    Rule(
+        _lags,
+        "not resolved: tip and lower end turn {turn:.3g} rad in a macro step together, and in all {lag:.2g} rad too "
+        "little; coupling.macro_step <= {size} resolves it{higher}",
+    ),
+    Rule(
+        _unstable,
+        "not resolved: with {coupling.scheme} the fastest mode of the beam turns {turn:.3g} rad in a macro step. Above "
+        f"{STABLE:g} rad the scheme may be unstable and miss short contacts; take a macro_step of {{size:.2g}} s, or "
+        'scheme = "energy"',
+    ),
+    Rule(
+        _waves_lag,
+        "not resolved: generalized-α turns the fastest waves that an impact sets off {lag:.2g} rad too little in all; "
+        "coupling.macro_step <= {size} resolves them, beam.alpha_b > 0 lets them die out, and "
+        'beam.integrator = "modal" is exact',
+    ),
+)
+#: How any steps may fail where ends part or strike the foundation.
+_OF_ENDS = (
+    Rule(
+        lambda s, seen: seen.mismatch > MISMATCH[s.coupling.degree],
+        "not resolved: the joined ends' velocities differ where they part or strike the foundation, in all by "
+        "{percent:.2g} % of the momentum of a body; what they do then depends on it. {remedy}",
+        lambda s, seen: {"percent": 100.0 * seen.mismatch, "remedy": _remedy(s)},
+    ),
+    Rule(
+        lambda s, seen: seen.alternation > ALTERNATION,
+        "not resolved: the force on joined ends goes up and down from step to step before they part, by {percent:.2g} "
+        "% of the momentum of a body; it decides when they do. {remedy}",
+        lambda s, seen: {"percent": 100.0 * seen.alternation, "remedy": _remedy(s)},
+    ),
+    Rule(  # a force that does not see the contact end
+        lambda s, seen: (
+            not s.coupling.adaptive
+            and (s.contact.rigid or s.coupling.scheme in ORDINARY_SCHEMES)
+            and seen.shortest_contact < SHORT * s.coupling.H
+        ),
+        "not resolved: a contact lasts {steps:.2g} macro steps only, so that the force of one or two steps decides "
+        "when it ends, and with it what follows; coupling.macro_step <= {size} resolves it",
+        lambda s, seen: {
+            "steps": seen.shortest_contact / s.coupling.H,
+            "size": _rounded_down(seen.shortest_contact / SHORT),
+        },
+    ),
+)
+#: What would resolve how ends part; the first that holds is told.
+_REMEDIES = (
+    Rule(
+        lambda s: s.contact.impact != "inelastic",
+        '{contact.impact} leaves the difference in; "inelastic" does not',
+    ),
+    Rule(lambda s: s.coupling.adaptive, "Smaller tolerances resolve the motion"),
+    Rule(
+        lambda s: s.beam is None or s.massless,
+        "A coupling.macro_step below {H:g} s resolves the motion",
+        lambda s: {"H": s.coupling.H},
+    ),
+    Rule(lambda s: True, "coupling.macro_step <= {size} resolves the modes kept{higher}{modes}", _fewer),
+)
+_MESH_DECIDES = Rule(
+    _settling,
+    "the peak contact force, a mean over {window:.2g} s, depends on the mesh: {contact.law} is rigid. "
+    "contact.force_window >= {longer:.2g} s, more elements or more modes settle it",
+)
 
 
 # -- frequencies ----------------------------------------------------------------------------------------------------

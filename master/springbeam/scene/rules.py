@@ -10,7 +10,7 @@ from typing import Any
 from .laws import laws_that
 from .linearised import hilltop, largest_load, spring_energy, well_depth
 from .loads import MOST_POINTS
-from .messages import Rule, at, told
+from .messages import Rule, at, told, told_of_loads
 from .partners import RigidWall
 from .scene import Scene
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
@@ -35,7 +35,7 @@ MOST_MACRO_STEPS = 1e12
 def impossible(scene: Scene) -> list[str]:
     """Return why ``scene`` cannot be run, as lines ``[table] key = value: reason and remedy``; empty if it can."""
     try:
-        found = list(told(scene, FORBIDDEN, FORBIDDEN_LOADS))
+        found = [*told(scene, FORBIDDEN), *told_of_loads(scene, FORBIDDEN_LOADS)]
         if not found and (scene.beam is None or _is_finite(scene.beam)):
             suspicions(scene)  # what is certain to overflow once the scene runs overflows here
             return []

@@ -8,7 +8,7 @@ from typing import Any
 
 from .laws import laws_that
 from .linearised import beam_energy, spring_energy, well_depth
-from .messages import Rule, told
+from .messages import Rule, told, told_of_loads
 from .scene import TABLES, Scene
 from .statics import initial_kinetic_energy, locking, tip_compliance, tip_inertia
 from .tables import ORDINARY_SCHEMES
@@ -27,7 +27,11 @@ _MOST_STRAIN = 0.05
 
 def suspicions(scene: Scene) -> list[str]:
     """Return warnings about values that can be run but are probably mistaken, or play no part."""
-    return [*implausible(scene), *told(scene, (*SUSPICIOUS, *EFFECTS), SUSPICIOUS_LOADS)]
+    return [
+        *implausible(scene),
+        *told(scene, (*SUSPICIOUS, *EFFECTS)),
+        *told_of_loads(scene, SUSPICIOUS_LOADS),
+    ]
 
 
 def implausible(scene: Scene) -> Iterator[str]:
