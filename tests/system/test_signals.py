@@ -10,11 +10,11 @@ import pytest
 from commands import printed
 from scenes import scene_from_dict
 
-from springbeam import load_scene, simulate, with_changes
+from springbeam import SceneError, load_scene, simulate, with_changes
 from springbeam.signals.driven import responses, settled
 from springbeam.signals.report import spectra
 from springbeam.signals.shock import shock_of_run, shock_spectrum
-from springbeam.signals.spectra import power_spectrum
+from springbeam.signals.spectra import power_spectrum, sampled
 from springbeam.studies.metrics import METRICS
 from springbeam.studies.study import record_all
 from springbeam.studies.sweep import Sweep
@@ -166,6 +166,15 @@ def test_the_power_of_a_settled_oscillator_is_at_its_drive(driven):
     late = driven.at(np.linspace(begin, driven.time[-1], 5000))["y"]
     assert found.density.sum() * found.frequency[1] == pytest.approx(np.var(late), rel=0.02)
     assert tail.since < begin
+
+
+def test_a_run_is_sampled_from_its_first_to_its_last_instant(driven):
+    end = float(driven.time[-1])
+    times, values = sampled(driven, "y", step=end / 10.0)
+    assert times == pytest.approx(np.linspace(0.0, end, 11))
+    assert values[[0, -1]] == pytest.approx(driven.y[[0, -1]])
+    with pytest.raises(SceneError, match="the run ends at"):
+        sampled(driven, "y", since=end)
 
 
 def test_the_shock_of_a_stiff_mount_is_that_of_its_base():
