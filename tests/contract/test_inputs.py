@@ -74,6 +74,14 @@ def test_an_impulse_acts_once_at_the_start_of_the_next_step(case):
         assert sum(k.get(*stored)) - before == pytest.approx(J * (2 * velocity + J / mass) / 2, rel=1e-9)
 
 
+def test_an_impulse_waits_where_its_step_is_discarded(spring):
+    k = spring.running(linear_stiffness=3.0, cubic_stiffness=-0.2)
+    k.set("impulse", 100.0)
+    assert k.try_step(0.0, 10.0) == 2
+    assert "has run away" in k.message
+    assert k.get("velocity", "impulse") == [0.0, 100.0]
+
+
 LOADED = {
     "beam": [
         {

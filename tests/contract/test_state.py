@@ -81,7 +81,8 @@ def test_a_state_carries_its_phase_parameters_and_time(case, phase):
 def test_a_state_carries_the_set_up_of_the_run_and_derivatives_of_inputs(case, same):
     """When the run ends, its tolerance, and both orders: bytes in an instance that is built without them."""
     loose = {"relative_tolerance": 1e-3, "absolute_tolerance": 1e-3} if case.name == "spring" else {}
-    k, other = case.moving(**loose, stop_time=0.15, tolerance=1e-13), case.moving(**loose) if same else case.running()
+    k = case.moving(**loose, stop_time=0.15, tolerance=1e-13)
+    other = case.moving(**loose) if same else case.running(tolerance=1e-13)
     k.set(case.force, 0.3)
     assert k.derive(case.force, 1, 50.0) == k.derive(case.force, 2, -700.0) == OK
     other.restore(other.deserialized(k.serialized()))
