@@ -48,9 +48,9 @@ class FmuProcess:
         ends = requests.fileno(), answers.fileno()
         command = [sys.executable, "-m", "springbeam.bodies.worker", self._folder.name, *map(str, ends)]
         with self._errors.open("wb") as printed, requests, answers:
-            # In a session of its own: Ctrl-C is the master's.
+            # Not in a session of its own: on a busy machine Linux lets that wait, and a step takes five times as long.
             self._process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=printed, stderr=printed, pass_fds=ends, start_new_session=True
+                command, stdin=subprocess.PIPE, stdout=printed, stderr=printed, pass_fds=ends
             )
         #: Whether it has answered all that it was asked.
         self.idle = True

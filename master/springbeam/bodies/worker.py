@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import tempfile
 import threading
@@ -17,6 +18,7 @@ from .protocol import BodyFailed, StepRefused
 def main() -> None:
     """Answer requests; see `springbeam.bodies.isolated.FmuProcess.ask`."""
     tempfile.tempdir = sys.argv[1]
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the master's
     ends: list[Any] = [Connection(int(end)) for end in sys.argv[2:]]
     requests, answers = ends
     threading.Thread(target=_end_with_the_master, daemon=True).start()
