@@ -242,6 +242,7 @@ def resume(
             RunDirectory(directory),
             seconds=start.seconds,
             start=start,
+            interval=start.interval,
             no_plots=no_plots,
             quiet=quiet,
             as_json=as_json,

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -32,14 +31,6 @@ _SUMMARY_ROOM = 16384
 _SAME = 1e-12
 
 
-@dataclass(frozen=True)
-class Written:
-    """What has reached the disk of a run that goes on later."""
-
-    files: dict[str, int]  #: bytes by name
-    interval: float | None  #: of the rows [s], as of `FileRecorder`
-
-
 class FileRecorder(Recorder):
     """Streams into a `RunDirectory` and keeps nothing, so that memory does not grow with the run.
 
@@ -60,11 +51,11 @@ class FileRecorder(Recorder):
         super().__init__(scene)
         self.directory = directory
         self.finished = False
-        self._interval = interval
+        self.interval = interval
         #: The first line of each file that grows, in the order in which they do.
-        self._headers = {directory.events: _line(EVENT_COLUMNS), directory.steps: b""}
+        self._headers = {directory.events: _lines([EVENT_COLUMNS]), directory.steps: b""}
         if scene.beam is not None:
-            self._headers = {directory.shapes: _line(SHAPE_COLUMNS), **self._headers}
+            self._headers = {directory.shapes: _lines([SHAPE_COLUMNS]), **self._headers}
         #: Each hands what is written to the system at once, so that a killed run has it.
         self._files: dict[Path, FileIO] = {}
 
@@ -129,9 +120,9 @@ class FileRecorder(Recorder):
                 self.directory.checkpoint.unlink(missing_ok=True)
 
     def _rows(self) -> Iterable[Mapping[str, np.ndarray]]:
-        if self._interval is None or self.time is None:
+        if self.interval is None or self.time is None:
             return blocks(self.scene, self.steps())
-        return [at_multiples(self.trajectory(), self._interval)]
+        return [at_multiples(self.trajectory(), self.interval)]
 
     def close(self) -> None:
         """Close the files, and let other processes use the directory."""
@@ -143,14 +134,14 @@ class FileRecorder(Recorder):
             for file in self._files.values():
                 files.callback(file.close)
 
-    def save(self) -> Written:
-        """Write what was recorded to the disk, and return what `restore` needs."""
+    def save(self) -> dict[str, int]:
+        """Write what was recorded to the disk, and return the sizes of its files [bytes], which `restore` needs."""
         self._begin()
         for file in self._files.values():
             os.fsync(file.fileno())
-        return Written({path.name: path.stat().st_size for path in self._files}, self._interval)
+        return {path.name: path.stat().st_size for path in self._files}
 
-    def restore(self, saved: Written) -> None:
+    def restore(self, saved: Mapping[str, int]) -> None:
         """Go on from what `save` of a recorder in the same directory returned; what came later is removed.
 
         Raises
@@ -161,11 +152,10 @@ class FileRecorder(Recorder):
             If another process is writing them.
         """
         self.directory.claim()
-        refuse_cut(self.directory, saved.files, longer=True)
+        refuse_cut(self.directory, saved, longer=True)
         self._open()
-        self._interval = saved.interval
         for path, file in self._files.items():
-            file.truncate(saved.files[path.name])
+            file.truncate(saved[path.name])
         self.directory.trajectory.unlink(missing_ok=True)
         self._write_summary({"status": "running"})
         self._reserve_summary()
@@ -221,7 +211,7 @@ def write_rows(directory: RunDirectory, rows: Iterable[Mapping[str, np.ndarray]]
     with replaced(directory.trajectory) as file:
         for number, columns in enumerate(rows):
             if number == 0:
-                file.write(_line(list(columns)))
+                file.write(_lines([list(columns)]))
             file.write(_lines(zip(*(values.tolist() for values in columns.values()), strict=True)))
 
 
@@ -260,10 +250,6 @@ def _append(file: FileIO, content: bytes) -> None:
 def _fields(event: Event) -> list[Any]:
     values = [getattr(event, name) for name in EVENT_COLUMNS]
     return ["" if v is None else v if isinstance(v, str) else float(v) for v in values]
-
-
-def _line(fields: Sequence[Any]) -> bytes:
-    return _lines([fields])
 
 
 def _lines(rows: Iterable[Sequence[Any]]) -> bytes:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from ..bodies.stateful import RunState
-from ..results.file_recorder import FileRecorder, Written, replaced
+from ..results.file_recorder import FileRecorder, replaced
 from ..scene import Scene, scene_from_dict
 
 if TYPE_CHECKING:  # a command that only reads a checkpoint loads no FMU
@@ -36,7 +36,8 @@ class Checkpoint:
     files: dict[str, str]  #: SHA-256 of the FMUs and tables, by name
     seconds: float  #: between checkpoints [s]
     wall_time: float  #: so far [s]
-    results: Written
+    interval: float | None  #: of the rows [s], as of `FileRecorder`
+    results: dict[str, int]  #: what the files of the run have [bytes], by name
     state: RunState
 
     def write(self, path: Path) -> None:
@@ -94,8 +95,9 @@ class Checkpoints:
         if now < self._due:
             return
         simulation.hand_over()
-        begun = self._recorder.scene, self._version, self._files, self._seconds
-        checkpoint = Checkpoint(*begun, now - self._began, self._recorder.save(), simulation.run_state())
+        recorder = self._recorder
+        begun = recorder.scene, self._version, self._files, self._seconds, now - self._began
+        checkpoint = Checkpoint(*begun, recorder.interval, recorder.save(), simulation.run_state())
         checkpoint.write(self._recorder.directory.checkpoint)
         self._due = perf_counter() + self._seconds
 

@@ -271,7 +271,7 @@ def resume(directory: str | Path, progress: Progress | None = None) -> Trajector
     `last_checkpoint` and `run` do.
     """
     start = last_checkpoint(directory)
-    with FileRecorder(start.scene, RunDirectory(directory)) as recorder:
+    with FileRecorder(start.scene, RunDirectory(directory), start.interval) as recorder:
         run(start.scene, recorder, progress, seconds=start.seconds, start=start)
     return load_trajectory(directory)
 
