@@ -85,7 +85,7 @@ def run(
         typer.Option(
             "--output-interval",
             metavar="DT",
-            help="Write rows at multiples of DT [s] into trajectory.csv, not one per step. Not beside --checkpoint.",
+            help="Write rows at multiples of DT [s] into trajectory.csv, not one per step.",
         ),
     ] = None,
     no_plots: NoPlotsOption = False,
