@@ -3,6 +3,7 @@
 import re
 import stat
 import zipfile
+from pathlib import Path
 from zipfile import ZipFile, ZipInfo
 
 import pytest
@@ -80,10 +81,12 @@ BROKEN = {
 
 
 def refusal(folder):
+    here = Path.cwd()
     with pytest.raises(FmuError) as caught:
         load_bodies(springbeam.load_scene("soft"), 0.0)
     message = str(caught.value)
     assert str(folder / "beam.fmu") in message
+    assert Path.cwd() == here  # FMPy goes to the folder of a library
     return message
 
 
