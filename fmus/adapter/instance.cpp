@@ -256,7 +256,8 @@ void Instance::restore(const Snapshot& s) {
   built_ = built_ && !s.numerics.empty() && progress.tolerance == s.progress.tolerance;
   progress.tolerance = s.progress.tolerance;
   for (std::size_t i = 0; i < settable_.size(); ++i) {
-    if (std::memcmp(&values_[i], &s.values[i], sizeof values_[i]) == 0) continue;  // which NaN do not equal
+    const void *const now = &values_[i], *const then = &s.values[i];
+    if (std::memcmp(now, then, sizeof(Polynomial)) == 0) continue;  // by their bits: NaN too
     values_[i] = s.values[i];
     built_ = built_ && i >= n_settings_;
     if (built_) settable_[i]->set(*model_, values_[i]);
