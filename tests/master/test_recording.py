@@ -202,6 +202,12 @@ def test_files_are_plain_csv_and_json(tmp_path):
     assert (tmp_path / "run" / "steps.bin").read_bytes() == steps.tobytes()
 
 
+def test_rows_in_blocks_have_one_header(tmp_path):
+    blocks = [{"time": np.array([0.0, 1.0])}, {"time": np.array([2.0])}]
+    file_recorder.write_rows(RunDirectory(tmp_path), blocks)
+    assert (tmp_path / "trajectory.csv").read_text() == "time\n0.0\n1.0\n2.0\n"
+
+
 def test_summaries_take_numpy_and_name_what_json_has_no_number_for(tmp_path):
     given = {
         "count": (np.int64(3), 3),
