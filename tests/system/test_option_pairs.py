@@ -104,6 +104,9 @@ def test_a_pair_runs_or_is_refused(tmp_path, monkeypatch, pair):
             run.scene, coupling={k: v for k, v in run.summary.get("coupling", {}).items() if k != "because"}
         )
         assert run.summary["max_energy_residual"] <= bounds(as_run)[0] or said
+    if "interval" in pair:  # also where it was interrupted
+        multiples = [float(row.partition(",")[0]) / 1e-3 for row in Path("run/trajectory.csv").read_text().split()[1:]]
+        assert multiples == pytest.approx([round(k) for k in multiples], abs=1e-9)
     files = {"trajectory.csv", "events.csv", "steps.bin", "summary.json", *(["shapes.csv"] if beam else [])}
     assert {path.name for path in Path("run").iterdir()} == files
 
