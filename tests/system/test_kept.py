@@ -5,6 +5,7 @@ import pytest
 
 from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
 from springbeam.bodies import fmu, fmu_bodies
+from springbeam.bodies.archive import own_fmu
 from springbeam.bodies.elements import PointMass
 from springbeam.bodies.fmu_bodies import release
 
@@ -88,3 +89,14 @@ def test_a_body_whose_calls_fail_is_not_kept(made, monkeypatch):
             simulate(SOFT)
     simulate(SOFT)
     assert made == ["beam", "spring", "beam"]  # the spring had not been called
+
+
+def test_after_fmi2_fatal_the_next_instance_has_a_library_of_its_own():
+    libraries = []
+    for status in (4, 4, 0, 0):
+        spring = fmu.Fmu("spring", own_fmu("spring"), {}, 0.0)
+        spring.failed(status, "nothing")
+        spring.close()
+        libraries.append(spring._slave.dll._name)
+    assert len(set(libraries)) == 3
+    assert libraries[2] == libraries[3]
