@@ -50,16 +50,18 @@ def misplaced(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray, events:
     if scene.spring is not None:
         resists, y = scene.spring.damping * per_mass, 0.5 * (before["y_after"] + step["y"])
         stiffness = per_mass * (scene.spring.linear_stiffness + 3.0 * scene.spring.cubic_stiffness * y**2)
-    kept = np.ones((len(step), parts))
-    kept[:, -1:] = np.multiply.reduceat(_kept(scene, steps, events), made)[:, None] if len(made) else 1.0
-    of_steps = [*np.repeat([step["size"] / parts, stiffness], parts, axis=1), kept.ravel(), *defect]
+    after = np.ones((3, len(step), parts)) * [[[1.0]], [[0.0]], [[0.0]]]
+    after[..., -1] = _after_events(scene, steps, events, made)
+    of_steps = [*np.repeat([step["size"] / parts, stiffness], parts, axis=1), *after.reshape(3, -1), *defect]
     first = int(np.argmax(defect[0] != 0.0))  # up to there nothing is off
     ways = [float(np.abs(steps[name] - steps[name][0]).max()) or inf for name in ("u_tip_after", "y_after")]
     *_, tip = modes = _modes(scene, pair)
     moves = cache(lambda H: _moves(modes, H))
     # Errors of displacements and velocities of the modes, and of both ends.
     x, u, y, z, found = np.zeros(2 * len(tip)), 0.0, 0.0, 0.0, 0.0
-    for H, k, stays, missed, early, stiffer, rate in zip(*(v[first:].tolist() for v in of_steps), strict=True):
+    for H, k, stays, turns, most, missed, early, stiffer, rate in zip(
+        *(v[first:].tolist() for v in of_steps), strict=True
+    ):
         # The midpoint rule; a force acts by its mean, and moves a free mass by ``shift``/m besides.
         half, shift, gap, (free, pushed, shifted, flexible) = 0.5 * H, 0.5 * H * H * (early - missed), y - u, moves(H)
         slow = 1.0 / (1.0 + half * (resists + half * k))
@@ -72,7 +74,8 @@ def misplaced(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray, events:
         force /= 1.0 + follows * (flexible + H * half * slow * per_mass)
         mean -= half * slow * per_mass * force
         x, u = x + force * pushed, u + force * flexible
-        y, z = stays * (y + H * mean), stays * (2.0 * mean - z)
+        y, z = y + H * mean, 2.0 * mean - z
+        y, z = stays * y, stays * z + max(-most, min(turns * y, most))
         found = max(found, abs(u) / ways[0], abs(y) / ways[1])
         if found > _LOST:
             break
@@ -105,13 +108,23 @@ def _defect(law: SoftLaw, before: np.ndarray, step: np.ndarray, parts: int) -> n
     return found.reshape(4, -1)
 
 
-def _kept(scene: Scene, steps: np.ndarray, events: Sequence[Event]) -> np.ndarray:
-    """Return which share of an error of the lower end is left after the event of each row: none while it is seated."""
-    kept = np.where(steps["phase"] >= 3.0, 0.0, 1.0)
+def _after_events(scene: Scene, steps: np.ndarray, events: Sequence[Event], made: np.ndarray) -> np.ndarray:
+    """Return what the events at the end of each of the steps ``made`` leave of the lower end's error, (3, len(made)).
+
+    It is the share of displacement and velocity, none while the end is seated, and by how much each unit of
+    displacement changes the velocity [1/s], at most by the jump of the stroke [m/s]: the end is struck earlier or
+    later, under the acceleration before and after that.
+    """
+    shares, (turns, most) = np.where(steps["phase"] >= 3.0, 0.0, 1.0), np.zeros((2, len(made)))
     struck = [n for n, event in enumerate(events, 1) if event.kind is EventKind.STOP_IMPACT]
     if struck and scene.stop is not None:
-        np.multiply.at(kept, np.searchsorted(steps["events"], struck), -scene.stop.restitution)
-    return kept
+        rows, e = np.searchsorted(steps["events"], struck), scene.stop.restitution
+        np.multiply.at(shares, rows, -e)
+        at = np.searchsorted(made, rows, side="right") - 1
+        gained = (steps["z"][made] - steps["z_after"][made - 1]) / steps["size"][made]
+        turns[at] = (e * gained[at] + np.append(gained, 0.0)[at + 1]) / steps["z"][made[at]]
+        most[at] = (1.0 + e) * np.abs(steps["z"][made[at]])
+    return np.array([np.multiply.reduceat(shares, made) if len(made) else turns, turns, most])
 
 
 def _modes(scene: Scene, pair: Pair) -> Modes:
