@@ -110,6 +110,11 @@ def test_what_creeps_or_has_no_inertia_has_nothing_to_resolve():
     assert not_resolved(tolerances, 0.0) is None
 
 
+def test_a_beam_without_inertia_has_no_modes_whose_step_could_be_named():
+    said = not_resolved(with_changes(PAIR, beam={"fidelity": "quasi_static"}), 1.0)
+    assert said.endswith(f"A coupling.macro_step below {PAIR.coupling.H:g} s resolves the motion")
+
+
 def test_the_step_that_is_named_resolves_the_motion():
     """`soft`, energy 0, at 4 ms, 1.7 % off: the warning's H and mode count cure it."""
     coarse = simulate(with_changes(PAIR, coupling={"macro_step": 4e-3}))
