@@ -1,20 +1,26 @@
 #include "beam.hpp"
 
-#include <Eigen/Core>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
 #include <string>
 
+#include "gauss.hpp"
 #include "generalized_alpha.hpp"
 #include "modal_beam.hpp"
 #include "text.hpp"
+#include "timoshenko.hpp"
 
 namespace beam {
 
+using Eigen::VectorXd;
+
 namespace {
+
+/// While coefficients stay below `largest_coefficient`, inputs and the sum of squares below `largest`, and step sizes
+/// [s] below `largest_size`, no output can overflow. What is not is refused.
+constexpr double largest_coefficient = 1e40, largest = 1e120, largest_size = 1e10;
 
 [[noreturn]] void reject(const char* name, double value, const std::string& allowed) {
   throw std::invalid_argument(std::string("beam: ") + name + " = " + number(value) + " is not allowed; it must be " +
@@ -54,12 +60,68 @@ void validate(const Parameters& p) {
   throw std::domain_error(message + "; the state is unchanged, use a smaller step or smaller inputs");
 }
 
+/// Those that a load of 1 N/m, 1 N or 1 m/s² (Loads::Shape) asks for: Q = ∫f ds, M = ∫(s − x) f ds over x … L. A point
+/// force at x itself counts.
+InternalForces internal_forces(const Parameters& p, std::size_t shape) {
+  InternalForces forces;
+  for (Eigen::Index j = 0; j < shape_points; ++j) {
+    const double x = static_cast<double>(j) / (shape_points - 1);
+    const auto add = [&](double place, double force) {
+      forces.shear[j] += force;
+      forces.moment[j] += p.length * (place - x) * force;
+    };
+    if (Loads::is_point(shape)) {
+      if (point_force_place(p, shape) >= x) add(point_force_place(p, shape), 1.0);
+      continue;
+    }
+    const double from = shape == Loads::hat ? std::max(x, 1.0 - 1.0 / p.n_elements) : x;  // where f has no kink
+    at_gauss_points([&](double part, double weight) {
+      const double place = from + part * (1.0 - from);
+      add(place, (1.0 - from) * p.length * weight * load_density(p, shape, place));
+    });
+  }
+  return forces;
+}
+
 }  // namespace
+
+bool Loads::is_point(std::size_t shape) { return shape >= point && shape <= tip; }
+
+double load_density(const Parameters& p, std::size_t shape, double place) {
+  if (shape == Loads::hat) return std::max(0.0, 1.0 - (1.0 - place) * p.n_elements);
+  if (shape == Loads::base_acceleration) return -p.density * p.area;
+  return std::pow(place, static_cast<double>(shape));
+}
+
+double point_force_place(const Parameters& p, std::size_t shape) {
+  return shape == Loads::tip ? 1.0 : p.point_force_position[shape - Loads::point];
+}
 
 std::unique_ptr<Beam> make_beam(const Parameters& parameters) {
   validate(parameters);
-  return parameters.integrator == Integrator::modal ? make_modal_beam(parameters)
-                                                    : make_generalized_alpha_beam(parameters);
+  const auto mesh = std::make_shared<const Timoshenko>(parameters);
+  return parameters.integrator == Integrator::modal ? make_modal_beam(mesh, parameters)
+                                                    : make_generalized_alpha_beam(mesh, parameters);
+}
+
+Beam::Beam(std::shared_ptr<const Discretisation> space, const Parameters& p, Eigen::Index memory)
+    : alpha_b_(p.alpha_b),
+      struck_(space->mass_solve(space->load(Loads::tip))),
+      motion_{p.initial_deflection_slope * space->linear_shape(), p.initial_velocity_slope * space->linear_shape(),
+              VectorXd::Zero(memory)},
+      start_(motion_),
+      space_(std::move(space)) {
+  for (std::size_t i = 0; i < Loads::count; ++i) {
+    const InternalForces forces = internal_forces(p, i);
+    shear_.col(static_cast<Eigen::Index>(i)) = forces.shear;
+    moment_.col(static_cast<Eigen::Index>(i)) = forces.moment;
+  }
+}
+
+void Beam::require_coefficients(std::initializer_list<double> values) {
+  for (const double value : values) {
+    if (!(value < largest_coefficient)) throw std::invalid_argument("beam: the parameters leave the range of numbers");
+  }
 }
 
 void Beam::step(double size, const Polynomial& c, const Loads& loads) {
@@ -70,25 +132,30 @@ void Beam::step(double size, const Polynomial& c, const Loads& loads) {
   });
   book();
   const Scalars before = now_;
-  const double squares = advance(size, c, loads);
+  std::swap(motion_, start_);
+  advance(size, c, loads);
+  booked_ = false;
+  now_.impulse = 0.0;
   now_.tip_force = value(c, size);
   now_.loads = loads.at(size);
+  const double squares = motion_.q.squaredNorm() + motion_.v.squaredNorm() + motion_.memory.squaredNorm();
   if (squares < largest && inputs < largest && size < largest_size) return;
-  undo();
+  motion_ = start_;
   now_ = before;
+  booked_ = true;
   throw_too_large(size, c, loads);
 }
 
-void Beam::require_coefficients(std::initializer_list<double> values) {
-  for (const double value : values) {
-    if (!(value < largest_coefficient)) throw std::invalid_argument("beam: the parameters leave the range of numbers");
-  }
+void Beam::book() const {
+  if (!booked_) book_step();
+  booked_ = true;
 }
 
 void Beam::apply_tip_impulse(double impulse) {
   if (!(std::abs(impulse) < largest)) throw_too_large(0.0, {impulse, 0.0, 0.0}, {});
   book();
-  strike(impulse);
+  motion_.v += impulse * struck_;
+  now_.impulse += impulse;
 }
 
 void Beam::observe(double tip_force, const Loads& loads) {
@@ -96,22 +163,49 @@ void Beam::observe(double tip_force, const Loads& loads) {
   now_.loads = loads.at(0.0);
 }
 
-double Beam::load_potential() const {
-  double work = 0.0;
-  for (const Loads::Shape i : {Loads::distributed, Loads::hat}) work += now_.loads[i] * load_work_per_unit(i);
-  return -work;
+void Beam::rest() {
+  motion_.q = space_->flexibility_times(force(now_.loads, now_.tip_force));
+  motion_.v.setZero();
+  motion_.memory.setZero();
+  booked_ = true;
 }
 
-double Beam::load_potential_rate() const {
-  double power = 0.0;
-  for (const Loads::Shape i : {Loads::distributed, Loads::hat}) power += now_.loads[i] * load_power_per_unit(i);
-  return -power;
+VectorXd Beam::force(Loads::Values loads, double tip_force) const {
+  loads[Loads::tip] += tip_force;
+  VectorXd sum = VectorXd::Zero(motion_.q.size());
+  for (std::size_t i = 0; i < Loads::count; ++i) {
+    if (loads[i] != 0.0) sum += loads[i] * space_->load(i);
+  }
+  return sum;
 }
 
-double Beam::load_power() const {
-  double power = 0.0;
-  for (std::size_t i = 0; i < Loads::count; ++i) power += now_.loads[i] * load_power_per_unit(i);
-  return power;
+VectorXd Beam::inertia_force() const {
+  return force(now_.loads, now_.tip_force) - space_->stiffness_times(motion_.q + alpha_b_ * motion_.v);
+}
+
+double Beam::potential_loads(const VectorXd& x) const {
+  return now_.loads[Loads::distributed] * space_->load(Loads::distributed).dot(x) +
+         now_.loads[Loads::hat] * space_->load(Loads::hat).dot(x);
+}
+
+Beam::Response Beam::respond(const VectorXd& acceleration, Loads::Values loads, double tip_force) const {
+  loads[Loads::tip] += tip_force;
+  const Eigen::Map<const Eigen::Matrix<double, Loads::count, 1>> values(loads.data());
+  const InternalForces inertia = space_->inertia(acceleration);
+  return {space_->tip(acceleration), {shear_ * values - inertia.shear, moment_ * values - inertia.moment}};
+}
+
+Beam::Response Beam::response() const { return respond(acceleration(), now_.loads, now_.tip_force); }
+
+Beam::Response Beam::response_rate(const Loads::Values& loads, double tip_force) const {
+  const VectorXd rate = force(loads, tip_force) - space_->stiffness_times(motion_.v + alpha_b_ * acceleration());
+  return respond(space_->mass_solve(rate), loads, tip_force);
+}
+
+Beam::Response Beam::response_per_load(std::size_t shape) const {
+  Loads::Values unit{};
+  unit[shape] = 1.0;
+  return respond(space_->mass_solve(space_->load(shape)), unit, 0.0);
 }
 
 /// Puts the state back.
@@ -145,21 +239,14 @@ Beam::Forecast Beam::forecast_per_load(double size, std::size_t shape) {
   return forecast(size);
 }
 
-Beam::Response Beam::response_per_load(std::size_t shape) {
-  Trial trial(*this);
-  trial.clear();
-  (shape == Loads::count ? now_.tip_force : now_.loads[shape]) = 1.0;
-  return response(Order::value);
-}
-
 std::array<double, 3> Beam::tip_response(double size) {
   Trial trial(*this);
   trial.clear();
   std::array<double, 3> response{};
-  step(size, {1.0, 0.0, 0.0}, {});
-  response[0] = tip_displacement();
-  step(size, {}, {});
-  response[1] = tip_displacement();
+  for (const std::size_t i : {0U, 1U}) {
+    step(size, {i == 0 ? 1.0 : 0.0, 0.0, 0.0}, {});
+    response[i] = tip_displacement();
+  }
   trial.clear();
   apply_tip_impulse(1.0);
   response[2] = forecast(size).velocity;
@@ -168,17 +255,27 @@ std::array<double, 3> Beam::tip_response(double size) {
 
 void Beam::save(std::vector<double>& state) const {
   book();
-  state.resize(motion_size_ + sizeof now_ / sizeof(double));
-  save_motion(state.data());
-  std::memcpy(state.data() + motion_size_, &now_, sizeof now_);
+  state.resize(state_size());
+  double* end = state.data();
+  for (const VectorXd* x : {&motion_.q, &motion_.v, &motion_.memory}) end = std::copy_n(x->data(), x->size(), end);
+  std::memcpy(end, &now_, sizeof now_);
 }
 
 void Beam::restore(const std::vector<double>& state) {
-  if (state.size() != motion_size_ + sizeof now_ / sizeof(double))
+  if (state.size() != state_size())
     throw std::invalid_argument("beam: a saved state of " + std::to_string(state.size()) +
                                 " numbers does not belong to this beam");
-  restore_motion(state.data());
-  std::memcpy(&now_, state.data() + motion_size_, sizeof now_);
+  const double* begin = state.data();
+  for (VectorXd* x : {&motion_.q, &motion_.v, &motion_.memory}) {
+    *x = Eigen::Map<const VectorXd>(begin, x->size());
+    begin += x->size();
+  }
+  std::memcpy(&now_, begin, sizeof now_);
+  booked_ = true;
+}
+
+std::size_t Beam::state_size() const {
+  return static_cast<std::size_t>(2 * motion_.q.size() + motion_.memory.size()) + sizeof now_ / sizeof(double);
 }
 
 }  // namespace beam

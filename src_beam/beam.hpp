@@ -3,6 +3,8 @@
 // u(L), F what the loads below give. Ahn & Tate, eqs. (1)–(5), (59).  Up is positive; C > 0 lifts the tip.
 #pragma once
 
+#include <Eigen/Core>
+
 #include <array>
 #include <cstddef>
 #include <initializer_list>
@@ -68,6 +70,7 @@ class Loads {
       "distributed_load", "distributed_load_1", "distributed_load_2",  "distributed_load_3",
       "point_force[1]",   "point_force[2]",     "point_force[3]",      "point_force[4]",
       "tip_load",         "base_acceleration",  "tip_load_coefficient"};
+  static bool is_point(std::size_t shape);  ///< or one of those in between
   /// Of each load its value at one instant, or its mean.
   using Values = std::array<double, count>;
 
@@ -100,13 +103,44 @@ class Loads {
   unsigned acting_ = 0;  ///< a bit per shape
 };
 
+/// f of a distributed load at x = place·L, of 1 N/m or, of the base acceleration, 1 m/s² [N/m]; exact in an element.
+double load_density(const Parameters& parameters, std::size_t shape, double place);
+double point_force_place(const Parameters& parameters, std::size_t shape);  ///< x/L, also of the tip load
+
 /// Points at which the shape is reported: x = 0, L/20, …, L.
 inline constexpr int shape_points = 21;
-using Shape = std::array<double, shape_points>;
+using Shape = Eigen::Matrix<double, shape_points, 1>;
 
 /// There, on the part between x and the tip: Q > 0 pulls the part before it up, M > 0 bends the beam upwards.
 struct InternalForces {
-  Shape shear{}, moment{};  ///< Q [N], M [N·m]
+  Shape shear = Shape::Zero(), moment = Shape::Zero();  ///< Q [N], M [N·m]
+};
+
+/// The beam in space, M q̈ + α_b K q̇ + K q = F in unknowns of its kind: of a mesh (timoshenko.hpp) or of modes.
+class Discretisation {
+ public:
+  using Vector = Eigen::Ref<const Eigen::VectorXd>;
+
+  Discretisation() = default;
+  virtual ~Discretisation() = default;
+  virtual Eigen::VectorXd linear_shape() const = 0;                      ///< u = x, θ = 0
+  virtual const Eigen::VectorXd& load(std::size_t shape) const = 0;      ///< F of 1 N/m, 1 N or 1 m/s²
+  virtual Eigen::VectorXd mass_solve(const Vector& f) const = 0;         ///< M⁻¹ f
+  virtual Eigen::VectorXd stiffness_times(const Vector& q) const = 0;    ///< K q
+  virtual Eigen::VectorXd flexibility_times(const Vector& f) const = 0;  ///< K⁻¹ f
+  virtual double mass_norm2(const Vector& q) const = 0;                  ///< qᵀMq
+  virtual double stiffness_norm2(const Vector& q) const = 0;             ///< qᵀKq, as a sum of squares
+  virtual double tip(const Vector& q) const = 0;                         ///< u(L)
+  virtual double tip_rotation(const Vector& q) const = 0;                ///< θ(L)
+  virtual Shape deflection(const Vector& q) const = 0;                   ///< u
+  virtual Shape rotation(const Vector& q) const = 0;                     ///< θ
+  virtual InternalForces inertia(const Vector& acceleration) const = 0;  ///< ∫ρA ü ds and ∫(s − x) ρA ü + ρI θ̈ ds
+
+ protected:
+  Discretisation(const Discretisation&) = default;
+  Discretisation(Discretisation&&) = default;
+  Discretisation& operator=(const Discretisation&) = default;
+  Discretisation& operator=(Discretisation&&) = default;
 };
 
 /// One beam; make_beam() chooses the integrator behind it. Every step depends only on the state, the inputs and the
@@ -134,29 +168,32 @@ class Beam {
   const Loads::Values& loads() const { return now_.loads; }  ///< acting now
   double tip_force() const { return now_.tip_force; }        ///< likewise
 
-  virtual double tip_displacement() const = 0;                                         ///< u(L) [m]
-  virtual double tip_velocity() const = 0;                                             ///< u_t(L) [m/s]
-  double tip_acceleration() const { return response(Order::value).tip_acceleration; }  ///< u_tt(L) [m/s²]
-  virtual double tip_rotation() const = 0;                                             ///< θ(L) [rad]
-  double tip_displacement_integral() const { return now_.integral; }      ///< ∫ u dτ over the last step [m·s]
-  double tip_displacement_integral_2() const { return now_.integral_2; }  ///< ∫∫ u dτ dτ over it [m·s²]
-  virtual double kinetic_energy() const = 0;                              ///< [J]
-  virtual double strain_energy() const = 0;                               ///< [J]
-  double dissipated_energy() const { return book(), now_.dissipated; }    ///< by α_b since the start [J]
-  double load_work() const { return book(), now_.load_work; }             ///< of all loads since the start [J]
-  double load_potential() const;  ///< −qᵀF [J] of the uniform and the hat load, as if they were constant
-  virtual double load_work_per_unit(std::size_t shape) const = 0;  ///< qᵀF of a unit of a load, as ∫ u dx [m²]
+  double tip_displacement() const { return space_->tip(motion_.q); }       ///< u(L) [m]
+  double tip_velocity() const { return space_->tip(motion_.v); }           ///< u_t(L) [m/s]
+  double tip_acceleration() const { return space_->tip(acceleration()); }  ///< u_tt(L) [m/s²]
+  double tip_rotation() const { return space_->tip_rotation(motion_.q); }  ///< θ(L) [rad]
+  double tip_displacement_integral() const { return now_.integral; }       ///< ∫ u dτ over the last step [m·s]
+  double tip_displacement_integral_2() const { return now_.integral_2; }   ///< ∫∫ u dτ dτ over it [m·s²]
+  double kinetic_energy() const { return 0.5 * space_->mass_norm2(motion_.v); }      ///< [J]
+  double strain_energy() const { return 0.5 * space_->stiffness_norm2(motion_.q); }  ///< [J]
+  double dissipated_energy() const { return book(), now_.dissipated; }               ///< by α_b since the start [J]
+  double load_work() const { return book(), now_.load_work; }  ///< of all loads since the start [J]
+  double load_potential() const {
+    return -potential_loads(motion_.q);
+  }  ///< −qᵀF [J] of the uniform and the hat load, as if they were constant
+  double load_work_per_unit(std::size_t shape) const {
+    return space_->load(shape).dot(motion_.q);
+  }  ///< qᵀF of a unit of a load, as ∫ u dx [m²]
   // Their rates, under what acts now.
-  virtual double tip_rotation_rate() const = 0;                     ///< [rad/s]
-  virtual double kinetic_power() const = 0;                         ///< [W]
-  virtual double strain_power() const = 0;                          ///< [W]
-  virtual double dissipated_power() const = 0;                      ///< [W]
-  virtual double load_power_per_unit(std::size_t shape) const = 0;  ///< q̇ᵀF of a unit of a load, as ∫ u_t dx [m²/s]
-  double load_power() const;                                        ///< of all loads [W]
-  double load_potential_rate() const;                               ///< [W]
-  virtual double tip_mass() const = 0;                              ///< 1/(eᵀ M⁻¹ e) [kg]
-  virtual void deflection(Shape& u) const = 0;                      ///< [m]
-  virtual void rotation(Shape& theta) const = 0;                    ///< [rad]
+  double tip_rotation_rate() const { return space_->tip_rotation(motion_.v); }               ///< [rad/s]
+  double kinetic_power() const { return motion_.v.dot(inertia_force()); }                    ///< [W]
+  double strain_power() const { return motion_.v.dot(space_->stiffness_times(motion_.q)); }  ///< [W]
+  double dissipated_power() const { return alpha_b_ * space_->stiffness_norm2(motion_.v); }  ///< [W]
+  double load_power() const { return force(now_.loads).dot(motion_.v); }                     ///< of all loads [W]
+  double load_potential_rate() const { return -potential_loads(motion_.v); }                 ///< [W]
+  double tip_mass() const { return 1.0 / space_->tip(struck_); }                             ///< 1/(eᵀ M⁻¹ e) [kg]
+  Shape deflection() const { return space_->deflection(motion_.q); }                         ///< [m]
+  Shape rotation() const { return space_->rotation(motion_.q); }                             ///< [rad]
 
   /// What follows the forces that act now without delay. Internal forces are those that equilibrium asks for, of C, the
   /// loads and the inertia between a point and the tip: there M = 0 and Q = C + the tip load, and the clamp's reaction,
@@ -165,21 +202,21 @@ class Beam {
     double tip_acceleration = 0.0;
     InternalForces forces;
   };
-  enum class Order { value, rate };
-  /// `rate`: how it changes, with C and the loads at these rates.
-  virtual Response response(Order order, const Loads::Values& loads_rate = {}, double tip_force_rate = 0.0) const = 0;
-  /// What 1 N of the tip force (Loads::count) or a unit of a load adds to it.
-  Response response_per_load(std::size_t shape);
+  Response response() const;
+  /// How it changes, with C and the loads at these rates.
+  Response response_rate(const Loads::Values& loads_rate, double tip_force_rate) const;
+  /// What a unit of a load adds to it. The tip force acts as the tip load does.
+  Response response_per_load(std::size_t shape) const;
 
   /// Put the beam at rest under the tip force and the loads that act now.
-  virtual void rest() = 0;
+  void rest();
 
   /// How the tip goes on over two steps of `size` [s] without a tip force.
   struct Forecast {
     double velocity;      ///< w = [u(t + 2·size) − u(t)]/(2·size) [m/s]
     double acceleration;  ///< its rate without a tip force, [u_t(t + 2·size) − u_t(t)]/(2·size) [m/s²]
   };
-  /// Under the load that load_potential() refers to, by two trial steps, which leave no trace.
+  /// Under the loads that act now, by two trial steps, which leave no trace.
   /// @throws as step()
   Forecast forecast(double size);
   /// What a load adds to the forecast per unit, which is linear in it.
@@ -198,33 +235,47 @@ class Beam {
   void restore(const std::vector<double>& state);
 
  protected:
-  explicit Beam(std::size_t motion_size) : motion_size_(motion_size) {}
+  Beam(std::shared_ptr<const Discretisation> space, const Parameters& parameters, Eigen::Index memory);
+  /// @throws std::invalid_argument if one of these is so large that outputs could overflow
+  static void require_coefficients(std::initializer_list<double> values);
 
+  struct Motion {
+    Eigen::VectorXd q, v;
+    Eigen::VectorXd memory;  ///< what else the integrator knows; 0 if nothing
+  };
   /// Beside the motion, what a state has.
   struct Scalars {
     double integral, integral_2, dissipated, load_work;
+    double impulse;    // at the tip since the last step [N·s]
     double tip_force;  // C [N] and the loads at the end of the last step, or as observed since
     Loads::Values loads;
   };
 
-  /// Makes the step and changes `now_`, but for the loads. Returns a sum of squares of the new motion, see `largest`.
-  virtual double advance(double size, const Polynomial& tip_force, const Loads& loads) = 0;
-  virtual void undo() = 0;  ///< takes the last advance() back, but for `now_`
-  virtual void strike(double impulse) = 0;
-  virtual void book() const {}  ///< adds to `now_` what the last step dissipated and its loads did
-  virtual void save_motion(double* numbers) const = 0;     ///< motion_size of them
-  virtual void restore_motion(const double* numbers) = 0;  ///< likewise
+  /// Makes `motion_` of `start_` and changes `now_`, but for its forces and, if book_step() does it, work.
+  virtual void advance(double size, const Polynomial& tip_force, const Loads& loads) = 0;
+  /// Adds to `now_` what the last step dissipated and its loads did. Called when that is asked for or a step follows: a
+  /// step that is tried and taken back, as event location does with ever new sizes, never pays for it.
+  virtual void book_step() const {}
 
-  /// While coefficients stay below `largest_coefficient`, inputs and the sum of squares below `largest`, and step sizes
-  /// [s] below `largest_size`, no output can overflow. What is not is refused.
-  static constexpr double largest_coefficient = 1e40, largest = 1e120, largest_size = 1e10;
-  static void require_coefficients(std::initializer_list<double> values);  ///< @throws std::invalid_argument
+  Eigen::VectorXd force(Loads::Values loads, double tip_force = 0.0) const;  ///< Σ values·F
 
+  double alpha_b_;          // [s]
+  Eigen::VectorXd struck_;  // M⁻¹e, the velocity that a unit impulse leaves
+  Motion motion_, start_;   // now, and at the start of the last step
   mutable Scalars now_{};
 
  private:
   class Trial;
-  std::size_t motion_size_;
+  void book() const;
+  std::size_t state_size() const;
+  Eigen::VectorXd inertia_force() const;  ///< M q̈ under what acts now: all forces that stiffness and damping leave
+  Eigen::VectorXd acceleration() const { return space_->mass_solve(inertia_force()); }
+  double potential_loads(const Eigen::VectorXd& x) const;
+  Response respond(const Eigen::VectorXd& acceleration, Loads::Values loads, double tip_force) const;
+
+  std::shared_ptr<const Discretisation> space_;
+  Eigen::Matrix<double, shape_points, Loads::count> shear_, moment_;  // internal forces of each load
+  mutable bool booked_ = true;                                        // whether `now_` has the work of the last step
 };
 
 /// @pre each parameter is within its own limits, those of the table in fmus/beam/beam_fmu.cpp

@@ -2,12 +2,12 @@
 // improved numerical dissipation: the generalized-α method", J. Appl. Mech. 60, 1993, 371–375), direct in the mesh's
 // unknowns. ρ∞ = 1 is the midpoint rule of Ahn & Tate, eq. (62).
 //
-//   M a_m + α_b K v_f + K q_f = F(t + (1−α_f)h)/ρA,   x_m = (1−α_m) x₁ + α_m x₀,  x_f = (1−α_f) x₁ + α_f x₀,
+//   M a_m + α_b K v_f + K q_f = F(t + (1−α_f)h),   x_m = (1−α_m) x₁ + α_m x₀,  x_f = (1−α_f) x₁ + α_f x₀,
 //   q₁ = q₀ + h v₀ + h² [(½−β) a₀ + β a₁],   v₁ = v₀ + h [(1−γ) a₀ + γ a₁],
 //   α_m = (2ρ∞−1)/(ρ∞+1),  α_f = ρ∞/(ρ∞+1),  γ = ½ − α_m + α_f,  β = (1 − α_m + α_f)²/4.
 //
 // For ρ∞ = 1 the acceleration drops out, and the step is, with the mean velocity w = (q₁ − q₀)/h,
-//   [M + (h²/4 + α_b h/2) K] w = M v₀ + (h/2)(F̄/ρA − K q₀),   q₁ = q₀ + h w,   v₁ = 2w − v₀,
+//   [M + (h²/4 + α_b h/2) K] w = M v₀ + (h/2)(F̄ − K q₀),   q₁ = q₀ + h w,   v₁ = 2w − v₀,
 // F̄ the mean of F over the step (for ρ∞ < 1 F is taken at t + (1−α_f)h). Then E₁ − E₀ = F̄ᵀ(q₁ − q₀) − h α_b wᵀK w holds
 // to rounding, whatever happened to F or v between the steps. One step of iterative refinement, with K applied element
 // by element, makes that rounding relative to the strain energy instead of to ‖K‖‖w‖² (1e-13 instead of 1e-7 at EI =
@@ -28,10 +28,11 @@
 
 #include <memory>
 
-#include "beam.hpp"
+#include "timoshenko.hpp"
 
 namespace beam {
 
-std::unique_ptr<Beam> make_generalized_alpha_beam(const Parameters& parameters);
+std::unique_ptr<Beam> make_generalized_alpha_beam(const std::shared_ptr<const Timoshenko>& mesh,
+                                                  const Parameters& parameters);
 
 }  // namespace beam

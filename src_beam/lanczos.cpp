@@ -30,20 +30,19 @@ struct Operator {
 
 Eigen::MatrixXd lanczos_modes(const Timoshenko& mesh, Index count) {
   // Rayleigh quotient of the static tip shape: a little above the lowest ω².
-  const VectorXd shape = mesh.flexibility_times(mesh.unit_tip_force());
-  const double lowest = shape[mesh.tip_index()] / mesh.mass_norm2(shape);
+  const VectorXd shape = mesh.flexibility_times(mesh.load(Loads::tip));
+  const double lowest = mesh.tip(shape) / mesh.mass_norm2(shape);
 
   // ν K⁻¹: the factor ν lifts the eigenvalues ν/ω² to where Spectra's convergence test, which has an absolute part of
   // 4e-11, is relative.
-  Operator flexibility{mesh.size(), [&mesh, factor = 1e8 * lowest](const double* x, double* y) {
-                         mesh.flexibility_times(x, y);
-                         Eigen::Map<VectorXd>(y, mesh.size()) *= factor;
+  using Map = Eigen::Map<VectorXd>;
+  using Given = Eigen::Map<const VectorXd>;
+  const Index size = mesh.size();
+  Operator flexibility{size, [&mesh, size, factor = 1e8 * lowest](const double* x, double* y) {
+                         Map(y, size) = factor * mesh.flexibility_times(Given(x, size));
                        }};
-  Operator mass{mesh.size(), [&mesh](const double* x, double* y) {
-                  std::fill(y, y + mesh.size(), 0.0);
-                  mesh.add_mass_times(1.0, x, y);
-                }};
-  const Index subspace = std::min(mesh.size(), std::max(2 * count, count + 20));
+  Operator mass{size, [&mesh, size](const double* x, double* y) { Map(y, size) = mesh.mass_times(Given(x, size)); }};
+  const Index subspace = std::min(size, std::max(2 * count, count + 20));
   Spectra::SymGEigsShiftSolver<Operator, Operator, Spectra::GEigsMode::ShiftInvert> solver(flexibility, mass, count,
                                                                                            subspace, 0.0);
   solver.init();  // a fixed pseudo-random start

@@ -32,61 +32,27 @@ constexpr std::array<double, n_terms + max_order + 2> make_inverse_factorials() 
 
 constexpr auto inverse_factorial = make_inverse_factorials();
 
-// Unevaluated sum high + low: twice the digits where ω²−c²/4 cancels and where the phase ωt is large.
-struct Double2 {
-  double high, low;
-};
-
-Double2 product(double a, double b) {
-  const double p = a * b;
-  return {p, std::fma(a, b, -p)};
-}
-
-Double2 difference(const Double2& a, const Double2& b) {
-  const double s = a.high - b.high, bb = s - a.high;
-  const double error = (a.high - (s - bb)) - (b.high + bb);
-  const double low = error + (a.low - b.low);
-  const double high = s + low;
-  return {high, low - (high - s)};
-}
-
-Double2 square_root(const Double2& a) {
-  if (a.high <= 0.0) return {0.0, 0.0};
-  const double s = std::sqrt(a.high);
-  return {s, (std::fma(-s, s, a.high) + a.low) / (2.0 * s)};
-}
-
-Double2 times(const Double2& a, double b) {
-  const Double2 p = product(a.high, b);
-  const double low = p.low + a.low * b;
-  const double high = p.high + low;
-  return {high, low - (high - p.high)};
-}
-
 // Roots of μ² + dμ + x² = 0 as −d/2 ± iw (complex) or −d/2 ± w (real).
 struct Roots {
   double x, d;  // ωt, ct
-  Double2 w;    // |√(x² − d²/4)|
+  double w;     // |√(x² − d²/4)|
+  double rest;  // of w, if that is a phase: what its last digit leaves
   bool complex;
   double slow;  // |μ₊|, the smaller modulus
   double fast;  // |μ₋|
 };
 
 Roots roots(double omega, double c, double t) {
-  Roots z;
-  z.x = omega * t;
-  z.d = c * t;
-  Double2 square = difference(product(omega, omega), product(0.5 * c, 0.5 * c));
-  z.complex = square.high > 0.0;
-  if (!z.complex) square = {-square.high, -square.low};
-  z.w = times(square_root(square), t);
-  if (z.complex) {
-    z.slow = z.fast = z.x;
-  } else {
-    z.fast = 0.5 * z.d + z.w.high;
-    z.slow = z.x * (z.x / z.fast);
+  const double x = omega * t, d = c * t, half = 0.5 * c;
+  const double frequency = std::sqrt(std::abs(omega - half) * (omega + half));  // nothing cancels
+  if (omega <= half) {
+    const double w = frequency * t, fast = 0.5 * d + w;
+    return {x, d, w, 0.0, false, x * (x / fast), fast};
   }
-  return z;
+  if (frequency < 0.5 * omega) return {x, d, frequency * t, 0.0, true, x, x};
+  // The phase may be large where the damping is small: it is ωt, to twice the digits, less a small part.
+  const double less = half / (omega + frequency) * half * t, w = x - less;
+  return {x, d, w, std::fma(omega, t, -x) + ((x - w) - less), true, x, x};
 }
 
 // Power series; needs |μ±| ≤ 1. With b_n the n-th derivative of g at 0: γ_k = Σ b_n/(n+k)!.
@@ -132,55 +98,34 @@ struct SineCosine {
   double sine, cosine;
 };
 
-SineCosine sine_cosine(const Double2& phase) {
-  const double s = std::sin(phase.high), c = std::cos(phase.high);
-  return {s + phase.low * c, c - phase.low * s};
+SineCosine sine_cosine(const Roots& z) {
+  const double s = std::sin(z.w), c = std::cos(z.w);
+  return {s + z.rest * c, c - z.rest * s};
 }
 
 Gamma by_closed_form(const Roots& z) {
   Gamma gamma{};
   if (z.complex) {
     const double e = std::exp(-0.5 * z.d);
-    const SineCosine w = sine_cosine(z.w);
-    const double sinc = z.w.high > 0.0 ? w.sine / z.w.high : 1.0;
+    const SineCosine w = sine_cosine(z);
+    const double sinc = z.w > 0.0 ? w.sine / z.w : 1.0;
     gamma[1] = e * sinc;
     gamma[0] = e * (w.cosine - 0.5 * z.d * sinc);
   } else {
-    const double w = z.w.high;
-    gamma[1] = std::exp(-z.slow) * (w > 0.0 ? -std::expm1(-2.0 * w) / (2.0 * w) : 1.0);
+    gamma[1] = std::exp(-z.slow) * (z.w > 0.0 ? -std::expm1(-2.0 * z.w) / (2.0 * z.w) : 1.0);
     gamma[0] = std::exp(-z.fast) - z.slow * gamma[1];
   }
   recur(gamma, z.x, z.d);
   return gamma;
 }
 
-// φ_k(z) = (φ_{k−1}(z) − 1/(k−1)!)/z, φ₀ = exp: phi[k], k = 0 … 5.
-using Phi = std::array<double, max_order + 1>;
-
-Phi phi_near(double z) {  // |z| ≤ 2
-  Phi phi{};
-  for (std::size_t k = 0; k < phi.size(); ++k) {
-    double sum = 0.0;
-    for (std::size_t n = n_terms; n-- > 0;) sum = sum * z + inverse_factorial[n + k];
-    phi[k] = sum;
-  }
-  return phi;
-}
-
-Phi phi_far(double z) {  // z ≤ −4
-  Phi phi{};
-  phi[0] = std::exp(z);
-  for (std::size_t k = 1; k < phi.size(); ++k) phi[k] = (phi[k - 1] - inverse_factorial[k - 1]) / z;
-  return phi;
-}
-
-// Strongly overdamped: the roots are far apart, γ_k = (φ_k(μ₊) − φ_k(μ₋))/(μ₊ − μ₋) does not cancel.
+// Strongly overdamped: with the roots far apart, γ_k = (φ_k(μ₊) − γ_{k−1})/|μ₋|, φ_k = exp[0,…,0,μ₊], loses nothing.
 Gamma by_separation(const Roots& z) {
-  const Phi slow = phi_near(-z.slow), fast = phi_far(-z.fast);
-  const double gap = 2.0 * z.w.high;
+  const Gamma phi = by_series(0.0, z.slow);  // whose roots are 0 and μ₊: phi[k] = φ_k
   Gamma gamma{};
-  for (std::size_t k = 0; k < slow.size(); ++k) gamma[k + 1] = (slow[k] - fast[k]) / gap;
-  gamma[0] = fast[0] - z.slow * gamma[1];
+  gamma[1] = (phi[0] - std::exp(-z.fast)) / (2.0 * z.w);
+  gamma[0] = std::exp(-z.fast) - z.slow * gamma[1];
+  for (std::size_t k = 1; k + 1 < gamma.size(); ++k) gamma[k + 1] = (phi[k] - gamma[k]) / z.fast;
   return gamma;
 }
 
@@ -210,7 +155,7 @@ OscillatorResponse oscillator_response(double omega, double c, double t) {
 }
 
 UndampedStep undamped_step(double omega, double t) {
-  const SineCosine x = sine_cosine(product(omega, t));
+  const SineCosine x = sine_cosine(roots(omega, 0.0, t));
   const double sign = x.cosine >= 0.0 ? 1.0 : -1.0;
   const double sine = sign * x.sine, cosine = sign * x.cosine;
   return {sign, sine / (1.0 + cosine) / omega, sine / omega};

@@ -18,24 +18,35 @@
 // meaning, and the energy could not be conserved.
 #pragma once
 
-#include <Eigen/Core>
-
 #include "timoshenko.hpp"
 
 namespace beam {
 
-/// Mass-normalised: φᵀ M φ = 1 kg, φᵀ K φ = ω². m of them, ω ascending (to rounding).
-struct Modes {
+/// Mass-normalised: φᵀ M φ = 1 kg, φᵀ K φ = ω². m of them, ω ascending (to rounding), φ_u(L) ≥ 0. Unknowns are the
+/// modal displacements η [m √kg].
+struct Modes final : Discretisation {
   Eigen::VectorXd omega;                            ///< [rad/s], m
-  Eigen::VectorXd tip;                              ///< φ_u(L) ≥ 0 [1/√kg], m
-  Eigen::VectorXd tip_rotation;                     ///< φ_θ(L) [1/(m √kg)], m
+  Eigen::VectorXd tip_rotations;                    ///< φ_θ(L) [1/(m √kg)], m
   std::array<Eigen::VectorXd, Loads::count> loads;  ///< modal force per unit of each, as ∫ φ_u dx [m/√kg], m
-  Eigen::VectorXd linear_shape;                     ///< coordinates of u = x, θ = 0: φᵀ M q [m √kg], m
-  Eigen::MatrixXd deflection;                       ///< φ_u at the output points, 21 × m
-  Eigen::MatrixXd rotation;                         ///< φ_θ at the output points, 21 × m
-  Eigen::MatrixXd shear, moment;                    ///< of the inertia of φ there, 21 × m, see Timoshenko::inertia()
-  LoadResultants resultants;                        ///< of the loads there
+  Eigen::VectorXd start;                            ///< coordinates of u = x, θ = 0: φᵀ M q [m √kg], m
+  Eigen::MatrixXd deflections, rotations;           ///< φ_u and φ_θ at the output points, 21 × m
+  Eigen::MatrixXd shears, moments;                  ///< of the inertia of φ there, 21 × m, see inertia()
   double residual = 0.0;  ///< largest ‖φ − ω² K⁻¹M φ‖_K / ω of the computed modes, φ with unit M-norm
+
+  Eigen::VectorXd linear_shape() const override { return start; }
+  const Eigen::VectorXd& load(std::size_t shape) const override { return loads[shape]; }
+  Eigen::VectorXd mass_solve(const Vector& f) const override { return f; }
+  Eigen::VectorXd stiffness_times(const Vector& eta) const override { return omega.cwiseAbs2().cwiseProduct(eta); }
+  Eigen::VectorXd flexibility_times(const Vector& f) const override { return f.cwiseQuotient(omega.cwiseAbs2()); }
+  double mass_norm2(const Vector& eta) const override { return eta.squaredNorm(); }
+  double stiffness_norm2(const Vector& eta) const override { return omega.cwiseProduct(eta).squaredNorm(); }
+  double tip(const Vector& eta) const override { return loads[Loads::tip].dot(eta); }
+  double tip_rotation(const Vector& eta) const override { return tip_rotations.dot(eta); }
+  Shape deflection(const Vector& eta) const override { return deflections * eta; }
+  Shape rotation(const Vector& eta) const override { return rotations * eta; }
+  InternalForces inertia(const Vector& acceleration) const override {
+    return {shears * acceleration, moments * acceleration};
+  }
 };
 
 /// Lowest modes by implicitly restarted Lanczos on K⁻¹M, M-orthonormal columns.
@@ -43,7 +54,8 @@ struct Modes {
 Eigen::MatrixXd lanczos_modes(const Timoshenko& mesh, Eigen::Index count);
 inline constexpr const char* remedy = "; keep fewer n_modes, or use the integrator generalized_alpha";
 
+/// The lowest `n_modes`, 0 = all, and what completes them.
 /// @throws std::runtime_error if the eigensolver does not converge
-Modes compute_modes(const Timoshenko& mesh, const Parameters& parameters);
+Modes compute_modes(const Timoshenko& mesh, Eigen::Index n_modes);
 
 }  // namespace beam

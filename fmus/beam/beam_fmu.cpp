@@ -104,22 +104,22 @@ struct BeamModel final : fmi::Model {
   const View& view() const {
     if (!view_) {
       view_.emplace();
-      beam->deflection(view_->deflection);
-      beam->rotation(view_->rotation);
-      view_->response = beam->response(Beam::Order::value);
+      view_->deflection = beam->deflection();
+      view_->rotation = beam->rotation();
+      view_->response = beam->response();
     }
     return *view_;
   }
   Beam::Response response_rate() const {
     Loads::Values rates{};
     loads.for_each([&](std::size_t i, const fmi::Polynomial& f) { rates[i] = f[1]; });
-    return beam->response(Beam::Order::rate, rates, tip_force[1]);
+    return beam->response_rate(rates, tip_force[1]);
   }
   /// Of `forces`, at the point where the bending moment is largest now.
   double bending_stress(const beam::InternalForces& forces) const {
     const beam::Shape& moment = view().response.forces.moment;
-    const auto less = [](double a, double b) { return std::abs(a) < std::abs(b); };
-    const auto most = static_cast<std::size_t>(std::max_element(moment.begin(), moment.end(), less) - moment.begin());
+    Eigen::Index most = 0;
+    moment.cwiseAbs().maxCoeff(&most);
     const double sign = moment[most] < 0.0 ? -1.0 : 1.0;
     return sign * forces.moment[most] * parameters.section_height / (2.0 * parameters.second_moment_of_area);
   }
@@ -369,7 +369,7 @@ fmi::Table fmi::make_table() {
         return m.resting ? std::numeric_limits<double>::quiet_NaN() : of_response(m, m.beam->response_per_load(load));
       });
     };
-    follows("tip_force", Loads::count);
+    follows("tip_force", Loads::tip);
     for (std::size_t i = 0; i < load_names.size(); ++i) follows(load_names[i], i);
   };
   using M = const BeamModel&;

@@ -33,9 +33,8 @@ constexpr double h = 0.004;
 /// What a step of (62) needs at the least.
 class Bare {
  public:
-  explicit Bare(const beam::Parameters& p) : mesh_(p), K_(mesh_.stiffness()), b_(mesh_.linear_shape()) {
-    Eigen::SparseMatrix<double> S = mesh_.mass();
-    S.coeffs() += 0.25 * h * h * K_.coeffs();
+  explicit Bare(const beam::Parameters& p) : mesh_(p), K_(assembled(0.0, 1.0)), b_(mesh_.linear_shape()) {
+    const Eigen::SparseMatrix<double> S = assembled(1.0, 0.25 * h * h);
     factor_.compute(S);
     if (factor_.info() != Eigen::Success) throw std::runtime_error("not factorised");
   }
@@ -46,6 +45,19 @@ class Bare {
   }
 
  private:
+  /// Its lower triangle, in the pattern of both matrices.
+  Eigen::SparseMatrix<double> assembled(double m, double k) const {
+    const Eigen::MatrixXd element = mesh_.element(m, k);
+    Eigen::SparseMatrix<double> matrix(mesh_.size(), mesh_.size());
+    for (Eigen::Index first = -2; first + 2 < mesh_.size(); first += element.rows() - 2) {
+      for (Eigen::Index i = 0; i < element.rows(); ++i) {
+        for (Eigen::Index j = std::max<Eigen::Index>(0, -first); j <= i; ++j)
+          matrix.coeffRef(first + i, first + j) += element(i, j);
+      }
+    }
+    return matrix;
+  }
+
   beam::Timoshenko mesh_;
   Eigen::SparseMatrix<double> K_;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> factor_;

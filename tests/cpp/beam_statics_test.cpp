@@ -93,16 +93,14 @@ TEST(BeamStatics, MotionComesToRestInTheStaticShape) {
         EXPECT_NEAR(b->tip_acceleration(), 0.0, 1e-7);  // forces in balance up to rounding of KAG/h u/(ρA h)
         // θ(L) = Σ h (L − x_mid)/EI = L²/2EI; the static shape is in the basis, so this too holds for any n_modes.
         EXPECT_NEAR(b->tip_rotation(), C * L * L / (2.0 * EI), 1e-12);
-        std::array<double, shape_points> u, theta;
-        b->deflection(u);
-        b->rotation(theta);
+        const Shape u = b->deflection(), theta = b->rotation();
         EXPECT_EQ(u[0], 0.0);
         EXPECT_EQ(theta[0], 0.0);
         EXPECT_NEAR(u[20], b->tip_displacement(), 1e-14);
         EXPECT_NEAR(theta[20], b->tip_rotation(), 1e-14);
         for (int j = 0; j <= 20; ++j) {  // 20 elements: every output point is a node
           const double x = L * j / 20.0, shape = (L * x - 0.5 * x * x) / EI;
-          EXPECT_NEAR(theta[static_cast<std::size_t>(j)], C * shape, 1e-12) << j;
+          EXPECT_NEAR(theta[j], C * shape, 1e-12) << j;
         }
       }
     }
@@ -134,7 +132,7 @@ TEST(BeamStatics, LoadsAreConsistent) {
     p.alpha_b = 1.0;
     p.n_modes = 3;
     Timoshenko mesh(p);
-    const Eigen::VectorXd shape = mesh.flexibility_times(mesh.unit_tip_force()) / (p.density * p.area);
+    const Eigen::VectorXd shape = mesh.flexibility_times(mesh.load(Loads::tip));
     const auto at_rest = [&](const Loads& loads) {
       auto b = make_beam(p);
       for (int i = 0; i < 200; ++i) b->step(5.0, {0.0, 0.0, 0.0}, loads);

@@ -38,7 +38,19 @@ inline Parameters general_beam(int n_elements, int element_degree = 1) {
   return p;
 }
 
-inline Modes modes_of(const Parameters& p) { return compute_modes(Timoshenko(p), p); }
+/// m M + k K of the mesh, a product a column.
+inline Eigen::MatrixXd assembled(const Timoshenko& mesh, double m, double k) {
+  const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(mesh.size(), mesh.size());
+  Eigen::MatrixXd matrix(mesh.size(), mesh.size());
+  for (Eigen::Index i = 0; i < mesh.size(); ++i) {
+    Eigen::VectorXd column = Eigen::VectorXd::Zero(mesh.size());
+    mesh.add_products(m, unit.col(i), k, unit.col(i), column);
+    matrix.col(i) = column;
+  }
+  return matrix;
+}
+
+inline Modes modes_of(const Parameters& p) { return compute_modes(Timoshenko(p), p.n_modes); }
 
 /// Of the modal beam, ascending [rad/s].
 inline std::vector<double> frequencies(const Parameters& p) {
@@ -51,11 +63,11 @@ inline std::vector<double> frequencies(const Parameters& p) {
 /// u(L) per unit static tip force [m/N], of the modes and of the mesh.
 inline double static_tip_compliance(const Parameters& p) {
   const Modes modes = modes_of(p);
-  return modes.tip.cwiseQuotient(modes.omega).squaredNorm();
+  return modes.loads[Loads::tip].cwiseQuotient(modes.omega).squaredNorm();
 }
 inline double mesh_tip_compliance(const Parameters& p) {
   const Timoshenko mesh(p);
-  return mesh.flexibility_times(mesh.unit_tip_force())[mesh.tip_index()] / mesh.mass_per_length();
+  return mesh.tip(mesh.flexibility_times(mesh.load(Loads::tip)));
 }
 
 inline Parameters with_integrator(Parameters p, Integrator integrator, double rho_inf = 1.0) {
@@ -129,11 +141,7 @@ inline std::vector<double> outputs(const Beam& b) {
                              b.dissipated_energy(),
                              b.load_work(),
                              b.load_potential()};
-  std::array<double, shape_points> shape;
-  b.deflection(shape);
-  all.insert(all.end(), shape.begin(), shape.end());
-  b.rotation(shape);
-  all.insert(all.end(), shape.begin(), shape.end());
+  for (const Shape& shape : {b.deflection(), b.rotation()}) all.insert(all.end(), shape.begin(), shape.end());
   return all;
 }
 
