@@ -171,8 +171,8 @@ void Beam::rest() {
 }
 
 VectorXd Beam::force(Loads::Values loads, double tip_force) const {
-  loads[Loads::tip] += tip_force;
-  VectorXd sum = VectorXd::Zero(motion_.q.size());
+  // In the order of a modal step: what is at rest stays there to the last digit.
+  VectorXd sum = tip_force * space_->load(Loads::tip);
   for (std::size_t i = 0; i < Loads::count; ++i) {
     if (loads[i] != 0.0) sum += loads[i] * space_->load(i);
   }

@@ -16,8 +16,8 @@ using Eigen::Index;
 
 /// Structure of arrays over the modes, G_k as in modal_oscillator.hpp; φ stands for φ(L).
 struct Coefficients {
-  ArrayXd sign, kick, drift, reflection;  // undamped; reflection = (1 − sign)/ω²
-  ArrayXd one_minus_decay;                // damped; 1 − ġ = ω²G₁ + cG₀
+  ArrayXd sign, kick, drift;  // undamped
+  ArrayXd one_minus_decay;    // damped; 1 − ġ = ω²G₁ + cG₀
   std::array<ArrayXd, 6> G;
   struct Integral {  // from η₀ and v₀ per mode; from the tip force in sum
     ArrayXd eta, v;
@@ -65,15 +65,17 @@ class ModalBeam final : public Beam {
       });
       force_[0] += load_[0];
     }
-    r_ = force_[0] - omega2_ * eta;
+    // As the beam is put at rest, so that it stays there to the last digit.
+    rest_ = force_[0] / omega2_;
+    r_ = omega2_ * (rest_ - eta);
     if (damped_) {
       eta_next = eta + (k.G[0] * v + k.G[1] * r_);
       v_next = v + (k.G[0] * r_ - k.one_minus_decay * v);
     } else {
       v_next = v + k.kick * r_;
       eta_next = eta + k.drift * v_next;
-      v_next = k.sign * (v_next + k.kick * (force_[0] - omega2_ * eta_next));
-      eta_next = k.sign * eta_next + k.reflection * force_[0];
+      v_next = k.sign * (v_next + k.kick * (omega2_ * (rest_ - eta_next)));
+      eta_next = k.sign * eta_next + (1.0 - k.sign) * rest_;
     }
     unbooked_.varying = unbooked_.varying || unbooked_.load_varies;
     if (unbooked_.varying) {
@@ -99,7 +101,7 @@ class ModalBeam final : public Beam {
   void make_coefficients(double h, Coefficients& k) const {
     const Index m = tip_.size();
     for (ArrayXd& G : k.G) G.resize(m);
-    for (ArrayXd* array : {&k.one_minus_decay, &k.sign, &k.kick, &k.drift, &k.reflection}) array->resize(m);
+    for (ArrayXd* array : {&k.one_minus_decay, &k.sign, &k.kick, &k.drift}) array->resize(m);
     for (Coefficients::Integral& of : k.integral) of = {ArrayXd(m), ArrayXd(m), {}};
     for (Index i = 0; i < m; ++i) {
       const double phi = tip_[i], c = damping_[i];
@@ -118,7 +120,6 @@ class ModalBeam final : public Beam {
         k.sign[i] = undamped.sign;
         k.kick[i] = undamped.kick;
         k.drift[i] = undamped.drift;
-        k.reflection[i] = (1.0 - undamped.sign) / omega2_[i];
       }
     }
   }
@@ -175,7 +176,7 @@ class ModalBeam final : public Beam {
   bool damped_;
 
   // Of the last step.
-  ArrayXd r_;
+  ArrayXd rest_, r_;  // where its first force would hold the modes, and what of that force their displacement leaves
   std::array<ArrayXd, 3> force_, load_;  // modal force and its part that is the loads', with their rates [N/√kg, …]
   struct Unbooked {
     double size;
