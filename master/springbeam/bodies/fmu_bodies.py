@@ -202,7 +202,10 @@ class FmuBody(Body):
             raise fmu.failed(status, "cannot set input derivatives")
         if (status := fmu.do_step()) > WARNING:
             fmu.refuse(status)
-        return self._tell()
+        told = self._outputs.get()
+        if not isfinite(sum(told)):
+            self._check(told)
+        return self._take(told)
 
     def _begin(self) -> None:
         """Read the motion that the FMU was initialised to."""
@@ -224,10 +227,14 @@ class FmuBody(Body):
     def _tell(self) -> Motion:
         """Read the motion, and the energies that belong to it."""
         told = self._outputs.get()
-        if not isfinite(sum(told)) and not all(map(isfinite, told)):
+        self._check(told)
+        return self._take(told)
+
+    def _check(self, told: tuple[float, ...]) -> None:
+        """Raise StepRefused if the FMU has told a number that is not finite."""
+        if not all(map(isfinite, told)):
             values = ", ".join(f"{name} = {value}" for name, value in zip(self._outputs.names, told, strict=True))
             raise StepRefused(f"not finite: {values} of {self.fmu.path.name}")
-        return self._take(told)
 
     def _stored(self) -> tuple[float, ...]:
         """Return the energies [J]; the kinetic one has the impulse that is still pending."""

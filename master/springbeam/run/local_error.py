@@ -12,6 +12,7 @@ from ..contact.phases import Phase
 from ..coupling.protocol import Scales, Step
 from ..results.paths import Path
 from ..scene import Scene
+from ..scene.statics import tip_compliance
 from .macro_steps import AdaptiveSteps
 from .outcome import RunStopped
 from .stepping import Pair, State
@@ -40,6 +41,8 @@ class LocalError(Stateful):
         self._pair, self._steps = pair, steps
         self._relative = scene.coupling.relative_tolerance or 0.0
         self._absolute = scene.coupling.absolute_tolerance or 0.0
+        #: By how much a unit of the contact force bends the beam [m/N].
+        self._compliance = 0.0 if scene.beam is None else tip_compliance(scene.beam)
         at_start = [end.displacement for end in pair.ends()]
         self.state = Reach(at_start, at_start)
 
@@ -68,13 +71,14 @@ class LocalError(Stateful):
         lowest, highest, speed = self._extremes(step)
         ranges = [high - low for low, high in zip(lowest, highest, strict=True)]
         cubic = [_beside_cubic(a, b, size) for a, b in zip(step.start, step.end, strict=True)]
-        span = min((r for r in ranges if r > 0.0), default=0.0)
+        rounding = self._rounding(state.contact[0])
+        span = min((r for r, least in zip(ranges, rounding, strict=True) if r > least), default=0.0)
         if span == 0.0:
             return 0.0, _CUBIC
         tolerance = self._relative + self._absolute / span
         coupling = pair.coupling(state.phase)
         scales = Scales(span, speed, self.state.energy, pair.reduced_mass(Phase()))
-        curve = self._curve(cubic, ranges)
+        curve = self._curve(cubic, ranges, rounding)
         told = coupling.local_errors(step, scales)
         return max(curve, *((error / tolerance, order) for error, order in told)) if told else curve
 
@@ -89,17 +93,20 @@ class LocalError(Stateful):
         highest = [max(high, *places) for high, places in zip(self.state.highest, passed, strict=True)]
         return lowest, highest, max(self.state.fastest, *(abs(end.velocity) for end in (*step.start, *step.end)))
 
-    def _curve(self, errors: list[float], ranges: list[float]) -> tuple[float, int]:
+    def _curve(self, errors: list[float], ranges: list[float], rounding: list[float]) -> tuple[float, int]:
         allowed = (self._absolute + self._relative * r for r in ranges)
-        told = zip(errors, ranges, allowed, self._rounding(), strict=True)
+        told = zip(errors, ranges, allowed, rounding, strict=True)
         ratios = [e / (a + least) for e, r, a, least in told if r > 0.0]
         return max(ratios, default=0.0), _CUBIC
 
-    def _rounding(self) -> list[float]:
+    def _rounding(self, contact: float) -> list[float]:
         """Up to where displacements of the ends are rounding [m]: no step is too long for that, though from rest the
-        motion so far is shorter still."""
+        motion so far is shorter still.
+
+        The tip is the sum of what the loads make of it and the force ``contact`` [N], which may be larger than it.
+        """
         places = zip(self.state.lowest, self.state.highest, strict=True)
-        return [_ULPS * _EPS * max(abs(low), abs(high)) for low, high in places]
+        return [_ULPS * _EPS * max(abs(low), abs(high), self._compliance * abs(contact)) for low, high in places]
 
 
 def _beside_cubic(start: Motion, end: Motion, size: float) -> float:
