@@ -36,14 +36,16 @@ struct Timoshenko::Element {
   Eigen::Matrix<double, N, P, 0, most + 1, most> slope, shear;  // Sᵀ, and h/r Tᵀ but for its last coefficient
   using Own = Eigen::Matrix<double, D, 1, 0, 2 * most, 1>;      // of all unknowns but the left node's
   Strains weight;
-  Eigen::Matrix<double, D, D, 0, 2 * most, 2 * most> flexibility;
+  Own weights;                                                      // of all strains
+  Eigen::Matrix<double, D, D, 0, 2 * most, 2 * most> from_strains;  // the unknowns of one that is clamped at its left
 
   explicit Element(const Timoshenko& mesh)
       : mass(mesh.mass_),
         slope(mesh.S_.transpose()),
         shear(mesh.h_ / mesh.r_ * mesh.T_.topRows(mesh.p_).transpose()),
         weight{mesh.weights_.row(0).transpose(), mesh.weights_.row(1).transpose()},
-        flexibility(mesh.flexibility_) {}
+        weights(mesh.weights_.reshaped()),
+        from_strains(mesh.from_strains_) {}
 
   Index p() const { return slope.cols(); }  // where it is known, to the compiler, too
   Fields of(const double* x, Index e) const { return {field(x, e), field(x + 1, e)}; }
@@ -101,7 +103,7 @@ Timoshenko::Timoshenko(const Parameters& p)
       T_(MatrixXd::Zero(p_ + 1, p_ + 1)),
       S_(MatrixXd::Zero(p_, p_ + 1)),
       weights_(2, p_),
-      flexibility_(2 * p_, 2 * p_) {
+      from_strains_(2 * p_, 2 * p_) {
   const double mu = p.density * p.area, s = p.shear_modulus * p.shear_coefficient * p.area;
   const double b = p.young_modulus * p.area;
   double top = b;  // b_{p−1}
@@ -138,15 +140,13 @@ Timoshenko::Timoshenko(const Parameters& p)
 
   // Its unknowns by the strains, first θ̃, then u, and the forces that these strains take, likewise.
   const MatrixXd from_slope = S_.rightCols(p_).inverse().transpose();
-  MatrixXd from_strains(2 * p_, 2 * p_);
   for (Index i = 0; i < 2 * p_; ++i) {
     MatrixXd strain = MatrixXd::Zero(2, p_);
     strain(i % 2, i / 2) = 1.0;
-    Map<MatrixXd> q(from_strains.col(i).data(), 2, p_);
+    Map<MatrixXd> q(from_strains_.col(i).data(), 2, p_);
     q.row(0) = strain.row(0) * from_slope;
     q.row(1) = (strain.row(1) + q.row(0) * (h_ / r_ * T_.topRightCorner(p_, p_).transpose())) * from_slope;
   }
-  flexibility_ = from_strains * weights_.reshaped().cwiseInverse().asDiagonal() * from_strains.transpose();
   mass_factors_ = factors(1.0, 0.0);
 }
 
@@ -211,7 +211,9 @@ VectorXd Timoshenko::flexibility_times(const Vector& f) const {
       own.template tail<2>() += beyond;
       beyond = own.template tail<2>();
       beyond[0] += h_ / r_ * beyond[1];
-      q.segment(2 * p_ * e, 2 * p_) = element.flexibility.lazyProduct(own);
+      // By the strains: what rounding leaves in them is as small as they are, however stiff they are.
+      own = element.from_strains.transpose().lazyProduct(own).cwiseQuotient(element.weights).eval();
+      q.segment(2 * p_ * e, 2 * p_) = element.from_strains.lazyProduct(own);
     }
     Vector2 left(0.0, 0.0);  // θ̃ and u
     for (Index e = 0; e < n_; ++e) {

@@ -84,13 +84,13 @@ class Timoshenko final : public Discretisation {
 
   Parameters parameters_;
   Eigen::Index n_, p_;
-  double h_;                     // element length [m]
-  double r_;                     // √(I/A) [m]
-  Eigen::MatrixXd T_;            // Legendre coefficients of a field by its unknowns (left node, bubbles, right node)
-  Eigen::MatrixXd S_;            // h times those of its derivative
-  Eigen::MatrixXd mass_;         // of a field in an element
-  Eigen::MatrixXd weights_;      // (b_j, s)/h(2j+1) of the strains h κ_j, h γ_j
-  Eigen::MatrixXd flexibility_;  // of an element that is clamped at its left node
+  double h_;                      // element length [m]
+  double r_;                      // √(I/A) [m]
+  Eigen::MatrixXd T_;             // Legendre coefficients of a field by its unknowns (left node, bubbles, right node)
+  Eigen::MatrixXd S_;             // h times those of its derivative
+  Eigen::MatrixXd mass_;          // of a field in an element
+  Eigen::MatrixXd weights_;       // (b_j, s)/h(2j+1) of the strains h κ_j, h γ_j
+  Eigen::MatrixXd from_strains_;  // unknowns of an element that is clamped at its left node, by its strains
   BandFactors mass_factors_;
   mutable std::array<Eigen::VectorXd, Loads::count> loads_;  // where one was asked for
 };

@@ -13,7 +13,7 @@ from springbeam.studies import rivals
 
 
 class _Clock:
-    perf_counter = staticmethod(process_time)
+    perf_counter = process_time = staticmethod(process_time)
 
 
 # What runs report as their wall time.

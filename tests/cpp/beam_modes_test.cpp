@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <vector>
 
 #include "beam.hpp"
@@ -274,6 +275,20 @@ TEST(InternalForces, OfTheFirstModesConvergeWithTwiceTheDegree) {
       for (const int i : {0, 1})
         EXPECT_NEAR(std::log2(errors[0][i] / errors[1][i]), 2.0 * degree, 0.3) << degree << mode;
     }
+  }
+}
+
+TEST(BeamModes, AreFoundToRoundingWhereShearIsTenPowersOfTenStiffer) {
+  Parameters p;
+  p.second_moment_of_area = 1e-5;
+  p.young_modulus = 1.5e-6;
+  p.shear_modulus = 650.0;
+  for (const int degree : {1, 2, 4}) {
+    p.n_elements = 1;
+    p.element_degree = degree;
+    const Modes modes = compute_modes(Timoshenko(p), p.n_modes);
+    const double rounding = std::numeric_limits<double>::epsilon() * modes.omega.maxCoeff() / modes.omega.minCoeff();
+    EXPECT_LT(modes.residual, 10.0 * rounding) << degree;
   }
 }
 
