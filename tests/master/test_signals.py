@@ -59,13 +59,21 @@ def test_a_motion_repeats_itself_after_three_periods_if_it_does_so_eight_times(c
 
 
 def test_the_response_to_a_chirp_is_that_of_whole_pairs_of_its_turns():
-    """Of 2.5 turns two, from 1 s to 1.2 s; what comes before and after does not count."""
+    """Two of 2.5 turns count, those from 1 s to 1.2 s; what comes before and after does not."""
     chirp = Load(on="tip", signal="chirp", start=1.0, frequency=10.0, frequency_end=10.0, duration=0.25)
     time = 1e-3 * np.arange(2000)
     values = np.where((time > 0.9995) & (time < 1.1995), 3.0 * np.sin(20.0 * np.pi * time), 9.0)
     found = response(0, chirp, time, values)
     assert found.frequency == pytest.approx([10.0])
     assert found.amplitude == pytest.approx([3.0])
+
+
+@pytest.mark.parametrize("rows", [2, 4, 4001])
+def test_turns_of_a_chirp_between_two_rows_have_no_response(rows):
+    chirp = Load(on="tip", signal="chirp", frequency=100.0, frequency_end=10.0, duration=1.0)
+    time = np.append(np.linspace(0.0, 0.3, rows), 1.0)  # from 0.3 s on it turns 33 times
+    found = response(0, chirp, time, np.sin(time))
+    assert len(found.frequency) == len(found.amplitude) == (13 if rows == 4001 else 0)
 
 
 # -- shock response spectra ---------------------------------------------------------------------------------------

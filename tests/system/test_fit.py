@@ -144,7 +144,7 @@ def test_a_clock_is_held_where_the_user_says(tmp_path):
 
 
 def test_intervals_hold_what_is_right_in_most_cases(tmp_path):
-    """Of data with noise of 2 % of the largest value; the clock is held.
+    """The data has noise of 2 % of its largest value; the clock is held.
 
     Four of four have a chance of 81 %, three or more of 98.6 %; these seeds are fixed.
     """

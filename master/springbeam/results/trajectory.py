@@ -226,8 +226,8 @@ class Trajectory:
         What clamp and sections feel at that instant grows with the number of elements and has gone by the next row.
         """
         beam, later = self.scene.beam, self.time > self.time[:1]
-        straight = beam is not None and (beam.initial_deflection_slope, beam.initial_velocity_slope) != (0.0, 0.0)
-        if not straight or not later.any():
+        leans = beam is not None and (beam.initial_deflection_slope, beam.initial_velocity_slope) != (0.0, 0.0)
+        if not leans or not later.any():
             return self
         columns, table = {name: values[later] for name, values in self.columns.items()}, self.shape_table
         return replace(self, columns=columns, shape_table=None if table is None else table[table[:, 0] > self.time[0]])

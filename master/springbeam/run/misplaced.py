@@ -141,6 +141,7 @@ def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, 
     Further what a constant force of 1 N adds to them, and 1 N·s² that moves a free mass before the step, (2n,) each,
     and how far 1 N moves the tip [m/N].
     """
+    # A free mass is a mode so soft that it does not turn; 1 − cos would leave nothing of a softer one.
     stiffness, decay, tip = np.maximum(modes[0], 1e-8 / H**2), 0.5 * modes[1], modes[2]
     root = np.sqrt(decay**2 - stiffness * (1.0 + 1e-12j))  # never 0
     slower, faster = np.exp((root - decay) * H), np.exp(-(root + decay) * H)

@@ -73,9 +73,9 @@ def _at_events(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Eve
 
     The mismatch is the impulse μ |v_tip − z|, the root of the sum of all events' squares. Either end of the last step
     counts: the mismatch alternates, and where the step is cut it may be small by chance. Strikes less than a macro step
-    after another one are left out: they may be as slow as one likes. At
-    degree 0 the force decides when ends part, as far as some steps before tell how much it alternates (`_alternation`).
-    Both are over the momentum of the body that they would change the most.
+    after another one are left out: they may be as slow as one likes. At degree 0 the force decides when ends part, as
+    far as some steps before tell how much it alternates (`_alternation`). Both are over the momentum of the body that
+    they would change the most.
     """
     strikes = np.array([event.kind.strikes for event in events], bool)
     let_go = [event.kind.opens or event.kind is EventKind.UNSEATED for event in events]

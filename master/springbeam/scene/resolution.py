@@ -2,7 +2,7 @@
 
 When a run is called *not resolved*, and why, is in ``docs/coupling.md``, "Is the motion resolved?"; the constants are
 its limits. Frequencies are those of the beam, not of its mesh, so that asking costs next to nothing;
-`springbeam.studies.stability.predict` has the mesh's.
+`springbeam.studies.stability.predict` has the mesh's. Longer than other modules by the table of what is told.
 """
 
 from __future__ import annotations
@@ -87,9 +87,8 @@ def not_resolved(
         How far an end is from where a soft law would have it, over its way.
     """
     seen = _Seen(mismatch, alternation, shortest_contact, misplaced)
-    of_steps = (
-        () if scene.coupling.adaptive else _OF_STEPS
-    )  # those that follow from tolerances are judged by their error
+    # Steps that follow from tolerances are judged by their error.
+    of_steps = () if scene.coupling.adaptive else _OF_STEPS
     return next(told(scene, (*of_steps, *_OF_ENDS), seen), None)
 
 

@@ -1,4 +1,7 @@
-"""Scenes that cannot be run although each value is allowed: which keys and values do not go together."""
+"""Scenes that cannot be run although each value is allowed: which keys and values do not go together.
+
+Longer than other modules, since nearly all of it is one table of such rules.
+"""
 
 from __future__ import annotations
 

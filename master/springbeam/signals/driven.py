@@ -122,7 +122,8 @@ def response(number: int, chirp: Load, time: np.ndarray, values: np.ndarray) -> 
     turns = (first + 0.5 * rate * since) * since + 1e-9
     whole = np.arange(turns[-1] // _OF_CHIRP if len(turns) else 0.0)
     begins = np.searchsorted(turns, _OF_CHIRP * np.append(whole, len(whole)))
-    values, rows = values[driven][: begins[-1]], np.diff(begins) > 1
-    ranges = np.maximum.reduceat(values, begins[:-1]) - np.minimum.reduceat(values, begins[:-1])
+    # One more value, that turns without rows at the end have a place; turns of one row or none have no range.
+    values, rows = np.append(values[driven][: begins[-1]], 0.0), np.diff(begins) > 1
+    ranges = (np.maximum.reduceat(values, begins) - np.minimum.reduceat(values, begins))[:-1]
     frequency = np.sqrt(first**2 + 2.0 * rate * _OF_CHIRP * (whole + 0.5))
     return Response(number, frequency[rows], 0.5 * ranges[rows])
