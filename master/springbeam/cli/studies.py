@@ -142,7 +142,7 @@ def tradeoff(
         ),
     ] = False,
 ) -> Study:
-    """Measure error against cost over schemes, macro steps, modes, meshes and tolerances, beside scipy's solvers.
+    """Measure error against cost over schemes, macro steps and tolerances, beside scipy's solvers.
 
     Example: springbeam tradeoff soft --until 0.0712
     """

@@ -1,15 +1,14 @@
 """Speed against accuracy: a scene run in many configurations, with the errors and the cost of each.
 
 All are judged on the same times, between the macro points too, beside the event-driven monolithic solution of the same
-semi-discrete model, so that what is measured is the coupling and the time integration. Where the model itself varies
-(modes, elements) it is the solution on a finer mesh. scipy solves the same model as a good user would have it do
-(`rivals`).
+semi-discrete model, so that what is measured is the coupling and the time integration (what the model itself leaves
+out, `converge` shows). scipy solves the same model as a good user would have it do (`rivals`).
 """
 
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from time import perf_counter
@@ -23,8 +22,7 @@ from ..results.trajectory import Trajectory
 from ..run.outcome import RunStopped
 from ..run.runner import simulate
 from ..scene import Scene, SceneError, with_changes
-from ..scene.resolution import mesh_frequency, slowest_frequency
-from ..scene.tables import ALL_MODES_UP_TO
+from ..scene.resolution import slowest_frequency
 from .comparison import SHORT_SHARE, comparable_until
 from .design import RIGID, SOFT
 from .metrics import costs, errors, motion_errors, worst
@@ -34,16 +32,14 @@ from .tables import number, table
 
 #: A run that takes longer than this is given up, and finer ones of its family are not begun [s]; quick: ten times less.
 _LIMIT = 10.0
-#: So long the reference on a finer mesh may take [s].
-_LIMIT_FINER = 60.0
 #: Runs longer than this are timed once [s].
 _TIMED_ONCE = 3.0
 #: Times at which all are judged.
 _TIMES = 401
-#: Methods whose steps are stable up to a few radians of the fastest mode, and how many radians they are let go [rad].
-_EXPLICIT, _MOST_TURNS = ("DOP853", "LSODA"), 1e5
 #: Relative errors for which the cheapest configuration is named.
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8)
+#: Errors of a tenth of the motion and more are no results.
+_NO_RESULT = 0.1
 
 #: Macro steps are the scene's times these, where a run has this many of them.
 _STEPS = tuple(2.0**k for k in range(6, -3, -1))
@@ -53,9 +49,6 @@ _ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 _MOST_RESOLVED = 2000.0
 #: Looser tolerances of IDA, and of the tie.
 _LOOSER = {"coupling.tolerance": 1e-6, "spring.relative_tolerance": 1e-4, "spring.absolute_tolerance": 1e-6}
-_MODES = (2, 4, 8, 16, 32, 64, 128)
-_MESHES = (0.25, 0.5, 1.0, 2.0)
-_DEGREES = (1, 4, 8)
 
 
 class Tradeoff(Study):
@@ -78,6 +71,10 @@ class Tradeoff(Study):
         if scene.accuracy is not None:
             left_out = f"accuracy = {scene.accuracy:g} is left out: each configuration has its own scheme and steps"
             remarks.append(left_out)
+        if scene.massless:
+            remarks.append(
+                "scipy's solvers are left out: a quasi-static beam has no equation of motion to hand to them"
+            )
         scene = with_changes(scene, accuracy=None, time={"t_end": window})
         return cls(scene=scene, remarks=tuple(remarks), **settings)
 
@@ -85,15 +82,14 @@ class Tradeoff(Study):
     def configurations(self) -> dict[str, Row]:
         """The axes of all configurations that the scene can have, by label; if quick, of every third of a family.
 
-        They are family, setting, and keys or scipy's tolerance.
+        They are family, setting, and keys or scipy's method and tolerance.
         """
         families: dict[str, list[Row]] = {}
         for case in _configurations(self.scene):
             with suppress(SceneError):  # what the scene cannot have
                 _ = "rtol" in case or self.at(case)
                 families.setdefault(case["family"], []).append(case)
-        chosen = [case for cases in families.values() for case in cases[:: 3 if self.quick else 1]]
-        return {_label(case): case for case in chosen}
+        return {_label(case): case for cases in families.values() for case in cases[:: 3 if self.quick else 1]}
 
     def cases(self) -> dict[str, Row]:
         """Return the configurations."""
@@ -114,8 +110,6 @@ class Tradeoff(Study):
 
     def record(self, case: Row) -> Row:
         """Run, time and judge a configuration: ``cost_wall_time`` [s] is the median of ``times``, without set-up."""
-        if why := self._pointless(case):
-            return {"status": "not run", "error": why}
         began, times, found = perf_counter(), list[float](), Row()
         try:
             while not times or (len(times) < self.repeats and not self.quick and times[-1] <= _TIMED_ONCE):
@@ -125,43 +119,28 @@ class Tradeoff(Study):
             return {"status": "stopped", "error": str(failed), "cost_wall_time": perf_counter() - began}
         return {"status": "done", "error": "", **found, "cost_wall_time": statistics.median(times), "times": times}
 
-    def _pointless(self, case: Row) -> str:
-        """Return why a configuration is not run, "" if it is."""
-        if case["finer"]:
-            return self.finer_reference if isinstance(self.finer_reference, str) else ""
-        if "rtol" in case and self.scene.massless:
-            return "a quasi-static beam has no equation of motion to hand to it"
-        beam = self.scene.beam if case.get("method") in _EXPLICIT else None
-        if beam is not None and mesh_frequency(beam) * self.scene.duration > _MOST_TURNS:
-            return f"explicit steps would follow the mesh's fastest mode over {_MOST_TURNS:g} rad"
-        return ""
-
     def _by_us(self, case: Row) -> Row:
-        scene, limit, began = self.at(case), _LIMIT, perf_counter()
+        limit, began = _LIMIT, perf_counter()
 
         def limited(time: float, phase: str, macro_steps: int) -> None:
             if perf_counter() - began > limit:
                 raise RunStopped(f"takes more than {limit:g} s", time)
 
-        run = simulate(scene, limited)
+        run = simulate(self.at(case), limited)
         done = perf_counter()
         run.at(self.times)
-        seconds = float(run.summary["wall_time"]) + perf_counter() - done
-        reference = self.finer_reference if case["finer"] else self.reference
-        assert isinstance(reference, Trajectory)
         return {
-            "cost_wall_time": seconds,
+            "cost_wall_time": float(run.summary["wall_time"]) + perf_counter() - done,
             "cost_setup": float(run.summary["setup_time"]),
             **costs(run),
-            "unknowns": 0 if scene.beam is None else scene.beam.modes_kept,
             "cost_macro_steps": int(run.summary.get("macro_steps", 0)),
-            **errors(run, reference, SHORT_SHARE * (self.times[-1] - self.times[0])),
+            **errors(run, self.reference, SHORT_SHARE * float(np.ptp(self.times))),
         }
 
     def _by_scipy(self, case: Row) -> Row:
-        began = perf_counter()
+        exact, began = self.reference, perf_counter()
         rival = Rival(self.scene)
-        ready, exact = perf_counter(), self.reference
+        ready = perf_counter()
         reach = max((float(np.abs(exact[k]).max()) for k in ("u_tip", "y") if k in exact.columns), default=1.0) or 1.0
         solved = rival.solve(case["method"], case["rtol"], 1e-3 * case["rtol"] * reach, self.times, _LIMIT)
         cost = {"cost_wall_time": solved.seconds, "cost_setup": ready - began, "cost_evaluations": solved.evaluations}
@@ -177,19 +156,9 @@ class Tradeoff(Study):
         """The solution of the same model."""
         return event_driven.simulate(self.scene, sample_times=self.times)
 
-    @cached_property
-    def finer_reference(self) -> Trajectory | str:
-        """The solution on a finer mesh, or why there is none."""
-        model = finer(self.scene)
-        assert model is not None
-        try:
-            return event_driven.simulate(model, sample_times=self.times, time_limit=_LIMIT_FINER)
-        except event_driven.ReferenceFailure as failed:
-            return f"the reference on a finer mesh {failed}"
-
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
         """Return a row per configuration."""
-        found = [{"unknowns": None, **row} for row in super().rows(records)]
+        found = super().rows(records)
         front = pareto(found)
         return [row | {"on_front": row in front} for row in found]
 
@@ -220,26 +189,20 @@ class Tradeoff(Study):
 
     def notes(self, records: Mapping[str, Row]) -> list[str]:
         """Return what was left out, and why."""
-        found, why = list[str](), dict[str, dict[str, None]]()
-        if slow := [name for name, r in records.items() if r["status"] == "stopped" and "takes more" in r["error"]]:
-            found.append(f"given up after {_LIMIT:g} s, finer ones of their kind not run: {'; '.join(slow)}")
-        for name, record in records.items():
-            if record["status"] == "not run":
-                why.setdefault(record["error"], {})[self.configurations[name]["family"]] = None
-        return found + [f"not run, {cause}: {', '.join(families)}" for cause, families in why.items()]
+        slow = [name for name, r in records.items() if r["status"] == "stopped" and "takes more" in r["error"]]
+        return [f"given up after {_LIMIT:g} s, finer ones of their kind not run: {'; '.join(slow)}"] * bool(slow)
 
     def draw(self, records: Mapping[str, Row]) -> Pictures:
-        """Draw the work–precision diagrams: error over time, over doStep calls, and the model's over its size."""
+        """Draw the work–precision diagrams: error over time, and over doStep calls."""
         from .picture import Point, curves
 
         rows = [row for row in self.rows(records) if np.isfinite(worst(row))]
-        over = {"wall time [s]": "cost_wall_time", "doStep calls of both FMUs": "cost_do_steps",
-                "unknowns of the beam, beside a finer mesh": "unknowns"}  # fmt: skip
+        over = {"wall time [s]": "cost_wall_time", "doStep calls of both FMUs": "cost_do_steps"}
         points = [
             Point(words, row["family"], row[cost], min(worst(row), 1.0))
             for words, cost in over.items()
             for row in rows
-            if row["finer"] == (cost == "unknowns") and cost in row
+            if cost in row
         ]
         title = f"{self.scene.title}: errors up to t = {self.scene.time.t_end:.6g} s"
         figure = curves(points, title, "", "largest relative error of u_tip and y", (6.0, 6.5))
@@ -250,38 +213,35 @@ class Tradeoff(Study):
 
 
 def pareto(rows: Iterable[Row]) -> list[Row]:
-    """Return the Pareto front, the cheapest first: no other row is both quicker and more accurate.
-
-    Errors of a tenth of the motion and more are no results.
-    """
-    best, front = 0.1, []
-    for row in sorted((r for r in rows if r["status"] == "done" and not r["finer"]), key=lambda r: r["cost_wall_time"]):
+    """Return the Pareto front, the cheapest first: no other row is both quicker and more accurate."""
+    best, front = _NO_RESULT, []
+    for row in sorted((row for row in rows if row["status"] == "done"), key=lambda row: row["cost_wall_time"]):
         if worst(row) < best:
             best = worst(row)
             front.append(row)
     return front
 
 
-def cheapest(rows: Iterable[Row]) -> list[Row]:
+def cheapest(rows: Sequence[Row]) -> list[Row]:
     """Return for each of `TARGETS` the cheapest configuration here and of scipy's, and how much longer scipy takes.
 
     A configuration counts if all finer ones of its family keep the error too: not by luck.
     """
-    same = [row for row in rows if not row["finer"]]
-
-    def best(ours: bool, target: float) -> Row | None:
-        kept = []
-        for family in dict.fromkeys(row["family"] for row in same if ("rtol" not in row) == ours):
-            done = [row for row in same if row["family"] == family and row["status"] == "done"]
-            kept += [row for k, row in enumerate(done) if all(worst(finer) <= target for finer in done[k:])]
-        return min(kept, key=lambda row: row["cost_wall_time"], default=None)
-
     found = []
     for target in TARGETS:
-        ours, theirs = best(True, target), best(False, target)
-        ratio = theirs["cost_wall_time"] / ours["cost_wall_time"] if ours and theirs else None
-        found.append({"error": target, "co_simulation": ours, "scipy": theirs, "ratio": ratio})
+        best: Row = {"co_simulation": None, "scipy": None}
+        kept = [row for k, row in enumerate(rows) if row["status"] == "done" and _kept(rows[k:], row["family"], target)]
+        for row in sorted(kept, key=lambda row: row["cost_wall_time"], reverse=True):
+            best["scipy" if "rtol" in row else "co_simulation"] = row
+        ratio = (
+            best["scipy"]["cost_wall_time"] / best["co_simulation"]["cost_wall_time"] if all(best.values()) else None
+        )
+        found.append({"error": target, **best, "ratio": ratio})
     return found
+
+
+def _kept(rows: Iterable[Row], family: str, target: float) -> bool:
+    return all(worst(row) <= target for row in rows if row["family"] == family and row["status"] == "done")
 
 
 def _label(case: Row) -> str:
@@ -301,10 +261,9 @@ def _told(row: Row | None) -> Row | None:
 
 def _configurations(scene: Scene) -> Iterator[Row]:
     """Yield the axes of all configurations, also those that the scene cannot have."""
-    rigid, beam = scene.contact.rigid, scene.beam
     schemes: dict[str, Row] = {
         f"{scheme} {degree}": {"coupling.scheme": scheme, "coupling.degree": degree}
-        for scheme, degree in (RIGID if rigid else SOFT)
+        for scheme, degree in (RIGID if scene.contact.rigid else SOFT)
     }
     best = {name: schemes[name] for name in ("energy 2", "hermite 2") if name in schemes}
     looser = {f"{name}, IDA 1e-04": keys | _LOOSER for name, keys in best.items() if scene.spring is not None}
@@ -312,32 +271,12 @@ def _configurations(scene: Scene) -> Iterator[Row]:
     sizes = [scene.coupling.H * share for share in _STEPS]
     for family, keys in (schemes | looser | auto).items():
         for H in (H for H in sizes if _FEWEST_STEPS <= scene.duration / H <= _MOST_STEPS):
-            yield {"family": family, "setting": f"H = {H:.3g}", "finer": False, **keys, "coupling.macro_step": H}
-    turns = 0.0 if beam is None or scene.massless else slowest_frequency(beam) * scene.duration
+            yield {"family": family, "setting": f"H = {H:.3g}", **keys, "coupling.macro_step": H}
+    turns = 0.0 if scene.beam is None or scene.massless else slowest_frequency(scene.beam) * scene.duration
     for family, keys in best.items():
         for tolerance in _ADAPTIVE_TOLERANCES if turns <= _MOST_RESOLVED else ():
-            axes = {"family": f"{family} adaptive", "setting": f"{tolerance:.0e}", "finer": False}
+            axes = {"family": f"{family} adaptive", "setting": f"{tolerance:.0e}"}
             yield axes | keys | {"coupling.relative_tolerance": tolerance}
-    if (fine := finer(scene)) is not None and beam is not None and fine.beam is not None:
-        for modes in (modes for modes in _MODES if modes < beam.unknowns):
-            yield {"family": "modes", "setting": f"{modes}", "finer": True, "beam.n_modes": modes}
-        for degree in _DEGREES:
-            for n in (round(factor * beam.n_elements / degree) for factor in _MESHES):
-                if n >= 1 and 2 * n * degree <= fine.beam.n_elements * fine.beam.element_degree:
-                    axes = {"family": f"elements of degree {degree}", "setting": f"{n}", "finer": True}
-                    mesh = {"beam.n_elements": n, "beam.element_degree": degree, "beam.n_modes": 0}
-                    yield axes | mesh | ({"beam.reduced_integration": False} if degree > 2 else {})
-    for method in TOLERANCES:
-        for rtol in TOLERANCES[method]:
-            yield {"family": method, "setting": f"rtol {rtol:.0e}", "finer": False, "method": method, "rtol": rtol}
-
-
-def finer(scene: Scene) -> Scene | None:
-    """Return the scene with elements of higher degree, which stand for the continuum; ``None`` if that is too large."""
-    beam = scene.beam
-    if beam is None or beam.integrator != "modal":
-        return None
-    degree = min(max(_DEGREES), ALL_MODES_UP_TO // (2 * beam.n_elements))
-    if degree < 2 * beam.element_degree:
-        return None
-    return with_changes(scene, beam={"element_degree": degree, "n_modes": 0, "reduced_integration": False})
+    for method, tolerances in TOLERANCES.items() if not scene.massless else ():
+        for rtol in tolerances:
+            yield {"family": method, "setting": f"rtol {rtol:.0e}", "method": method, "rtol": rtol}
