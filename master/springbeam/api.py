@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .results.reading import load_trajectory as load
+from .results.files import load_trajectory as load
 from .studies.accuracy import simulate
 
 __all__ = ["load", "simulate"]

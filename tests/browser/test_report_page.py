@@ -12,7 +12,7 @@ import pytest
 from commands import printed
 
 from springbeam.results.directory import REPORT
-from springbeam.results.reading import load_trajectory
+from springbeam.results.files import load_trajectory
 from springbeam.scene import shipped_scenes
 
 DESKTOP, PHONE = {"width": 1200, "height": 900}, {"width": 390, "height": 800}

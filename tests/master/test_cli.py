@@ -22,7 +22,7 @@ from springbeam import Event, RunStopped, cli
 from springbeam.cli import common
 from springbeam.cli.look import results_of
 from springbeam.results.directory import PICTURES
-from springbeam.results.reading import load_trajectory
+from springbeam.results.files import load_trajectory
 from springbeam.results.steps import STEP
 from springbeam.results.totals import totals
 from springbeam.scene import load_scene, with_changes

@@ -14,7 +14,7 @@ import pytest
 from pyarrow import parquet
 from runs import PAIR, SCENES, a_trajectory, block
 
-from springbeam.results import file_recorder
+from springbeam.results import files, recording
 from springbeam.results.columns import columns, first_not_finite
 from springbeam.results.directory import (
     ANIMATIONS,
@@ -26,10 +26,8 @@ from springbeam.results.directory import (
     ResultsUnreadable,
     RunDirectory,
 )
-from springbeam.results.export import export
-from springbeam.results.file_recorder import FileRecorder
-from springbeam.results.reading import load_summary, load_trajectory, read_run
-from springbeam.results.recording import MemoryRecorder
+from springbeam.results.files import export, load_summary, load_trajectory, read_run
+from springbeam.results.recording import FileRecorder, MemoryRecorder
 from springbeam.results.steps import PHASE_NAMES, STEP_COLUMNS
 from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, TOLD, Event, columns_of
 from springbeam.scene import SceneError, with_changes
@@ -204,7 +202,7 @@ def test_files_are_plain_csv_and_json(tmp_path):
 
 def test_rows_in_blocks_have_one_header(tmp_path):
     blocks = [{"time": np.array([0.0, 1.0])}, {"time": np.array([2.0])}]
-    file_recorder.write_rows(RunDirectory(tmp_path), blocks)
+    files.write_rows(RunDirectory(tmp_path), blocks)
     assert (tmp_path / "trajectory.csv").read_text() == "time\n0.0\n1.0\n2.0\n"
 
 
@@ -229,13 +227,13 @@ def test_summaries_take_numpy_and_name_what_json_has_no_number_for(tmp_path):
 
 def test_a_kill_at_any_byte_leaves_all_blocks_but_the_last(tmp_path, monkeypatch):
     """Files with the first bytes, so many of them, of what a run writes to them one after the other."""
-    writes, append = [], file_recorder._append
+    writes, append = [], recording._append
 
     def noted(file, content):
         writes.append((Path(file.name).name, content))
         append(file, content)
 
-    monkeypatch.setattr(file_recorder, "_append", noted)
+    monkeypatch.setattr(recording, "_append", noted)
     kept = [block(5, t_end=0.1), block(4, t_end=0.2, begin=5), block(12, t_end=0.9, begin=9)]
     recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path / "whole"))
     headers = {path.name: header for path, header in recorder._headers.items()}
@@ -374,7 +372,7 @@ def test_damage_of_a_run_that_goes_on_is_named_by_file(tmp_path, name, damage, m
         (lambda content: b"", r"trajectory\.csv: empty"),
         (swapped(b"time,", b"t,"), r"trajectory\.csv: line 1: no column time"),
         (swapped(b"\n0.0", b"\n0.\xf1"), r"trajectory\.csv: .*row"),
-        (swapped(b",free", b",freed"), r"trajectory\.csv: 'freed' is no phase; phases are"),
+        (swapped(b",free", b",freed"), r"trajectory\.csv: phase = freed: no phase; phases are"),
     ],
 )
 def test_damage_of_the_rows_of_a_reference_is_named(tmp_path, damage, message):

@@ -12,7 +12,7 @@ from scenes import scene_from_dict
 
 from springbeam import RunStopped, SceneError, with_changes
 from springbeam.monolithic import event_driven
-from springbeam.results.reading import load_trajectory
+from springbeam.results.files import load_trajectory
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.runner import run
 from springbeam.scene.reading import tomllib

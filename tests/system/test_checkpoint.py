@@ -24,8 +24,8 @@ from springbeam.bodies.protocol import FmuError
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.soft import SoftSolver
 from springbeam.results.directory import RunDirectory
-from springbeam.results.file_recorder import FileRecorder
-from springbeam.results.reading import load_trajectory
+from springbeam.results.files import load_trajectory
+from springbeam.results.recording import FileRecorder
 from springbeam.run import runner
 from springbeam.run.checkpoint import Checkpoint, CheckpointRefused
 
@@ -38,7 +38,7 @@ CHANGES = ["--set", "beam.n_elements=10", "--set", "coupling.macro_step=2e-3"]
 def interrupted_into(directory, steps=200, scene=SCENE):
     """With a checkpoint every 40 steps or so, by a clock that is told the time by being asked."""
     with (
-        patch("springbeam.run.checkpoint.perf_counter", side_effect=count(1.0)),
+        patch("springbeam.run.runner.perf_counter", side_effect=count(1.0)),
         pytest.raises(KeyboardInterrupt),
         FileRecorder(scene, RunDirectory.create(directory)) as recorder,
     ):

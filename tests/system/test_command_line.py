@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from springbeam.bodies.archive import fmu_directory
 from springbeam.cli import app
-from springbeam.results.reading import load_summary
+from springbeam.results.files import load_summary
 from springbeam.scene import load_scene, reference, scene_keys, shipped_scenes, with_changes
 from springbeam.scene.reading import tomllib
 from springbeam.studies.metrics import METRICS

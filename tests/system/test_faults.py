@@ -14,7 +14,7 @@ import tomli_w
 from commands import HANGS, command, printed, written
 from faulty import NAMES, Fault, installed
 
-from springbeam.results.reading import load_trajectory
+from springbeam.results.files import load_trajectory
 from springbeam.scene.reading import tomllib
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")

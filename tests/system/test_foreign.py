@@ -20,8 +20,8 @@ from springbeam import RunStopped, SceneError, resume, simulate, with_changes
 from springbeam.bodies import isolated
 from springbeam.bodies.protocol import FmuError
 from springbeam.results.directory import RunDirectory
-from springbeam.results.file_recorder import FileRecorder
-from springbeam.results.reading import load_summary
+from springbeam.results.files import load_summary
+from springbeam.results.recording import FileRecorder
 from springbeam.run import runner
 from springbeam.scene import scene_from_dict
 

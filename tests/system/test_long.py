@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springbeam.results.reading import load_events
+from springbeam.results.files import load_events
 from springbeam.scene import load_scene, with_changes
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
@@ -34,7 +34,7 @@ SCENES = {
 RUN = """
 import json, os, sys
 from springbeam.results.directory import RunDirectory
-from springbeam.results.file_recorder import FileRecorder
+from springbeam.results.recording import FileRecorder
 from springbeam.run.runner import run
 from springbeam.scene import scene_from_dict
 

@@ -10,7 +10,7 @@ import tomli_w
 from commands import Interrupt, command
 from scenes import completed
 
-from springbeam.results.reading import load_trajectory
+from springbeam.results.files import load_trajectory
 from springbeam.run.ledger import bounds
 from springbeam.scene import with_changes
 

@@ -18,7 +18,7 @@ from commands import Interrupt, command
 from hypothesis import HealthCheck, event, given, seed, settings
 from hypothesis import strategies as st
 
-from springbeam.results.reading import load_trajectory
+from springbeam.results.files import load_trajectory
 from springbeam.studies.stability.cells import PARAMETERS, scene_dict
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")

@@ -22,7 +22,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from ..bodies.protocol import FmuError
 from ..results.directory import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory
-from ..results.file_recorder import as_json
+from ..results.files import as_json
 from ..run.checkpoint import CheckpointRefused
 from ..scene import SceneError, scene_keys, shipped_scenes
 

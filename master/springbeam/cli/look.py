@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn
 from rich.text import Text
 
 from ..results.directory import ANIMATIONS, REPORT
-from ..results.reading import load_trajectory
+from ..results.files import load_trajectory
 from ..results.totals import LOSS_NAMES, TOTALS, totals
 from ..results.trajectory import Trajectory
 from ..scene import Scene
@@ -64,7 +64,7 @@ def export(
 
     Example: springbeam export results/soft --format parquet
     """
-    from ..results.export import export as write
+    from ..results.files import export as write
 
     with bad_input_reported():
         files = write(results_directory(directory), form)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
-from itertools import islice
+from contextlib import contextmanager
 from math import inf
 from pathlib import Path
 from time import monotonic
@@ -19,8 +18,8 @@ from rich.text import Text
 
 from ..bodies.protocol import FmuError
 from ..results.directory import RunDirectory
-from ..results.file_recorder import FileRecorder
-from ..results.reading import load_events, load_summary, load_trajectory
+from ..results.files import load_events, load_summary, load_trajectory
+from ..results.recording import FileRecorder
 from ..results.totals import in_words
 from ..results.trajectory import Event, Trajectory, rounded
 from ..run.checkpoint import Checkpoint
@@ -221,29 +220,23 @@ def _run_into(
     from ..run.runner import run as run_scene
 
     t_end = recorder.scene.time.t_end
-
-    with recorder, _progress(t_end, quiet=quiet) as progress:
-        try:
+    try:
+        with _progress(t_end, quiet=quiet) as progress, recorder:
             if made is not None:
                 recorder.write(made)
             else:
                 run_scene(recorder.scene, recorder, progress, seconds=seconds, start=start)
-            return None
-        except (RunStopped, OSError, FmuError, KeyboardInterrupt) as error:
-            if not recorder.begun and not isinstance(error, RunStopped):
-                raise
-            directory, cause = recorder.directory, cause_of(error, recorder.directory.path)
-            interrupted = isinstance(error, KeyboardInterrupt)
-            reached = 0.0 if recorder.time is None else recorder.time
-            if not recorder.finished:
-                with suppress(OSError):  # on a full disk: the rows that fit are there, and the cause is reported
-                    status = "interrupted" if interrupted else "stopped"
-                    recorder.finish({"status": status, "cause": cause, "time": reached})
-            begun = "; a run begun with --checkpoint SECONDS can go on after it has ended early"
-            again = f"; springbeam resume {directory.path} goes on from the last checkpoint"
-            how = again if directory.checkpoint.exists() else begun * (seconds is None and made is None)
-            what = cause if interrupted else f"the run stopped early: {cause}"
-            return f"{what} (reached t = {reached:.9g} s of {t_end:g} s); what was computed is in {directory.path}{how}"
+        return None
+    except (RunStopped, OSError, FmuError, KeyboardInterrupt) as error:
+        if not recorder.begun and not isinstance(error, RunStopped):
+            raise
+        directory, cause = recorder.directory, cause_of(error, recorder.directory.path)
+        begun = "; a run begun with --checkpoint SECONDS can go on after it has ended early"
+        again = f"; springbeam resume {directory.path} goes on from the last checkpoint"
+        how = again if directory.checkpoint.exists() else begun * (seconds is None and made is None)
+        what = cause if isinstance(error, KeyboardInterrupt) else f"the run stopped early: {cause}"
+        where = f"(reached t = {recorder.time:.9g} s of {t_end:g} s)"
+        return f"{what} {where}; what was computed is in {directory.path}{how}"
 
 
 @contextmanager
@@ -270,14 +263,10 @@ def report(console: Console, directory: RunDirectory, scene: Scene) -> None:
     """Print what a run has come to: its events, totals, residuals and warnings."""
     summary, events = load_summary(directory.path), load_events(directory.path)
     console.print(Text(scene.title or "(untitled scene)", style="bold"))
-    first = list(islice(events, _FIRST_EVENTS))
-    kinds = Counter(event.kind for event in first)
-    last: deque[Event] = deque(maxlen=_LAST_EVENTS)
-    for event in events:
-        kinds[event.kind] += 1
-        last.append(event)
+    kinds = Counter(event.kind for event in events)
+    first, last = events[:_FIRST_EVENTS], events[_FIRST_EVENTS:][-_LAST_EVENTS:]
     if first:
-        console.print(_event_table(first, list(last), kinds.total() - len(first) - len(last), scene))
+        console.print(_event_table(first, last, len(events) - len(first) - len(last), scene))
         counts = ", ".join(f"{number} {kind}" for kind, number in kinds.most_common())
         console.print(f"events    {counts}")
         console.print("          (on the tip, of the stop: impulses, upward; lost: energy that the event takes)")

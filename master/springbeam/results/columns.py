@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from ..scene import Scene, Spring
 from .steps import BEAM_TELLS, PHASE_NAMES, SPRING_TELLS, STEP_COLUMNS, force, joined
-from .trajectory import TOLD, columns_of
+from .trajectory import TOLD, Event, Trajectory, columns_of
 
 #: Largest value of a column that the motion does not depend on [N]; pictures multiply two of them.
 MOST_SHOWN = 1e150
@@ -102,6 +103,16 @@ def blocks(scene: Scene, steps: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
     """Yield the columns of all records of a run, some thousand rows at a time."""
     for begin in range(0, max(len(steps), 1), _TOGETHER):  # of no records as well, columns without rows
         yield columns(scene, steps[begin : begin + _TOGETHER], steps[:1])
+
+
+def trajectory_of(
+    scene: Scene, steps: np.ndarray, events: list[Event], shapes: np.ndarray | None, summary: dict[str, Any]
+) -> Trajectory:
+    """Return the run that records, events and shapes amount to; parameters as of `springbeam.results.recording`."""
+    made = list(blocks(scene, steps))
+    found = {name: np.concatenate([block[name] for block in made]) for name in made[0]}
+    inside = steps if steps["size"].any() else None
+    return Trajectory(scene, found, events, summary=summary, steps=inside, shape_table=shapes)
 
 
 def normal_compliance(scene: Scene, u: np.ndarray, first: np.ndarray) -> np.ndarray:

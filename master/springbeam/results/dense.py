@@ -43,6 +43,8 @@ _LINEAR = (
 MOTION = ("u_tip", "v_tip", "y", "z", "gap")
 #: Steps of which extremes are looked for at once, so that those of a long run need little memory.
 _TOGETHER = 65536
+#: Times closer than this share are one.
+_SAME = 1e-12
 
 
 def at(run: Trajectory, times: Any) -> Trajectory:
@@ -79,6 +81,13 @@ def rows_at(run: Trajectory, times: Any) -> Trajectory:
     records[between] = _between(run.scene, before, after, run.events, wanted[between])
     made = columns(run.scene, records, steps[:1])
     return Trajectory(run.scene, made, list(run.events), summary=dict(run.summary))
+
+
+def at_multiples(run: Trajectory, interval: float) -> dict[str, np.ndarray]:
+    """Return the columns of ``run`` at the multiples of ``interval`` [s] from its first to its last row."""
+    first, last = (run.time[i] / interval for i in (0, -1))
+    times = interval * np.arange(np.ceil(first * (1.0 - _SAME)), np.floor(last * (1.0 + _SAME)) + 1.0)
+    return rows_at(run, np.clip(times, run.time[0], run.time[-1])).columns
 
 
 def extremes(scene: Scene, steps: np.ndarray, name: str) -> Extremes:

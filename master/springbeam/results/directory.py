@@ -1,8 +1,8 @@
 """A run directory: its files, the claim on it, and the errors of one that cannot be read.
 
 It holds ``steps.bin`` (the records of the run), ``events.csv``, ``shapes.csv`` (the beam's deflection at
-`SHAPE_POINTS`), ``trajectory.csv`` (a row per accepted step), ``summary.json`` and pictures. ``file_recorder`` writes
-it, ``reading`` reads it.
+`SHAPE_POINTS`), ``trajectory.csv`` (a row per accepted step), ``summary.json`` and pictures. ``files`` writes and reads
+each of them.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import tempfile
 from contextlib import suppress
-from itertools import count
+from itertools import chain, count
 from pathlib import Path
 from typing import BinaryIO
 from weakref import finalize
@@ -78,12 +78,9 @@ class RunDirectory:
         """Keep other processes out until `release`, or until this one ends. Raises ResultsInUse if another is in."""
         if self._claim is None and fcntl is not None:
             folder = os.open(self.path, os.O_RDONLY)
-            self._claim = finalize(self, os.close, folder)
-            try:
-                lock(folder, self.path)
-            except ResultsInUse:
-                self.release()
-                raise
+            claim = finalize(self, os.close, folder)
+            lock(folder, self.path)
+            self._claim = claim
 
     def release(self) -> None:
         """Let other processes in."""
@@ -138,16 +135,10 @@ class RunDirectory:
         Runs started at the same time get different directories.
         """
         first = Path(path)
-        first.parent.mkdir(parents=True, exist_ok=True)
-        for number in count(1):
-            candidate = first if number == 1 else first.with_name(f"{first.name}-{number}")
-            try:
-                candidate.mkdir()
-            except FileExistsError:
-                continue
-            directory = cls(candidate)
-            directory.claim()
-            return directory
+        for candidate in chain([first], (first.with_name(f"{first.name}-{number}") for number in count(2))):
+            with suppress(FileExistsError):
+                candidate.mkdir(parents=True)
+                return cls.create(candidate)
         raise AssertionError("unreachable")
 
 

@@ -1,20 +1,27 @@
-"""Where a run leaves its records, events and shapes, some hundred steps at a time: `MemoryRecorder` keeps them.
-
-``file_recorder`` writes them into a directory instead.
-"""
+"""Where a run leaves its records, events and shapes, some hundred steps at a time: in memory, or in a directory."""
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from io import FileIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..scene import Scene
-from .columns import blocks
+from .columns import blocks, trajectory_of
+from .dense import at_multiples
+from .directory import RunDirectory
+from .files import event_lines, lines, load_events, part_of, read_run, refuse_cut, write_rows, write_summary
 from .steps import STEP
-from .trajectory import SHAPE_COLUMNS, Event, Trajectory
+from .trajectory import EVENT_COLUMNS, SHAPE_COLUMNS, Event, Trajectory
+
+#: Bytes kept free for the last summary; longer ones are written if the disk has room.
+_SUMMARY_ROOM = 16384
 
 
 class Recorder(ABC):
@@ -48,7 +55,7 @@ class Recorder(ABC):
         """Return the records kept so far, shape (n,)."""
 
     @abstractmethod
-    def events(self) -> Iterable[Event]:
+    def events(self) -> list[Event]:
         """Return the events kept so far."""
 
     @abstractmethod
@@ -62,6 +69,9 @@ class Recorder(ABC):
         The command line reports ``status`` (``done``, ``stopped``, ``interrupted``), ``macro_steps``, ``wall_time``
         [s], ``max_energy_residual`` (relative) and ``warnings`` (list of str), those that are there.
         """
+
+    def _with_scene(self, summary: Mapping[str, Any]) -> dict[str, Any]:
+        return {**summary, "scene": self.scene.model_dump(exclude_none=True)}
 
 
 class MemoryRecorder(Recorder):
@@ -83,26 +93,184 @@ class MemoryRecorder(Recorder):
         return self._steps[0]
 
     def events(self) -> list[Event]:
-        return self._events
-
-    def finish(self, summary: Mapping[str, Any]) -> None:
-        self._summary = with_scene(summary, self.scene)
+        return list(self._events)
 
     def trajectory(self) -> Trajectory:
         shapes = None if self.scene.beam is None else np.concatenate(self._shapes)
-        return trajectory_of(self.scene, self.steps(), list(self._events), shapes, dict(self._summary))
+        return trajectory_of(self.scene, self.steps(), self.events(), shapes, dict(self._summary))
+
+    def finish(self, summary: Mapping[str, Any]) -> None:
+        self._summary = self._with_scene(summary)
 
 
-def trajectory_of(
-    scene: Scene, steps: np.ndarray, events: list[Event], shapes: np.ndarray | None, summary: dict[str, Any]
-) -> Trajectory:
-    """Return the run that records, events and shapes amount to; parameters as of `Recorder`."""
-    made = list(blocks(scene, steps))
-    columns = {name: np.concatenate([block[name] for block in made]) for name in made[0]}
-    inside = steps if steps["size"].any() else None
-    return Trajectory(scene, columns, events, summary=summary, steps=inside, shape_table=shapes)
+class FileRecorder(Recorder):
+    """Streams into a `RunDirectory` and keeps nothing, so that memory does not grow with the run.
+
+    Records are appended a block at a time, after their events and shapes: a run that is killed loses no more than that,
+    and ``summary.json`` says from the start which scene they belong to. Rows are made from the records at the end.
+    Results of an earlier run stay until this one has something to record; then they are removed.
+
+    As a context it ends a run that has not ended itself when an error leaves it, and closes the files.
+
+    Parameters
+    ----------
+    scene
+        As of `Recorder`.
+    directory
+        Where the results go (`RunDirectory.create`).
+    interval
+        Make the rows at its multiples [s], by `Trajectory.at`, instead of one per step.
+    """
+
+    def __init__(self, scene: Scene, directory: RunDirectory, interval: float | None = None) -> None:
+        super().__init__(scene)
+        self.directory, self.interval = directory, interval
+        self._finished = False
+        #: The first line of each file that grows, in the order in which they do.
+        self._headers = {directory.events: lines([EVENT_COLUMNS]), directory.steps: b""}
+        if scene.beam is not None:
+            self._headers = {directory.shapes: lines([SHAPE_COLUMNS]), **self._headers}
+        #: Each hands what is written to the system at once, so that a killed run has it.
+        self._files: dict[Path, FileIO] = {}
+
+    def __enter__(self) -> FileRecorder:
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
+        if self.begun and not self._finished and error is not None:
+            status = "stopped" if isinstance(error, Exception) else "interrupted"
+            with suppress(OSError):  # on a full disk: the rows that fit are there
+                self.finish({"status": status, "cause": f"{type(error).__name__}: {error}", "time": self.time})
+        self.close()
+
+    @property
+    def begun(self) -> bool:
+        """Whether the directory holds results of this run."""
+        return bool(self._files)
+
+    @property
+    def time(self) -> float:
+        """Time of the last record [s], 0 before the first."""
+        return float(self.steps()["time"][-1:].sum())
+
+    def keep(self, steps: np.ndarray, events: Sequence[Event], shapes: np.ndarray) -> None:
+        self._begin()
+        directory = self.directory
+        if directory.shapes in self._files:
+            _append(self._files[directory.shapes], lines(shapes.tolist()))
+        _append(self._files[directory.events], event_lines(events))
+        _append(self._files[directory.steps], steps.tobytes())
+
+    def steps(self) -> np.ndarray:
+        path = self.directory.steps
+        whole = path.stat().st_size // STEP.itemsize if self.begun else 0
+        return np.memmap(path, STEP, mode="r", shape=whole) if whole else np.empty(0, STEP)
+
+    def events(self) -> list[Event]:
+        return load_events(self.directory.path) if self.begun else []
+
+    def trajectory(self) -> Trajectory:
+        self._begin()
+        return read_run(self.directory)
+
+    def write(self, run: Trajectory) -> None:
+        """Write a finished run, also one by a reference, which has columns only."""
+        steps = np.empty(0, STEP) if run.steps is None else run.steps
+        shapes = np.empty((0, len(SHAPE_COLUMNS))) if run.shape_table is None else run.shape_table
+        self.keep(steps, run.events, shapes)
+        columns = run.columns if self.interval is None else at_multiples(run, self.interval)
+        self._end({name: run.summary[name] for name in run.summary.keys() - {"scene", "files"}}, [columns])
+
+    def finish(self, summary: Mapping[str, Any]) -> None:
+        """See `Recorder.finish`. Raises OSError."""
+        self._begin()
+        steps = self.steps()
+        if self.interval is None or not len(steps):
+            self._end(summary, blocks(self.scene, steps))
+        else:
+            self._end(summary, [at_multiples(self.trajectory(), self.interval)])
+
+    def _end(self, summary: Mapping[str, Any], rows: Iterable[Mapping[str, np.ndarray]]) -> None:
+        self._close_files()
+        self._finished = True
+        try:
+            write_rows(self.directory, rows)
+        finally:  # also where the disk has no room for them
+            write_summary(self.directory, self._with_scene({**summary, "files": self.directory.sizes()}))
+            if summary.get("status") == "done":
+                self.directory.checkpoint.unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """Close the files, and let other processes use the directory."""
+        self._close_files()
+        self.directory.release()
+
+    def _close_files(self) -> None:
+        for file in self._files.values():
+            file.close()
+
+    def save(self) -> dict[str, int]:
+        """Write what was recorded to the disk, and return the sizes of its files [bytes], which `restore` needs."""
+        self._begin()
+        for file in self._files.values():
+            os.fsync(file.fileno())
+        return self.directory.sizes()
+
+    def restore(self, saved: Mapping[str, int]) -> None:
+        """Go on from what `save` of a recorder in the same directory returned; what came later is removed.
+
+        Raises
+        ------
+        ResultsUnreadable
+            If a file is missing or shorter than it was; nothing is removed then.
+        ResultsInUse
+            If another process is writing them.
+        """
+        self.directory.claim()
+        refuse_cut(self.directory, saved, longer=True)
+        self._open()
+        for path, file in self._files.items():
+            file.truncate(saved[path.name])
+        self.directory.trajectory.unlink(missing_ok=True)
+        self._say_it_runs()
+
+    def _begin(self) -> None:
+        """Remove earlier results and write the files with their headers, once the disk has room for them."""
+        if self._files:
+            return
+        try:
+            self._reserve_summary()
+        except OSError:
+            part_of(self.directory.summary).unlink(missing_ok=True)
+            raise
+        for file in self.directory.results():
+            file.unlink()
+        self._open()
+        for path, header in self._headers.items():
+            _append(self._files[path], header)
+        self._say_it_runs()  # last: where there is a summary, there is a run that can be loaded
+
+    def _open(self) -> None:
+        self._files = {path: path.open("ab", buffering=0) for path in self._headers}
+
+    def _say_it_runs(self) -> None:
+        write_summary(self.directory, self._with_scene({"status": "running"}))
+        self._reserve_summary()
+
+    def _reserve_summary(self) -> None:
+        """Keep room on the disk for the last summary, which has to be written also when the disk is full."""
+        part_of(self.directory.summary).write_bytes(b" " * _SUMMARY_ROOM)
 
 
-def with_scene(summary: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
-    """Return ``summary`` with the scene as run, as it goes into ``summary.json``."""
-    return {**summary, "scene": scene.model_dump(exclude_none=True)}
+def save(run: Trajectory, directory: str | Path, *, replace: bool) -> Path:
+    """Write the files of a finished run; see `Trajectory.save`."""
+    target = RunDirectory.create(directory, replace=replace)
+    with FileRecorder(run.scene, target) as recorder:
+        recorder.write(run)
+    return target.path
+
+
+def _append(file: FileIO, content: bytes) -> None:
+    written = 0
+    while written < len(content):  # a disk that is almost full takes a part, and then refuses
+        written += file.write(content[written:])

@@ -288,7 +288,7 @@ class Trajectory:
 
         Raises ResultsExist if there are results and ``replace`` is false, OSError if it cannot be written to.
         """
-        path: Path = _at_call("results.file_recorder").save(self, directory, replace=replace)
+        path: Path = _at_call("results.recording").save(self, directory, replace=replace)
         return path
 
 

@@ -10,17 +10,13 @@ import dataclasses
 import hashlib
 import os
 from pathlib import Path
-from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 
 from ..bodies.stateful import RunState
-from ..results.file_recorder import FileRecorder, replaced
+from ..results.files import replaced
 from ..scene import Scene, scene_from_dict
-
-if TYPE_CHECKING:  # a command that only reads a checkpoint loads no FMU
-    from .master import Master
 
 
 class CheckpointRefused(ValueError):
@@ -65,41 +61,6 @@ class Checkpoint:
             return msgspec.msgpack.decode(content, type=cls, dec_hook=scene_of)
         except (ValueError, RecursionError) as error:
             raise CheckpointRefused(f"{path}: not what this version writes: {error!r}") from error
-
-
-class Checkpoints:
-    """Takes the checkpoints of a run into the directory of its results.
-
-    Parameters
-    ----------
-    recorder
-        Of the run.
-    seconds
-        Of the clock between checkpoints [s]; the first is taken at once.
-    version, files
-        As in `Checkpoint`.
-    wall_time
-        That the run took before now [s].
-    """
-
-    def __init__(
-        self, recorder: FileRecorder, seconds: float, version: str, files: dict[str, str], wall_time: float
-    ) -> None:
-        self._recorder, self._seconds, self._version, self._files = recorder, seconds, version, files
-        self._began = perf_counter() - wall_time
-        self._due = self._began + wall_time
-
-    def take_when_due(self, simulation: Master) -> None:
-        """To be called between two steps. Raises OSError if the disk refuses; the last checkpoint stays then."""
-        now = perf_counter()
-        if now < self._due:
-            return
-        simulation.hand_over()
-        recorder = self._recorder
-        begun = recorder.scene, self._version, self._files, self._seconds, now - self._began
-        checkpoint = Checkpoint(*begun, recorder.interval, recorder.save(), simulation.run_state())
-        checkpoint.write(self._recorder.directory.checkpoint)
-        self._due = perf_counter() + self._seconds
 
 
 def _title(content: bytes) -> bytes:

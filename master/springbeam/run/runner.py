@@ -5,6 +5,7 @@ from __future__ import annotations
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from math import inf
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -15,12 +16,11 @@ from ..bodies.fmu_bodies import FmuBody
 from ..bodies.isolated import IsolatedBody
 from ..bodies.protocol import Body
 from ..results.directory import RunDirectory
-from ..results.file_recorder import FileRecorder
-from ..results.reading import load_summary, load_trajectory
-from ..results.recording import MemoryRecorder, Recorder
+from ..results.files import load_summary, load_trajectory
+from ..results.recording import FileRecorder, MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, scene_from_dict, suspicions
-from .checkpoint import Checkpoint, CheckpointRefused, Checkpoints
+from .checkpoint import Checkpoint, CheckpointRefused
 from .equilibrium import contact_at_rest
 from .master import Master
 from .outcome import Progress, RunStopped
@@ -80,9 +80,7 @@ class Simulation:
         self._summary: dict[str, Any] = {}  #: of the run when it has ended
 
     def _go_on(self, start: Checkpoint) -> None:
-        recorder = self.recorder
-        if not isinstance(recorder, FileRecorder):
-            raise TypeError("a run goes on in the directory of its results")
+        recorder = self._in_directory()
         try:
             self._master.go_on(start.state)
         except ValueError as error:
@@ -90,6 +88,11 @@ class Simulation:
             raise CheckpointRefused(f"{path}: written by another version: {error}") from error
         recorder.restore(start.results)
         self._master.catch_up()
+
+    def _in_directory(self) -> FileRecorder:
+        if not isinstance(self.recorder, FileRecorder):
+            raise TypeError("a run with checkpoints has its results in a directory")
+        return self.recorder
 
     def __enter__(self) -> Simulation:
         return self
@@ -132,17 +135,28 @@ class Simulation:
             self._end({"status": "done"})
         return not self.done
 
-    def finish(self, progress: Progress | None = None, checkpoints: Checkpoints | None = None) -> dict[str, Any]:
-        """Make all steps that are left and return the summary; ``progress`` is called after each. Raises RunStopped."""
-        master = self._master
+    def finish(self, progress: Progress | None = None, seconds: float | None = None) -> dict[str, Any]:
+        """Make all steps that are left and return the summary. Raises RunStopped; parameters as of `run`."""
+        master, due = self._master, inf
+        if seconds is not None:
+            recorder, due = self._in_directory(), 0.0
+            _refuse_checkpoints(self.scene)
+            files = fingerprints(self.scene)
         with self._ending():
             while not master.done:
                 master.step()
                 if progress is not None:
                     progress(master.state.time, master.state.phase.name, master.state.macro_steps)
-                if checkpoints is not None:
-                    checkpoints.take_when_due(master)
+                if seconds is not None and perf_counter() >= due:
+                    master.hand_over()
+                    kept, state = recorder.save(), master.run_state()
+                    begun = self.scene, __version__, files, seconds, self._wall_time(), recorder.interval
+                    Checkpoint(*begun, kept, state).write(recorder.directory.checkpoint)
+                    due = perf_counter() + seconds
         return self._end({"status": "done"})
+
+    def _wall_time(self) -> float:
+        return self._before + perf_counter() - self._loaded
 
     @contextmanager
     def _ending(self) -> Iterator[None]:
@@ -178,7 +192,7 @@ class Simulation:
         return self._summary
 
     def _summed_up(self, status: dict[str, Any]) -> dict[str, Any]:
-        ended, summary = perf_counter(), self._master.summary()
+        wall_time, summary = self._wall_time(), self._master.summary()
         beam, spring = self._bodies
         return {
             **status,
@@ -186,7 +200,7 @@ class Simulation:
             **summary,
             **_calls(beam=beam, spring=spring),
             "setup_time": self._setup_time,
-            "wall_time": self._before + ended - self._loaded,
+            "wall_time": wall_time,
             "warnings": [*suspicions(self.scene), *summary["warnings"]],
         }
 
@@ -222,15 +236,8 @@ def run(
     OSError
         If the results cannot be written.
     """
-    checkpoints = None
-    if seconds is not None:
-        if not isinstance(recorder, FileRecorder):
-            raise TypeError("checkpoints belong to results in a directory")
-        _refuse_checkpoints(scene)
-        before = 0.0 if start is None else start.wall_time
-        checkpoints = Checkpoints(recorder, seconds, __version__, fingerprints(scene), before)
     with Simulation(scene, recorder, start=start, upper=upper, lower=lower) as simulation:
-        return simulation.finish(progress, checkpoints)
+        return simulation.finish(progress, seconds)
 
 
 def last_checkpoint(directory: str | Path) -> Checkpoint:
