@@ -69,8 +69,8 @@ def page() -> str:
         heading = reference.heading(name)
         lines += [f"## {heading}\n\n{reference.about(name)}\n" if name else f"## {heading.capitalize()}\n"]
         for ways in model.WAYS:
-            marked = ", or ".join(" and ".join(f"`{key}`" for key in group) for group in ways.groups)
-            lines.append(f"Give the {ways.thing} one way: {marked}.\n")
+            marked = ", or ".join(" and ".join(f"`{key}`" for key in group) for group in ways)
+            lines.append(f"Give only one of these: {marked}.\n")
         lines += [*table(COLUMNS, map(row, reference.listed(name))), ""]
     return "\n".join([*lines, *elements()])
 

@@ -96,7 +96,6 @@ def keys(
     for name, group in groupby(found, lambda key: key.table):
         title = f"\n{reference.heading(name)}  {reference.about(name)}" if name else reference.heading(name)
         shown.append(Text(title, style="bold"))
-        shown += [Text(f"give the {ways.thing} one way: {ways}") for ways in MODELS[name].WAYS]
         for key in group:
             unit = "" if key.unit == "–" else f" [{key.unit}]"
             left_out = key.default if key.default.startswith("needed") else f"default: {key.default}"

@@ -28,6 +28,9 @@ _NOUNS = {
     "string": "a text in quotes",
     "array": "a list of 1 to 4 finite numbers",
     "object": "a table, as { k = 3.0e4 }",
+    "parameter": "a number, true or false, or a text in quotes",
+    "table": "a table, written as [name] above its keys",
+    "tables": "tables, each written as [[loads]] above its keys",
 }
 _BOUNDS = {
     "exclusiveMinimum": "greater than",
@@ -67,6 +70,11 @@ def schema() -> dict[str, Any]:
     return found
 
 
+def model_of(table: str) -> type[Table] | None:
+    """Return the table of that name, ``"loads.0"`` being the first of ``[[loads]]``; ``None`` if there is none."""
+    return MODELS.get(table.partition(".")[0])
+
+
 def keys_of(model: type[Table]) -> dict[str, dict[str, Any]]:
     """Return what the JSON Schema says of each key of a table."""
     properties: dict[str, dict[str, Any]] = schema()["$defs"].get(model.__name__, schema())["properties"]
@@ -78,7 +86,8 @@ def allowed(key: Mapping[str, Any]) -> str:
     if choices := key.get("enum") or [key[name] for name in ("const",) if name in key]:
         return " or ".join(json.dumps(choice, ensure_ascii=False) for choice in choices)
     bounds = " and ".join(f"{words} {key[name]:.15g}" for name, words in _BOUNDS.items() if name in key)
-    return f"{_NOUNS[key['type']]} {bounds}".strip()
+    kind = "tables" if "$ref" in key.get("items", ()) else key.get("type", "table")
+    return f"{_NOUNS[kind]} {bounds}".strip()
 
 
 def listed(table: str | None = None) -> list[Key]:
@@ -100,7 +109,7 @@ def heading(table: str) -> str:
 
 def unit_of(table: str, key: str) -> str:
     """Return the unit of a key of a table, or of a load by its number ("loads.0"); "–" if it has none."""
-    return str(keys_of(MODELS[table.partition(".")[0]])[key]["unit"])
+    return str(keys_of(model_of(table) or Scene)[key]["unit"])
 
 
 def about(table: str) -> str:
@@ -109,9 +118,8 @@ def about(table: str) -> str:
 
 
 def _default(model: type[Table], name: str, key: Mapping[str, Any]) -> str:
-    one_way = [ways.thing for ways in model.WAYS if ways.taken((name,)) and ways.needed(model)]
-    if "otherwise" in key or one_way:
-        return str(key.get("otherwise") or f"needed: the {one_way[0]} one way")
+    if "otherwise" in key:
+        return str(key["otherwise"])
     if model.model_fields[name].is_required():
         return "needed" + (", or dimensionless" if name in model.SCALES else "")
     default = key.get("default")
@@ -119,23 +127,5 @@ def _default(model: type[Table], name: str, key: Mapping[str, Any]) -> str:
 
 
 def beginning(title: str) -> str:
-    """Return a scene file to start from: ``beginning.toml``, with the meaning and unit of each key beside it.
-
-    It has an aluminium beam, 0.8 m × 30 × 3 mm, above a rubber bumper above a stop.
-    """
-    lines = [
-        tomli_w.dumps({"title": title}).strip(),
-        "",
-        "# All values are SI, up is positive. springbeam keys lists every key, springbeam predict checks the values.",
-        "",
-    ]
-    table = ""
-    for line in Path(__file__).with_name("beginning.toml").read_text(encoding="utf-8").splitlines():
-        name, comment = line.partition(" = ")[0].strip("[]"), ""
-        if line.startswith("["):
-            table, comment = name, f"  # {about(name).partition('. ')[0].rstrip('.')}."
-        elif line:
-            key = keys_of(TABLES[table])[name]
-            comment = " " * (32 - len(line)) + f"# {key['description']}" + f" [{key['unit']}]" * (key["unit"] != "–")
-        lines.append(line + comment)
-    return "\n".join(lines) + "\n"
+    """Return a commented scene file to start from: an aluminium beam above a rubber bumper above a stop."""
+    return tomli_w.dumps({"title": title}) + Path(__file__).with_name("beginning.toml").read_text(encoding="utf-8")

@@ -200,11 +200,6 @@ TABLES: dict[str, type[Table]] = {
 }
 
 
-def table_of(name: str) -> type[Table] | None:
-    """Return the table of that name, ``"loads.0"`` being the first of ``[[loads]]``; ``None`` if there is none."""
-    return Load if re.fullmatch(r"loads\.\d+", name) else TABLES.get(name)
-
-
 def split_key(text: str) -> tuple[str, str] | None:
     """Return table and key of ``"table.key"`` or ``"loads.0.key"``; ``None`` if it is neither."""
     found = re.fullmatch(r"\s*(loads\s*\.\s*\d+|[^.]*?)\s*\.(.*)", text, re.DOTALL)

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable
+from itertools import chain
 from math import pi
 from sys import float_info
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal
 
 from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
     ModelWrapValidatorHandler,
-    PrivateAttr,
     SerializerFunctionWrapHandler,
     field_validator,
     model_serializer,
@@ -62,27 +62,14 @@ def key(
     return Field(default, description=meaning, json_schema_extra=extra, **bounds)  # type: ignore[call-overload]
 
 
-class Ways(NamedTuple):
-    """Ways to give one thing, each a group of keys; a table has keys of one group, and those of the first follow."""
-
-    thing: str
-    groups: tuple[tuple[str, ...], ...]
-
-    def __str__(self) -> str:
-        return ", or ".join(" and ".join(group) for group in self.groups)
-
-    def needed(self, model: type[Table]) -> bool:
-        """Return whether a table must have one of them."""
-        return model.model_fields[self.groups[0][0]].is_required()
-
-    def taken(self, content: Any) -> list[tuple[str, ...]]:
-        """Return the groups of which ``content`` (a mapping, or a set of keys) has a key."""
-        return [group for group in self.groups if any(name in content for name in group)]
+#: Groups of keys that give one thing, each another way; those of the first follow from the others.
+Ways = tuple[tuple[str, ...], ...]
 
 
 class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True, serialize_by_alias=True)
 
+    #: What can be given in several ways: a table has keys of one.
     WAYS: ClassVar[tuple[Ways, ...]] = ()
     #: Keys that give the table its scales: of a table with none of them, those that are needed are 1 (dimensionless).
     SCALES: ClassVar[tuple[str, ...]] = ()
@@ -91,9 +78,6 @@ class Table(BaseModel):
 
     #: Which keys follow from others: where they do, by the keys given, and their values, by the values of these.
     FOLLOWS: ClassVar[tuple[tuple[Callable[[set[str]], bool], dict[str, Callable[[Any], float]]], ...]] = ()
-
-    #: Keys that have followed so; files do not have them.
-    _followed: frozenset[str] = PrivateAttr(frozenset())
 
     @classmethod
     def ones(cls) -> dict[str, float]:
@@ -105,16 +89,22 @@ class Table(BaseModel):
         """Return the table of `ones` with some keys changed."""
         return cls(**{**cls.ones(), **keys})
 
+    @classmethod
+    def other_ways(cls, name: str) -> set[str]:
+        """Return the keys that give in another way what the key ``name`` gives."""
+        return {
+            key for ways in cls.WAYS if name in chain(*ways) for group in ways if name not in group for key in group
+        }
+
     @model_validator(mode="wrap")
     @classmethod
     def _completed(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         if not isinstance(data, dict):
             return handler(data)
         given = {name for name, value in data.items() if value is not None}
-        for ways in cls.WAYS:
-            if len(groups := ways.taken(given)) > 1:
-                both = [name for group in groups for name in group if name in given]
-                raise ValueError(f"{', '.join(both)}: give the {ways.thing} one way: {ways}")
+        for name in data:
+            if name in given and (others := given & cls.other_ways(name)):
+                raise ValueError(f"{', '.join([name, *sorted(others)])}: two ways to give one thing; leave one out")
         # A bad value, which is reported as such, counts as 1.
         sane = {name: x for name, x in data.items() if isinstance(x, (int, float)) and abs(x) <= float_info.max}
         following = [values for follow, values in cls.FOLLOWS if follow(given)]
@@ -125,13 +115,15 @@ class Table(BaseModel):
             follows |= {name: one for name, one in cls.ones().items() if name in cls.SCALES}
         follows = {name: value for name, value in follows.items() if name not in given}
         table = handler({**data, **follows})
-        table._followed = frozenset(follows)
+        table.model_fields_set.difference_update(follows)
         return table
 
     @model_serializer(mode="wrap")
     def _as_given(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        data = handler(self)
-        return {name: value for name, value in data.items() if name not in self._followed and value not in ((), [])}
+        """Leave out what follows from other keys: neither given nor the default."""
+        fields, given = type(self).model_fields, self.model_fields_set
+        followed = {name for name in fields.keys() - given if getattr(self, name) != fields[name].default}
+        return {name: value for name, value in handler(self).items() if name not in followed and value not in ((), [])}
 
 
 class Time(Table):
@@ -144,6 +136,9 @@ class Time(Table):
     )  # fmt: skip
 
 
+_OF_SECTION = "needed, or width and height, or diameter"
+
+
 class Beam(Table):
     """Kelvin–Voigt Timoshenko beam, clamped at x = 0 (Ahn & Tate, (1)–(5)).
 
@@ -153,13 +148,15 @@ class Beam(Table):
 
     density: float = key("kg/m³", "density ρ", gt=0.0)
     length: float = key("m", "length L", gt=0.0)
-    area: float = key("m²", "area A of the section", gt=0.0)
-    second_moment_of_area: float = key("m⁴", "second moment of area I about the axis of bending", gt=0.0)
+    area: float = key("m²", "area A of the section", gt=0.0, otherwise=_OF_SECTION)
+    second_moment_of_area: float = key(
+        "m⁴", "second moment of area I about the axis of bending", gt=0.0, otherwise=_OF_SECTION
+    )
     width: float | None = key("m", "width of a rectangular section", None, gt=0.0)
     height: float | None = key("m", "height of a rectangular section, in the direction of motion", None, gt=0.0)
     diameter: float | None = key("m", "diameter of a round section", None, gt=0.0)
     young_modulus: float = key("Pa", "Young's modulus E", gt=0.0)
-    shear_modulus: float = key("Pa", "shear modulus G", gt=0.0)
+    shear_modulus: float = key("Pa", "shear modulus G", gt=0.0, otherwise="needed, or poisson_ratio")
     poisson_ratio: float | None = key("–", "Poisson's ratio ν: G = E/2(1 + ν)", None, gt=-1.0, le=0.5)
     shear_coefficient: float = key(
         "–", "shear coefficient K", gt=0.0, otherwise="5/6 with width and height, 9/10 with diameter; needed with area"
@@ -191,9 +188,9 @@ class Beam(Table):
     )
 
     WAYS = (
-        Ways("section", (("area", "second_moment_of_area"), ("width", "height"), ("diameter",))),
-        Ways("shear stiffness", (("shear_modulus",), ("poisson_ratio",))),
-        Ways("velocity at the start", (("initial_velocity_slope",), ("approach_speed",))),
+        (("area", "second_moment_of_area"), ("width", "height"), ("diameter",)),
+        (("shear_modulus",), ("poisson_ratio",)),
+        (("initial_velocity_slope",), ("approach_speed",)),
     )
     START = "initial_deflection_slope"
     SCALES = (
@@ -377,7 +374,7 @@ class Coupling(Table):
         1.0e-6, gt=0.0, le=0.1,
     )  # fmt: skip
 
-    WAYS = (Ways("steps", ((STEP_KEY,), TOLERANCE_KEYS)),)
+    WAYS = (((STEP_KEY,), TOLERANCE_KEYS),)
 
     @model_validator(mode="before")
     @classmethod
