@@ -46,7 +46,8 @@ from .common import (
 #: Most rows that --output-interval may ask for.
 _MOST_ROWS = 10_000_000
 _REFRESH_SECONDS = 0.1
-_FIRST_EVENTS, _LAST_EVENTS = 10, 3
+#: More are in events.csv.
+_FIRST_EVENTS = 12
 
 
 def run(
@@ -264,9 +265,8 @@ def report(console: Console, directory: RunDirectory, scene: Scene) -> None:
     summary, events = load_summary(directory.path), load_events(directory.path)
     console.print(Text(scene.title or "(untitled scene)", style="bold"))
     kinds = Counter(event.kind for event in events)
-    first, last = events[:_FIRST_EVENTS], events[_FIRST_EVENTS:][-_LAST_EVENTS:]
-    if first:
-        console.print(_event_table(first, last, len(events) - len(first) - len(last), scene))
+    if events:
+        console.print(_event_table(events[:_FIRST_EVENTS], len(events) - _FIRST_EVENTS, scene))
         counts = ", ".join(f"{number} {kind}" for kind, number in kinds.most_common())
         console.print(f"events    {counts}")
         console.print("          (on the tip, of the stop: impulses, upward; lost: energy that the event takes)")
@@ -304,18 +304,15 @@ def picked_in_words(accuracy: Mapping[str, Any]) -> str:
     return f"{accuracy['asked']:g} asked: {found['scheme']} {found['degree']}, H = {found['macro_step']:.3g} s"
 
 
-def _event_table(first: list[Event], last: list[Event], between: int, scene: Scene) -> Table:
+def _event_table(first: list[Event], more: int, scene: Scene) -> Table:
     position, speed = ("u_tip", "v_tip") if scene.lower is None else ("y", "z")
     table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
     table.add_column("event", no_wrap=True)
     units = {"time": "s", position: "m", speed: "m/s", "on the tip": "N·s", "of the stop": "N·s", "lost": "J"}
     for name, unit in units.items():
         table.add_column(Text(f"{name}\n[{unit}]"), justify="right", no_wrap=True)
-    shown = [*first, *last]
-    scales = {name: max(abs(getattr(event, name) or 0.0) for event in shown) for name in (position, speed)}
-    for event in shown:
-        if between and last and event is last[0]:
-            table.add_row("⋮", Text(f"{between} more"))
+    scales = {name: max(abs(getattr(event, name) or 0.0) for event in first) for name in (position, speed)}
+    for event in first:
         impulses = (event.impulse_contact, event.impulse_foundation)
         table.add_row(
             event.kind,
@@ -323,4 +320,6 @@ def _event_table(first: list[Event], last: list[Event], between: int, scene: Sce
             *("" if getattr(event, name) is None else rounded(getattr(event, name), scales[name]) for name in scales),
             *(f"{value:.3g}" if value else "" for value in (*impulses, event.energy_loss)),
         )
+    if more > 0:
+        table.add_row("⋮", Text(f"{more} more"))
     return table

@@ -89,10 +89,8 @@ class Converge(Study):
             If the scene has no beam with a mesh, or a quantity is unknown.
         """
         beam = self.scene.beam
-        if beam is None:
+        if beam is None or self.scene.massless:
             raise SceneError("[beam]: the scene has no mesh to refine")
-        if self.scene.massless:
-            raise SceneError('beam.fidelity = "quasi_static": a beam without inertia has no mesh to refine')
         known(self.metrics)
         more = [_RATIO**k for k in range(self.levels)]
         found = [("elements", beam.n_elements * k, beam.n_modes) for k in more]

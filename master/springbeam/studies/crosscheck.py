@@ -29,6 +29,7 @@ class Crosscheck(Study):
     """A scene beside the reference of its law."""
 
     kind: ClassVar[str] = "crosscheck"
+    announced: ClassVar[str] = "2 runs and 2 references; of Algorithm 1 a run and 2 references"
 
     scene: Scene  #: its first quarter if quick
 
@@ -38,10 +39,6 @@ class Crosscheck(Study):
             event_driven.refuse(self.scene)
         start, end = self.scene.contact_time or 0.0, self.scene.time.t_end
         return {_CASE: {"time.t_end": start + 0.25 * (end - start)} if self.quick else {}}
-
-    def cost(self) -> str:
-        """Say what is run."""
-        return "a run, and Algorithm 1 twice" if self.scene.contact.algorithm else "2 runs and 2 references"
 
     def record(self, case: Row) -> Row:
         """Return what was found, as `compare` has it."""

@@ -48,6 +48,7 @@ class Fit(Study):
     """Keys that make runs of a scene agree with a measurement."""
 
     kind: ClassVar[str] = "fit"
+    announced: ClassVar[str] = "some 25 runs for each key, five times as many where the clock is to be found"
 
     scene: Scene
     file: str  #: path of the measurement
@@ -89,11 +90,6 @@ class Fit(Study):
     def data(self) -> Measured:
         """Return the measured curves."""
         return read_measured(self.file, self.scene, mapping(self.names))
-
-    def cost(self) -> str:
-        """Say what is run."""
-        unknowns, searches = (len(self.vary), 1) if self.shift is not None else (len(self.vary) + 1, 3)
-        return f"some {10 * searches * (2 * unknowns + 1)} runs"
 
     def record(self, case: Row) -> Row:
         """Return the values found, their intervals, and every run on the way."""

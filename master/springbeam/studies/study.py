@@ -10,7 +10,7 @@
 * A case whose record is there is not computed again. A study with all records is shown at once.
 * Table (``KIND.parquet``, ``KIND.csv``), pictures and what is shown are made from the records alone.
 
-`record_all` computes, `Records` is the file, `cli/frame.py` what all commands share.
+`record_all` computes, `Records` is the file, `cli/studies.py` has the commands.
 """
 
 from __future__ import annotations
@@ -83,6 +83,7 @@ class Study(BaseModel, ABC):
     kind: ClassVar[str]  #: names the command, and the files of the results begin with it
     #: Whether workers compute the cases; else they follow one another here, where they are timed or too few.
     parallel: ClassVar[bool] = False
+    announced: ClassVar[str] = "{} runs"  #: what there is to compute, with the number of cases
 
     scene: Scene | None = None
     quick: bool = False  #: a smaller table of cases
@@ -166,10 +167,6 @@ class Study(BaseModel, ABC):
             files.append(directory / f"{name}.png")
             figure.savefig(files[-1], dpi=110)
         return files
-
-    def cost(self) -> str:
-        """Say how much there is to compute."""
-        return f"{len(self.cases())} runs"
 
     def settings(self) -> dict[str, Any]:
         """Return what tells one study from another, with the files that it needs. Raises FmuError if one is missing."""

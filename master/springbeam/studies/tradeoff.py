@@ -55,6 +55,7 @@ class Tradeoff(Study):
     """All configurations of a scene; coarse to fine in each family."""
 
     kind: ClassVar[str] = "tradeoff"
+    announced: ClassVar[str] = "{} configurations; finer ones of a kind are left out after one that takes too long"
 
     scene: Scene  #: ends with the compared window
     repeats: int = 3  #: timings of each configuration; their median counts. 1 if quick
@@ -94,11 +95,6 @@ class Tradeoff(Study):
     def cases(self) -> dict[str, Row]:
         """Return the configurations."""
         return self.configurations
-
-    def cost(self) -> str:
-        """Say how many configurations there are."""
-        what = f"{len(self.cases())} configurations, timed {1 if self.quick else self.repeats}×"
-        return f"{what}; finer ones of a kind are left out after one that takes too long"
 
     def skipped(self, case: Row, records: Mapping[str, Row]) -> Row | None:
         """Leave out what a coarser one of the family was too slow for."""

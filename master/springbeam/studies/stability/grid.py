@@ -33,6 +33,7 @@ class Grid(Study):
     """A Latin hypercube over all parameters, and slices through two of them."""
 
     kind: ClassVar[str] = "stability"
+    announced: ClassVar[str] = "{} cells, mostly below a second each; --samples and --resolution set how many"
     parallel: ClassVar[bool] = True
 
     samples: int = 300
@@ -48,10 +49,6 @@ class Grid(Study):
         if not cells:
             raise SceneError("no cells: --samples and --resolution are both 0")
         return {str(number): cell for number, cell in enumerate(cells)}
-
-    def cost(self) -> str:
-        """Say how many cells there are."""
-        return f"{len(self.cases())} cells, mostly below a second each; --samples and --resolution set how many"
 
     def record(self, case: Mapping[str, Any]) -> Row:
         """Run a cell."""
