@@ -20,8 +20,7 @@ from springbeam.scene import Coupling, SceneError
 from springbeam.scene.laws import LAWS
 from springbeam.studies.stability import grid
 from springbeam.studies.stability.cells import AT_REST, COUPLINGS, PARAMETERS, SLICES, sampled_cells, slice_cells
-from springbeam.studies.stability.grid import Grid
-from springbeam.studies.stability.outcome import CLASSES, ended, judged, run_cell
+from springbeam.studies.stability.grid import CLASSES, Grid, ended, judged, run_cell
 from springbeam.studies.study import record_all
 
 SMALL = {"time": {"t_end": 0.05}, "beam": {"n_elements": 5}, "coupling": {"macro_step": 2e-3}}
@@ -161,16 +160,15 @@ def test_what_calls_itself_resolved_is_compared_with_the_reference(monkeypatch, 
     [
         ("z", "z is not finite"),
         ("gap", "overlap or part by 2.0e-09"),
-        ("e_dissipated", "damping gives energy back"),
-        ("e_impact_loss", "impacts give energy back"),
-        ("time", "time runs backwards"),
+        ("e_dissipated", "energy lost by damping comes back"),
+        ("e_impact_loss", "energy lost by impacts comes back"),
     ],
 )
 def test_what_must_not_be_is_garbage_whatever_the_energy(column, reason):
     run = done()
     values = run[column].copy()
     motion = np.abs(run.shapes[1]).max() + 2e-3 * max(np.abs(run.v_tip).max(), np.abs(run.z).max())
-    values[-1] = {"z": np.nan, "gap": 2e-9 * motion, "time": 0.0}.get(column, values[-1] - 1e-6)
+    values[-1] = {"z": np.nan, "gap": 2e-9 * motion}.get(column, values[-1] - 1e-6)
     outcome = judged(changed(run, **{column: values}))
     assert outcome["kind"] == "garbage"
     assert reason in outcome["reason"]

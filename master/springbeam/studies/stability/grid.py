@@ -1,4 +1,16 @@
-"""The grid of extreme scenes: which cells it has, and what their outcomes amount to.
+"""The grid of extreme scenes: each cell is run and put into a class; what the classes amount to.
+
+===========  ==========================================================================================================
+conserved    done, energy constant to `ledger.EXACT`, nothing lost
+dissipative  done, energy plus booked losses constant to `ledger.EXACT`; or a numerically damped beam (``rho_inf`` < 1)
+             that has only lost energy
+approximate  done, energy changed by more: within the bound of its scheme (`ledger.bounds`), or the run says so
+refused      a scene that cannot be run, with the reason
+stopped      ended early, with the cause
+garbage      anything else: a run that calls itself resolved and is far from the event-driven reference; a coupling that
+             changes no energy and has changed it; energy changed without a warning, numbers that are not finite, bodies
+             that overlap, damping that returns energy, a crash
+===========  ==========================================================================================================
 
 The same settings give the same cells and outcomes, in whatever order and in however many processes they run.
 """
@@ -7,7 +19,8 @@ from __future__ import annotations
 
 import statistics
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -16,17 +29,41 @@ import tomli_w
 from rich.table import Table
 from rich.text import Text
 
+from ...bodies.protocol import FmuError
+from ...monolithic import event_driven
 from ...pictures.drawing import BLACK, BLUE, GREEN, ORANGE, SKY, STONE
-from ...scene import SceneError
+from ...results.trajectory import Trajectory
+from ...run.ledger import EXACT, bounds
+from ...run.outcome import RunStopped
+from ...run.runner import Simulation
+from ...scene import Scene, SceneError, scene_from_dict, with_changes
+from ...scene.automatic import with_scheme_chosen
+from ..comparison import PERTURBATION, initial_speed
+from ..metrics import motion_errors, worst
 from ..study import Findings, Pictures, Row, Study
 from ..tables import table
 from .cells import COUPLINGS, SLICES, UNITS, sampled_cells, scene_dict, slice_cells
-from .outcome import CLASSES, ended, run_cell
 
+#: In the order in which pictures and tables show them; the last must stay empty.
+CLASSES = ("conserved", "dissipative", "approximate", "refused", "stopped", "garbage")
 #: Of `CLASSES`; residuals outside are drawn in the colours of the ends.
 _COLOURS, _RESIDUALS = (BLUE, SKY, GREEN, STONE, ORANGE, BLACK), (1e-16, 1.0)
 #: Quick: the hypercube has so many times fewer cells, each axis of a slice half as many.
 _QUICK = 5
+#: A run is cut after this many accepted steps: a contact that opens and closes in every macro step.
+_MOST_STEPS = 600
+#: Bodies may overlap or, joined, part by so much of their motion.
+_OVERLAP = 1e-9
+#: A coupling that changes no energy, at whatever step, may change it by so much of the largest before it is wrong: what
+#: rounding leaves of a gap costs energy where the force of a step is very large.
+_GUARANTEED = 1e-6
+#: What is resolved may be off by so much of its motion, unless a change of the initial velocity changes the motion by
+#: more than so many times as much.
+_RESOLVED, _WELL_CONDITIONED = 0.05, 100.0
+#: Times at which a resolved cell is compared with the reference, and how long that may take [s].
+_COMPARED, _PATIENCE = 60, 60.0
+#: Rounding of a sum of energies, of the largest so far.
+_SLACK = 1e-10
 
 
 class Grid(Study):
@@ -65,25 +102,33 @@ class Grid(Study):
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Count classes; passed if no cell is garbage."""
         bad = {name: record["reason"] for name, record in records.items() if self.failed(record)}
-        classes = Counter(record["kind"] for record in records.values())
         garbage = [Text(f"garbage   {_file(name)}: {reason}") for name, reason in bad.items()]
         errors = [record["error_motion"] for record in records.values() if record["error_motion"] is not None]
         resolved = sum(record["resolved"] for record in records.values())
         beside = f"{resolved} cells call themselves resolved, {len(errors)} were compared with the reference"
         if errors:
             beside += f": errors {statistics.median(errors):.0e} in the median, at most {max(errors):.0e}"
-        shown = [self._classes(records), Text(beside), *garbage]
+        classes = Counter(record["kind"] for record in records.values())
         told = {"cells": len(records), "classes": classes, "resolved": resolved, "compared": len(errors)}
+        shown = [self._classes(records), Text(beside), *garbage]
         return Findings({**told, "garbage": bad}, shown, 1 if bad else 0)
+
+    def _classes(self, records: Mapping[str, Row]) -> Table:
+        """Return a row per coupling, with the largest residual of the runs that were done."""
+        cells, rows = self.cases(), []
+        for coupling in (*COUPLINGS, None):
+            mine = [r for name, r in records.items() if coupling in (cells[name]["coupling"], None)]
+            counts = Counter(record["kind"] for record in mine)
+            done = [r["residual"] or 0.0 for r in mine if r["kind"] not in ("refused", "stopped")]
+            name = "all" if coupling is None else " ".join(map(str, coupling)).removeprefix("transmission ")
+            rows.append((name, *(str(counts[kind] or "") for kind in CLASSES), f"{max(done):.0e}" if done else ""))
+        names = ("coupling", *(f"{kind[:4]}." for kind in CLASSES), "residual")
+        return table(names, rows, f"{len(records)} cells")
 
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
         """Return a row per cell."""
-        found = []
-        for row in super().rows(records):
-            law, scheme, degree = row.pop("coupling")
-            coupling = {"law": law, "scheme": scheme, "degree": degree}
-            found.append(row | coupling | {"reason": " ".join(row["reason"].split())})
-        return found
+        names = ("law", "scheme", "degree")
+        return [row | dict(zip(names, row.pop("coupling"), strict=True)) for row in super().rows(records)]
 
     def write(self, records: Mapping[str, Row], directory: Path, *, pictures: bool) -> list[Path]:
         """Write the table, the pictures, and the scenes of garbage."""
@@ -98,47 +143,185 @@ class Grid(Study):
         import matplotlib
         from matplotlib.colors import ListedColormap, LogNorm
 
-        from ..picture import Scale, cells, column, panels
+        from ..picture import Scale, cells, panels
 
-        rows, figures = self.rows(records), Pictures()
-        slices = [name for name in SLICES if any(row["slice"] == name for row in rows)]
+        slices: dict[str, list[Row]] = {}
+        for row in self.rows(records):
+            number, residual = CLASSES.index(row["kind"]), max(row["residual"] or 0.0, _RESIDUALS[0])
+            if row["slice"]:
+                slices.setdefault(row["slice"], []).append(row | {"classes": number, "residuals": residual})
         looks: dict[str, dict[str, Any]] = {
             "classes": {"cmap": ListedColormap(_COLOURS), "vmin": -0.5, "vmax": len(CLASSES) - 0.5},
             "residuals": {"cmap": matplotlib.colormaps["cividis"], "norm": LogNorm(*_RESIDUALS, clip=True)},
         }
+        figures = Pictures()
         for what, look in looks.items() if slices else ():
             figure, axes = panels(len(slices), 4, (4.2, 3.6), f"Slices through the extremes: {what}")
-            for ax, name in zip(axes, slices, strict=True):
-                mine = [row for row in rows if row["slice"] == name]
-                labels = {parameter: f"{parameter} [{UNITS.get(parameter, '–')}]" for parameter in SLICES[name][:2]}
-                x, y = (Scale(parameter, label, words=True) for parameter, label in labels.items())
-                values = np.maximum(column(mine, "residual"), _RESIDUALS[0])
-                if what == "classes":
-                    values = np.array([CLASSES.index(row["kind"]) for row in mine], dtype=float)
-                drawn = cells(ax, mine, x, y, values, **look)
+            for ax, (name, rows) in zip(axes, slices.items(), strict=True):
+                x, y = (Scale(key, f"{key} [{UNITS.get(key, '–')}]", words=True) for key in SLICES[name][:2])
+                refused = [row["residual"] is None and what == "residuals" for row in rows]
+                drawn = cells(ax, rows, x, y, np.where(refused, np.nan, [row[what] for row in rows]), **look)
                 ax.set(title=name, facecolor=STONE)  # where nothing was run
                 ax.tick_params(labelsize="small")
                 ax.tick_params(axis="x", labelrotation=30)
             bar = figure.colorbar(drawn, ax=axes, shrink=0.6)
+            bar.set_label("largest energy residual / largest energy so far (grey: refused)" * (what == "residuals"))
             if what == "classes":
                 bar.set_ticks(range(len(CLASSES)), labels=CLASSES)
-            else:
-                bar.set_label("largest energy residual / largest energy so far (grey: refused)")
             figures[f"stability-{what}"] = figure
         return figures
-
-    def _classes(self, records: Mapping[str, Row]) -> Table:
-        """Return a row per coupling, with the largest residual of the runs that were done."""
-        cells, rows = self.cases(), []
-        for coupling in (*COUPLINGS, None):
-            mine = [r for name, r in records.items() if coupling in (cells[name]["coupling"], None)]
-            counts = Counter(record["kind"] for record in mine)
-            done = [r["residual"] or 0.0 for r in mine if r["kind"] not in ("refused", "stopped")]
-            name = "all" if coupling is None else " ".join(map(str, coupling)).removeprefix("transmission ")
-            rows.append((name, *(str(counts[kind] or "") for kind in CLASSES), f"{max(done):.0e}" if done else ""))
-        names = ("coupling", *(f"{kind[:4]}." for kind in CLASSES), "residual")
-        return table(names, rows, f"{len(records)} cells")
 
 
 def _file(name: str) -> str:
     return f"stability-garbage-{name}.toml"
+
+
+# -- how a cell ends --------------------------------------------------------------------------------------------------
+
+
+def ended(kind: str, reason: str = "") -> Row:
+    """Return the record of a cell that ended as one of `CLASSES`.
+
+    ``reason``: refused, stopped, garbage: why; approximate: the run's warnings. ``residual``: the largest energy
+    residual over the largest energy until then; ``overlap`` of bodies, or the gap of joined ones, over the largest
+    motion; ``resolved``: whether the run calls itself so; ``error_motion`` of u_tip and y beside the reference, over
+    their largest changes, of what is resolved and well-conditioned.
+    """
+    told: Row = dict.fromkeys(("residual", "overlap", "error_motion"))
+    return {"kind": kind, "reason": " ".join(reason.split()), **told, "resolved": False, "macro_steps": 0, "events": 0}
+
+
+def run_cell(cell: dict[str, Any]) -> Row:
+    """Run a cell and return how it ended."""
+    accepted, cause = 0, ""
+    try:
+        simulation = Simulation(scene_from_dict(scene_dict(cell), source="cell"))
+    except (SceneError, FmuError) as error:
+        return ended("refused", str(error))
+    with simulation:
+        try:
+            while simulation.step() and accepted < _MOST_STEPS:
+                accepted += 1
+        except RunStopped as stopped:
+            cause = stopped.cause
+        found = simulation.run
+    if "traceback" in found.summary:  # an error that nobody foresaw
+        return ended("garbage", f"crashed: {cause}")
+    outcome = judged(found, cause)
+    if outcome["resolved"] and outcome["kind"] not in ("stopped", "garbage"):
+        outcome["error_motion"] = off = _error(found)
+        if off is not None and off > _RESOLVED:
+            why = f"calls itself resolved, and is {off:.1e} of its motion off the reference"
+            outcome |= {"kind": "garbage", "reason": why}
+    return outcome
+
+
+def _error(run: Trajectory) -> float | None:
+    """Return the error of ``run``; ``None`` without a reference, or if it is large and the motion ill-conditioned."""
+    scene, end = run.scene, float(run.time[-1])
+    times = np.linspace(float(run.time[0]), end, _COMPARED)
+    if end <= times[0]:
+        return None
+    options: dict[str, Any] = {"sample_times": times, "t_end": end, "time_limit": _PATIENCE}
+    try:
+        exact = event_driven.simulate(scene, **options)
+        error = worst(motion_errors(run.at(exact.time).columns, exact))
+        if error <= _RESOLVED:
+            return error
+        few, change = _WELL_CONDITIONED * PERTURBATION, PERTURBATION * initial_speed(scene)
+        perturbed = [(scene, change), *((pushed, 0.0) for pushed in _spring_pushed(scene, change))]
+        for other, velocity in perturbed:
+            moved = event_driven.simulate(other, velocity_perturbation=velocity, **options)
+            if worst(motion_errors(moved.columns, exact)) > few:
+                return None
+    except (ValueError, event_driven.ReferenceFailure):
+        return None
+    return error
+
+
+def _spring_pushed(scene: Scene, change: float) -> Iterator[Scene]:
+    """Yield a pair whose spring starts with a little less and more velocity, where it may have any.
+
+    A spring that the tip meets a little above Ψ is met a little below it, where another phase follows.
+    """
+    if scene.spring is None or scene.beam is None:
+        return
+    start, speed = scene.spring.initial_velocity, change * scene.beam.length
+    for velocity in (start - speed, start + speed):
+        with suppress(SceneError):  # a spring that is kept still until the tip has come
+            yield with_changes(scene, spring={"initial_velocity": velocity})
+
+
+def judged(run: Trajectory, cause: str = "") -> Row:
+    """Return the class of a run that is done, or has stopped for ``cause``, from what it recorded."""
+    counts = {name: run.summary[name] for name in ("macro_steps", "events")}
+    if len(run.time) == 0:
+        return ended("stopped", cause) | counts
+    # The scale is the largest energy so far [J], as in `springbeam.run.ledger.errors`.
+    mechanical = sum(np.abs(run[name]) for name in ("e_beam", "e_spring", "e_contact") if name in run.columns)
+    scale, overlap = np.maximum.accumulate(np.maximum(mechanical, abs(run.e_total[0]))), _overlap(run)
+    relative = np.divide(run.energy_residual, scale, out=np.zeros_like(scale), where=scale > 0.0)
+    measured = {"residual": float(np.abs(relative).max()), "overlap": overlap}
+    resolved = {"resolved": bool(run.summary["resolved"])}
+    return ended(*_class(run, cause, relative, scale, overlap)) | counts | measured | resolved
+
+
+def _class(run: Trajectory, cause: str, relative: np.ndarray, scale: np.ndarray, overlap: float) -> tuple[str, str]:
+    """Return the class of a run and why, by its relative residuals, the scale of its energy and its overlap."""
+    scene, _ = with_scheme_chosen(run.scene)
+    residual = float(np.abs(relative).max())
+    damped = scene.beam is not None and scene.beam.damped_numerically
+    keeps = scene.coupling.scheme == "energy" and not scene.contact.algorithm
+    if keeps and not damped and residual > _GUARANTEED:
+        return "garbage", f"energy residual {residual:.1e} of a coupling that changes none; {cause}"
+    if cause:
+        return "stopped", cause
+    if faults := list(_faults(run, overlap, scale)):
+        return "garbage", "; ".join(faults)
+    if residual <= EXACT:
+        lost = run.e_dissipated[-1] + run.e_impact_loss[-1]
+        return "dissipative" if lost > EXACT * scale[-1] else "conserved", ""
+    if keeps and damped and relative.max() <= EXACT:
+        return "dissipative", ""
+    said = [text for text in run.summary["warnings"] if "energy" in text]
+    if said or residual <= bounds(scene)[0]:
+        return "approximate", "; ".join(said)
+    return "garbage", f"energy residual {residual:.1e}, and nothing says so"
+
+
+def _faults(run: Trajectory, overlap: float, scale: np.ndarray) -> Iterator[str]:
+    """Yield what must not be, whatever the scene."""
+    for name, values in run.columns.items():
+        if name != "phase" and not np.all(np.isfinite(values)):
+            yield f"{name} is not finite"
+    beam = run.scene.beam
+    # What damping takes over an unresolved generalized-α step is exact, but of no sign.
+    if beam is None or not beam.damped_numerically:
+        yield from _given_back("damping", run.e_dissipated, scale)
+    if run.scene.contact.impact != "tip":
+        yield from _given_back("impacts", run.e_impact_loss, scale)
+    if overlap > _OVERLAP:
+        yield f"the bodies overlap or part by {overlap:.1e} of their motion"
+
+
+def _given_back(what: str, energy: np.ndarray, scale: np.ndarray) -> Iterator[str]:
+    change = np.diff(energy)
+    if np.any(change < -_SLACK * scale[1:]):
+        yield f"energy lost by {what} comes back: {change.min() / scale[-1]:.1e} of the largest"
+
+
+def _overlap(run: Trajectory) -> float:
+    """Return the largest overlap of bodies that may not, over the largest deflection or motion in a step."""
+    scene, overlaps = run.scene, [0.0]
+    positions = [run[name] for name in ("u_tip", "y") if name in run.columns]
+    if run.shapes is not None and len(run.shapes[0]):
+        positions.append(run.shapes[1])  # the tip is as exact as the largest deflection, however little it moves
+    speeds = [run[name] for name in ("v_tip", "z") if name in run.columns]
+    motion, moved = (max(float(np.abs(values).max()) for values in several) for several in (positions, speeds))
+    motion += scene.coupling.H * moved
+    if scene.contact.rigid and scene.coupled:
+        joined, free = np.isin(run.phase, ("tied", "touch")), run.phase == "free"
+        overlaps += [np.abs(run.gap[joined]).max(initial=0.0), np.max(-run.gap[free], initial=0.0)]
+    if scene.stop is not None and not scene.contact.algorithm and not scene.elastic_stop:
+        overlaps.append(np.max(scene.stop.position - (run.y if "y" in run.columns else run.u_tip)))
+    return float(max(overlaps)) / motion if motion > 0.0 else 0.0
