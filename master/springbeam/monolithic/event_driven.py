@@ -26,7 +26,7 @@ from .exponential import ExponentialPropagator, LinearForm, Segment
 from .hybrid_system import NOISE, HybridSystem, ReferenceFailure
 from .laws import Phase, Watch, law_of
 from .oscillators import GAUSS, STAGES
-from .quasi_static import QuasiStaticForm, QuasiStaticSystem
+from .quasi_static import QuasiStaticSystem
 from .rows import Rows
 from .transitions import HybridState
 
@@ -106,9 +106,7 @@ def refuse(scene: Scene) -> None:
 
 class _Run:
     def __init__(self, scene: Scene, velocity_perturbation: float, t_end: float | None) -> None:
-        self.scene, self.system, self._form = scene, HybridSystem(scene), LinearForm
-        if scene.massless:
-            self.system, self._form = QuasiStaticSystem(scene), QuasiStaticForm
+        self.scene, self.system = scene, (QuasiStaticSystem if scene.massless else HybridSystem)(scene)
         self.t_end = scene.time.t_end if t_end is None else min(t_end, scene.time.t_end)
         self._forms: dict[Phase, LinearForm] = {}
         self.counts = {"steps": 0, "phases": 0}
@@ -198,7 +196,7 @@ class _Run:
         state, self._phase_start = self.state, self.state.time
         self._kink = self.system.loads.smooth_from(state.time)
         if state.phase not in self._forms:
-            self._forms[state.phase] = self._form(self.system, state.phase)
+            self._forms[state.phase] = LinearForm(self.system, state.phase)
         self._propagator = ExponentialPropagator(self.system, state.phase, self._forms[state.phase], state.X)
 
     def _summary(self, wall_time: float) -> dict[str, Any]:
@@ -211,12 +209,10 @@ def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
     scene, X, time = s.scene, np.zeros(s.size), 0.0
     if scene.static:
         return time, _at_rest(s)
-    inertia = s.inverse_tip_mass not in (0.0, np.inf)
-    if s.has_spring:
-        X[s.Y] = s.spring.equilibrium
-        X[s.Z] = s.spring.initial_velocity + (0.0 if inertia else perturbation)
-    if scene.elastic_stop:
-        X[s.Y] = s.stop.position
+    inertia = s.tip_mobility not in (0.0, np.inf)
+    x, x_dot = X[s.A], X[s.V]
+    x[s.r :] = s.root_mass * s.spring.equilibrium
+    x_dot[s.r :] = s.root_mass * (s.spring.initial_velocity + (0.0 if inertia else perturbation))
     if scene.beam is not None and s.beam is not None:
         slope, rate = scene.beam.initial_deflection_slope, scene.beam.initial_velocity_slope
         if scene.tip_target is not None and scene.beam.approach == "undeformed":
@@ -225,12 +221,10 @@ def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
             if gap > 0.0:
                 time = -gap / (rate * scene.beam.length)
                 slope = obstacle / scene.beam.length
-        X[s.A] = slope * s.beam.slope_shape
-        X[s.V] = (rate + perturbation * inertia) * s.beam.slope_shape
+        x[: s.r] = slope * s.beam.slope_shape
+        x_dot[: s.r] = (rate + perturbation * inertia) * s.beam.slope_shape
         if scene.beam.approach == "elastic":
             s.settle(Phase("free"), X)
-        if s.alone:
-            s.synchronise(Phase("free"), X)
     X[s.T] = time
     return time, X
 
@@ -240,9 +234,10 @@ def _at_rest(s: HybridSystem) -> np.ndarray:
 
     Raises ReferenceFailure where the spring rests nowhere near Ψ.
     """
-    X, loads, p = np.zeros(s.size), s.loads.values(np.zeros(())), s.spring
-    bent = (s.load + loads @ s.loads.patterns) / s.stiffness if s.r else np.zeros(0)
-    on_spring = p.external_force + float(loads @ s.loads.on_spring)
+    X, p = np.zeros(s.size), s.spring
+    force = s.load + s.loads.values(np.zeros(())) @ s.patterns
+    b, k = s.tip[: s.r], s.omega2[: s.r]
+    bent, on_spring = force[: s.r] / k, s.mass * float(force @ s.top)
 
     def top(C: float) -> float:
         if not s.has_spring:
@@ -255,18 +250,16 @@ def _at_rest(s: HybridSystem) -> np.ndarray:
         return float(y)
 
     def mismatch(C: float) -> float:
-        p = top(C) - float(s.b @ (bent + s.b * C / s.stiffness))
+        p = top(C) - float(b @ (bent + b * C / k))
         return p if s.law.rigid else float(s.law.force(np.array(p), np.zeros(()))) - C
 
-    C, obstacle = 0.0, s.has_spring or s.scene.stop is not None
-    deep = top(0.0) - float(s.b @ bent)
-    if s.r and obstacle and (deep > 0.0 or s.law.start != "free") and deep != 0.0:
-        far = deep / float(s.b @ (s.b / s.stiffness))
+    C, deep = 0.0, top(0.0) - float(b @ bent)
+    if s.r and (s.has_spring or s.scene.stop is not None) and (deep > 0.0 or s.law.start != "free") and deep != 0.0:
+        far = deep / float(b @ (b / k))
         while mismatch(far) * deep > 0.0:
             far *= 2.0
         C = brentq(mismatch, 0.0, far, xtol=1e-300, rtol=1e-15)
-    X[s.A] = bent + (s.b * C / s.stiffness if s.r else 0.0)
-    X[s.Y] = float(s.b @ X[s.A]) if s.alone else top(C)
+    X[: s.r], X[s.r : s.n] = bent + b * C / k, s.root_mass * top(C)
     return X
 
 

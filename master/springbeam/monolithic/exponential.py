@@ -57,75 +57,61 @@ class Segment:
 
 
 class LinearForm:
-    """The linear part of a phase, in the modes ξ of what moves in it.
+    """The linear part of a phase, in the modes ξ of what moves in it: x = basis ξ + offset.
 
-    Beam and spring side by side have the coordinates x = (a, √m y), the spring only if it moves, in which the mass is 1
-    and the stiffness diagonal. A constraint g·x = const (g: u − y of joined ends, u of a held tip) leaves the space
-    orthogonal to g, and a linear law adds its stiffness: x = basis ξ + offset with the modes of both.
+    A constraint g·x = const leaves the space orthogonal to g, and a linear law adds its stiffness; the modes are those
+    of both. Without either they are the coordinates x themselves.
 
     Attributes
     ----------
-    omega2 : (p,) array
-        ω² [1/s²]; negative where a spring with k1 < 0 wins.
-    constant : (p,) array
-        c, of the constant loads.
-    loads : (loads, p) array
-        Forces of a unit of each load that varies.
+    omega2, c : (p,) arrays
+        ω² [1/s²], negative where a spring with k1 < 0 wins, and damping [1/s].
+    constant, loads : (p,), (loads, p) arrays
+        Constant loads, and forces of a unit of each load that varies.
     inputs : (k, p) array
-        P: the forces r. First the spring's remainder −(α_s − α_b k1) z − k2 y³, then the law's force C, or what
-        `linked` leaves of it; each if the phase has it.
+        P: the forces r. First, on the top, what is left of the spring's damping, and −k2 y³; then the law's force C, or
+        what `linked` leaves of it; each if the phase has it.
     linked : float
         Stiffness [N/m] of a linear law that is part of the modes, damped like them.
-    outputs : (o, p) array
-        J: the interface displacements that r depends on: y, then u; each if it moves and matters.
-    watched : (2, p) array
-        Displacements that events depend on, u and y.
+    ends, at : (2, p) array, (2, 1) array
+        u and y are ends @ ξ + at.
     pressing : (p,) array
-        ω² × this is what a mode adds to the contact force that must not change sign; zeros if there is none.
+        What a mode adds to the contact force that must not change sign; zeros if there is none.
     """
 
     def __init__(self, system: HybridSystem, phase: Phase) -> None:
-        self.system, self.phase = system, phase
-        s, p = system, system.spring
-        self.spring_moves = s.has_spring and not phase.seated
-        joined, held = self.spring_moves and s.joined(phase), s.held(phase)
-        self.linked, self.rest = self._split()
-        self.pressed = s.law.acts(phase.contact) and self.rest != (0.0, 0.0)
-        self.root_mass = float(np.sqrt(p.mass))
-        omega2, constant, loads, tip, top = s.stiffness, s.load, s.loads.patterns, s.b, np.zeros(s.r)
-        if self.spring_moves:
-            omega2 = np.append(omega2, p.linear_stiffness / p.mass)
-            constant = np.append(constant, p.external_force / self.root_mass)
-            loads = np.column_stack([loads, s.loads.on_spring / self.root_mass])
-            tip, top = np.append(tip, 0.0), np.append(top, 1.0 / self.root_mass)
+        self.system, self.phase = s, phase = system, phase
+        moving, omega2, c, constant = s.oscillating(phase)
+        loads, tip, top, between = (rows[..., moving] for rows in (s.patterns, s.tip, s.top, s.between))
+        row = s.row(phase)
+        self.moving, self.linked, self.rest = moving, *self._split()
         self.offset, self.pressing = np.zeros(len(omega2)), np.zeros(len(omega2))
-        if held:
-            self.offset = tip * (s.stop.position / s.inverse_tip_mass)
-            constant = constant - omega2 * self.offset
-            self.pressing = omega2 * tip
-        elif self.linked > 0.0 and not self.spring_moves:
-            constant = constant + tip * (self.linked * s.stop.position)
-        elif joined and phase.contact == "touch":
-            self.pressing = tip
+        self.at = np.array([[0.0], [s.stop.position * s.fixed(phase)]])
+        #: Damping of the spring that ``c`` does not hold yet [N·s/m].
+        self.damping = 0.0
         #: `offset` + this @ ξ = x; ``None`` where x are the modes.
         self.basis: np.ndarray | None = None
-        if held or joined or self.linked > 0.0:
-            space = scipy.linalg.null_space((tip - top)[None]) if held or joined else np.eye(len(omega2))
-            omega2, modes = _modes(omega2, space, self.linked, tip - top)
+        if row is not None or self.linked > 0.0:
+            space = np.eye(len(omega2)) if row is None else scipy.linalg.null_space(row[None, moving])
+            if row is not None and phase.seated:
+                self.offset = tip * (s.stop.position / s.tip_mobility)
+                self.at[0] = s.stop.position
+            if row is not None and (phase.seated or phase.contact == "touch"):
+                self.pressing = row[moving] * omega2
+            constant = constant - omega2 * self.offset + between * (self.linked * self.at[1])
+            omega2, modes = _modes(omega2, space, self.linked, between)
             self.basis = space @ modes
-            constant, loads, tip, top, self.pressing = (
-                rows @ self.basis for rows in (constant, loads, tip, top, self.pressing)
+            constant, loads, tip, top, between, self.pressing = (
+                rows @ self.basis for rows in (constant, loads, tip, top, between, self.pressing)
             )
-        if held:
-            self.pressing = self.pressing / omega2
-        self.omega2, self.constant, self.loads = omega2, constant, loads
-        inputs = [top] * self.spring_moves + [tip - top] * self.pressed
-        outputs = [top] * self.spring_moves + [tip] * self.pressed
-        self.inputs, self.outputs = (np.array(rows).reshape(len(rows), len(omega2)) for rows in (inputs, outputs))
-        self.watched = np.array([tip, top])
-        #: Damping of the spring that α_b × stiffness does not hold yet [N·s/m].
-        self.extra_damping = p.damping - s.alpha_b * p.linear_stiffness
-        self.oscillators = Oscillators(self.omega2, s.alpha_b * self.omega2)
+            c, self.damping = s.alpha_b * omega2, s.spring.damping - s.alpha_b * s.spring.linear_stiffness
+        self.omega2, self.c, self.constant, self.loads = omega2, c, constant, loads
+        self.of_spring = bool(np.any(top)) and s.has_spring and bool(self.damping or s.spring.cubic_stiffness)
+        self.of_law = s.law.acts(phase.contact) and self.rest != (0.0, 0.0)
+        inputs = [top] * self.of_spring + [between] * self.of_law
+        self.inputs = np.reshape(inputs, (len(inputs), len(omega2)))
+        self.ends = np.array([tip, top])
+        self.oscillators = Oscillators(omega2, c)
         self.mobility = np.sum(self.inputs**2, axis=1)  #: acceleration per unit force r [1/kg]
         self._weights: dict[str, StepWeights] = {}  #: by the first digits of sizes, which recur but for rounding
 
@@ -136,46 +122,41 @@ class LinearForm:
             return 0.0, None
         k, c = s.law.linear
         # The modes' damping α_b k may be far from c; what is left must not be faster than the law itself.
-        mobility = s.inverse_tip_mass + s.inverse_mass
         left = c - s.alpha_b * k
-        if abs(left) * mobility <= max(c * mobility, float(np.sqrt(k * mobility))):
+        if abs(left) * s.mobility <= max(c * s.mobility, float(np.sqrt(k * s.mobility))):
             return k, (0.0, left)
         return 0.0, (k, c)
 
     def pack(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (ξ, ξ̇) of a state."""
-        s = self.system
-        x, x_dot = X[s.A], X[s.V]
-        if self.spring_moves:
-            x, x_dot = np.append(x, self.root_mass * X[s.Y]), np.append(x_dot, self.root_mass * X[s.Z])
+        x, x_dot = X[self.system.A][self.moving], X[self.system.V][self.moving]
         return (x, x_dot) if self.basis is None else ((x - self.offset) @ self.basis, x_dot @ self.basis)
 
     def unpack(self, xi: np.ndarray, xi_dot: np.ndarray, times: np.ndarray, X: np.ndarray) -> np.ndarray:
-        """Return states (k, 2r + 5) from modes (k, p) at ``times`` (k,) [s]; X supplies what does not move."""
+        """Return states (k, 2n + 3) from modes (k, p) at ``times`` (k,) [s]; X supplies what does not move."""
         s = self.system
-        x, x_dot = (xi, xi_dot) if self.basis is None else (xi @ self.basis.T + self.offset, xi_dot @ self.basis.T)
         states = np.repeat(X[None, :], len(xi), axis=0)
-        states[:, s.A], states[:, s.V] = x[:, : s.r], x_dot[:, : s.r]
-        if self.spring_moves:
-            states[:, s.Y], states[:, s.Z] = x[:, -1] / self.root_mass, x_dot[:, -1] / self.root_mass
-        states[:, s.T] = times
+        x, x_dot = states[:, s.A], states[:, s.V]
+        if self.basis is not None:
+            xi, xi_dot = xi @ self.basis.T + self.offset, xi_dot @ self.basis.T
+        x[:, self.moving], x_dot[:, self.moving], states[:, s.T] = xi, xi_dot, times
         return s.synchronise(self.phase, states)
 
     def load_at(self, times: np.ndarray) -> np.ndarray:
         """Return all loads on the modes, (..., p), at ``times`` [s] of shape (...)."""
         return np.asarray(self.constant + self.system.loads.values(times) @ self.loads)
 
-    def forces(self, w: np.ndarray, w_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
-        """Return R: forces (k, n) at interface displacements and velocities (o, n)."""
-        s = self.system
-        result = np.empty((len(self.inputs), w.shape[1]))
-        if self.spring_moves:
-            result[0] = -self.extra_damping * w_dot[0] - s.spring.cubic_stiffness * w[0] ** 3
-        if self.pressed:
-            y, z = (w[0], w_dot[0]) if self.spring_moves else (X[s.Y], X[s.Z])
-            p, rate = y - w[-1], z - w_dot[-1]
-            result[-1] = s.law.force(p, rate) if self.rest is None else self.rest[0] * p + self.rest[1] * rate
-        return result
+    def forces(self, xi: np.ndarray, xi_dot: np.ndarray) -> np.ndarray:
+        """Return R: forces (inputs, k) at modes (k, p)."""
+        (u, y), (v, z) = self.ends @ xi.T + self.at, self.ends @ xi_dot.T
+        found, spring = [], self.system.spring
+        if self.of_spring:
+            found.append(-self.damping * z - spring.cubic_stiffness * y**3)
+        if self.of_law and self.rest is None:
+            found.append(self.system.law.force(y - u, z - v))
+        elif self.of_law and self.rest is not None:
+            found.append(self.rest[0] * (y - u) + self.rest[1] * (z - v))
+        return np.array(found).reshape(len(found), len(xi))
 
     def weights(self, size: float) -> StepWeights:
         """Return the weights of a step of ``size`` [s]; the last ones used are kept."""
@@ -201,8 +182,8 @@ class LinearForm:
         mode = order % len(self.omega2)
         stiffness = np.abs(self.omega2)[mode]
         alpha = self.system.alpha_b
-        pressing = np.abs(self.pressing)[mode] * stiffness * (1.0 + alpha * rates)
-        limits = [(np.abs(row)[mode], 1, _UNSEEN_DISPLACEMENT) for row in self.watched]
+        pressing = np.abs(self.pressing)[mode] * (1.0 + alpha * rates)
+        limits = [(np.abs(row)[mode], 1, _UNSEEN_DISPLACEMENT) for row in self.ends]
         limits.append((pressing, 1, _UNSEEN_FORCE))
         if alpha > 0.0:
             limits.append((stiffness + rates**2, 2, _UNSEEN_ENERGY))
@@ -241,8 +222,7 @@ class ExponentialPropagator:
     def advance(self, remaining: float, resolution: float = 0.0) -> Segment:
         """Make one step towards ``remaining`` [s] from here, which is known to ``resolution`` [s]."""
         xi, xi_dot = self.form.pack(self.X)
-        outputs = self.form.outputs
-        r = self.form.forces((outputs @ xi)[:, None], (outputs @ xi_dot)[:, None], self.X)
+        r = self.form.forces(xi[None], xi_dot[None])
         limit = self.form.longest_step(xi, xi_dot, r[:, 0], self.X)
         while True:
             size = self._next_size(remaining, resolution, min(limit, self._force_limit))
@@ -281,7 +261,7 @@ class ExponentialPropagator:
         self._speed = max(self._speed, float(np.max(np.abs(xi_dot @ form.inputs.T / root_mobility), initial=0.0)))
         tail = np.sum(np.abs(r @ GAUSS.transform[-2:].T), axis=1)
         # A place that rounding would change as much is no reason for a shorter step.
-        reach = NOISE * float(np.max(np.abs(form.outputs @ xi.T), initial=0.0))
+        reach = NOISE * float(np.max(np.abs(form.ends @ xi.T), initial=0.0))
         if np.any((tail * size * root_mobility > _TAIL * self._speed) & (tail * size**2 * form.mobility > reach)):
             return None
         states = form.unpack(xi, xi_dot, np.append(times, X[s.T] + size), X)
@@ -312,7 +292,7 @@ class ExponentialPropagator:
         for iteration in range(_MAX_ITERATIONS):
             with np.errstate(over="ignore", invalid="ignore"):  # an escaping spring; found below
                 displacements, velocities = w.motion(xi, xi_dot, load + r.T @ form.inputs)
-                new = form.forces(form.outputs @ displacements[:-1].T, form.outputs @ velocities[:-1].T, self.X)
+                new = form.forces(displacements[:-1], velocities[:-1])
             if not np.all(np.isfinite(new)):
                 return None
             change, scale = np.max(np.abs(new - r)), np.max(np.abs(new))

@@ -1,22 +1,22 @@
 """Spring and beam as one constraint-eliminated ODE per phase.
 
-State of every phase, a vector of length 2r + 5 (r modal coordinates of the beam, r = 0 without one)::
+Coordinates x = (a, √m y) have the mass 1 and a diagonal stiffness: a are the beam's modes, as far as there is a beam,
+and y the spring's top, if there is one. State of every phase, a vector of length 2n + 3::
 
-    X = (a, ȧ, y, z, D, W, t),      D the energy dissipated so far [J], W the work of the loads that vary [J]
+    X = (x, ẋ, D, W, t),      D the energy dissipated so far [J], W the work of the loads that vary [J]
 
-Dynamics, with u = bᵀa, p = f(t) − ω²(a + α_b ȧ) the beam's own forces and s = f_s(t) − α_s z − k1 y − k2 y³ the
-spring's (Ahn & Tate, eqs. (1)–(6), (8))::
+Dynamics, with u = tip·x, y = top·x and p = f(t) − ω² x − c ẋ − k2 y³ top (Ahn & Tate, eqs. (1)–(6), (8))::
 
-    free    ä = p + b C,  m z' = s − C,           C = 0, or the force of the law (`laws`)
-    joined  ä = p + b C,  m z' = s − C,  u = y:   C = (s − m bᵀp) / (1 + m bᵀb)
-    elastic stop: no spring, y = φ, z = 0, and C the force of the law
-    seated  y = φ, z = 0, N = C − s;  joined: u = φ, C = −bᵀp / bᵀb
-    without a spring the tip is joined to an end with m = 0 and s = 0
+    ẍ = p + C between + N top,      between = tip − top
+    free    C = 0, or the force of the law (`laws`)
+    joined  u = y: C = −between·p / between·between
+    seated  y = φ, N = C − m top·p; joined: C = −tip·p / tip·tip
+    without a spring top = 0 and y = φ on an elastic stop, else tip and top are one: between = top = tip, C = N
 """
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -32,103 +32,150 @@ class ReferenceFailure(RuntimeError):
     """The reference cannot go on; the message says why and at which time."""
 
 
+class Oscillating(NamedTuple):
+    """The coordinates that move in a phase, ẍ + c ẋ + ω² x = constant + loads, before what joins or holds them."""
+
+    moving: slice  #: of x
+    omega2: np.ndarray
+    c: np.ndarray
+    constant: np.ndarray
+
+
 class HybridSystem:
-    """Equations of motion, energies and forces of a scene, phase by phase; of its own beam's modes, or of ``beam``."""
+    """Equations of motion, energies and forces of a scene, phase by phase; of its own beam's modes, or of ``beam``.
+
+    Attributes
+    ----------
+    r, n : int
+        How many modes and coordinates there are.
+    omega2, c, load : (n,) arrays
+        ω² [1/s²], damping [1/s] and constant loads.
+    patterns : (loads, n) array
+        Forces of a unit of each load that varies.
+    tip, top, between : (n,) arrays
+        u = tip·x, y = top·x; ``between`` is what C acts on.
+    """
 
     def __init__(self, scene: Scene, beam: ModalBeam | None = None) -> None:
         self.scene, self.law = scene, law_of(scene)
         self.beam = modal_beam(scene.beam) if beam is None and scene.beam is not None else beam
         self.has_spring = scene.spring is not None
-        #: Without a spring its terms vanish; a tip above no wall then is joined to an end that has no mass.
-        self.spring = scene.spring or Spring(mass=1.0, linear_stiffness=0.0)
-        self.mass = self.spring.mass if self.has_spring else 0.0
-        self.inverse_mass = 1.0 / self.mass if self.has_spring else 0.0
         self.alone = not (self.has_spring or scene.elastic_stop)
-        #: Without a stop nothing is ever seated on this one.
-        self.stop = scene.stop or Stop(position=0.0)
-        empty = np.zeros(0)
-        self.b = empty if self.beam is None else self.beam.tip
-        self.load = empty if self.beam is None else self.beam.load
+        #: Without a spring its terms vanish, and without a stop nothing is ever seated on this one.
+        self.spring, self.stop = (
+            scene.spring or Spring(mass=1.0, linear_stiffness=0.0),
+            scene.stop or Stop(position=0.0),
+        )
+        self.mass, self.root_mass = self.spring.mass * self.has_spring, float(np.sqrt(self.spring.mass))
+        empty, p, one = np.zeros(0), self.spring, np.ones(int(self.has_spring))
+        omega2, load, b = (empty, empty, empty) if self.beam is None else (
+            self.beam.omega**2, self.beam.load, self.beam.tip
+        )  # fmt: skip
         self.alpha_b = 0.0 if self.beam is None else self.beam.alpha
-        self.stiffness = empty if self.beam is None else self.beam.omega**2
-        #: eᵀM⁻¹e [1/kg]; infinite for a beam without inertia.
-        self.inverse_tip_mass = float(self.b @ self.b)
         self.loads = Loads(scene, self.beam)
-        self.r = len(self.stiffness)
-        self.size = 2 * self.r + 5
-        self.A, self.V = slice(0, self.r), slice(self.r, 2 * self.r)
-        self.Y, self.Z = 2 * self.r, 2 * self.r + 1
-        self.D, self.W, self.T = 2 * self.r + 2, 2 * self.r + 3, 2 * self.r + 4
+        self.r, self.n = len(b), len(b) + len(one)
+        self.omega2 = np.append(omega2, one * p.linear_stiffness / p.mass)
+        self.c = np.append(self.alpha_b * omega2, one * p.damping / p.mass)
+        self.load = np.append(load, one * p.external_force / self.root_mass)
+        self.patterns = np.column_stack([self.loads.patterns, np.outer(self.loads.on_spring, one) / self.root_mass])
+        self.tip, self.top = np.append(b, 0.0 * one), np.append(0.0 * b, one / self.root_mass)
+        if self.alone:
+            self.top = self.tip
+        self.between = self.tip if self.alone else self.tip - self.top
+        #: What an impulse of 1 N·s adds to the velocity of the tip, and to that between the ends [1/kg].
+        self.tip_mobility, self.mobility = float(self.tip @ self.tip), float(self.between @ self.between)
+        self.size = 2 * self.n + 3
+        self.A, self.V = slice(0, self.n), slice(self.n, 2 * self.n)
+        self.D, self.W, self.T = 2 * self.n, 2 * self.n + 1, 2 * self.n + 2
+
+    # Phases ---------------------------------------------------------------------------------------------------------
 
     def joined(self, phase: Phase) -> bool:
         """Whether u = y holds as a constraint."""
         return self.alone or self.law.holds(phase.contact)
 
-    def held(self, phase: Phase) -> bool:
-        """Whether the tip stands on the foundation, u = φ."""
-        return phase.seated and self.joined(phase)
+    def row(self, phase: Phase) -> np.ndarray | None:
+        """Return g of the constraint g·x = const that joins or holds the tip; ``None`` without one."""
+        if not self.joined(phase):
+            return None
+        return self.tip if phase.seated else None if self.alone else self.between
 
-    def _own_forces(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return p, (..., r), and s [N], (...), of states."""
-        a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
-        p, spring, s = self.load - self.stiffness * (a + self.alpha_b * v), self.spring, np.zeros_like(y)
-        if self.has_spring:
-            elastic = (spring.linear_stiffness + spring.cubic_stiffness * y**2) * y
-            s = spring.external_force - spring.damping * z - elastic
-        if len(self.loads):
-            values = self.loads.values(X[..., self.T])
-            p, s = p + values @ self.loads.patterns, s + values @ self.loads.on_spring
-        return p, s
+    def oscillating(self, phase: Phase) -> Oscillating:
+        """Return what moves in a phase: all but a spring that is seated."""
+        moving = slice(0, self.r if phase.seated else self.n)
+        return Oscillating(moving, self.omega2[moving], self.c[moving], self.load[moving])
 
-    def load_power(self, X: np.ndarray) -> np.ndarray:
-        """Return the power of the loads that vary [W] on states of shape (..., 2r + 5)."""
-        speeds = X[..., self.V] @ self.loads.patterns.T + X[..., self.Z, None] * self.loads.on_spring
-        return np.asarray(np.sum(self.loads.values(X[..., self.T]) * speeds, axis=-1))
+    def fixed(self, phase: Phase) -> bool:
+        """Whether the top stands on the foundation, y = φ."""
+        return self.scene.elastic_stop or (phase.seated and self.has_spring)
+
+    # Motion ---------------------------------------------------------------------------------------------------------
+
+    def ends(self, phase: Phase, X: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return u, v, y and z of states of shape (..., 2n + 3)."""
+        x, x_dot = X[..., self.A], X[..., self.V]
+        y, z = x @ self.top, x_dot @ self.top
+        if self.fixed(phase):
+            y = np.full_like(y, self.stop.position)
+        return (y, z, y, z) if self.joined(phase) else (x @ self.tip, x_dot @ self.tip, y, z)
 
     def motion(self, phase: Phase, X: np.ndarray) -> Motion:
-        """Return accelerations and interface quantities of states of shape (..., 2r + 5)."""
-        a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
-        u_tip, v_tip = a @ self.b, v @ self.b
-        p, s = self._own_forces(X)
-        if self.joined(phase):
-            by_beam, by_spring = self.multiplier(phase)
-            C = by_beam * (p @ self.b) + by_spring * s
-        else:
-            C = self.law.force(y - u_tip, z - v_tip) if self.law.acts(phase.contact) else np.zeros_like(y)
-        N = C - s if phase.seated else np.zeros_like(y)
-        z_dot = np.zeros_like(y) if phase.seated else (s - C) * self.inverse_mass
-        return Motion(u_tip, v_tip, y, z, C, N, p + self.b * C[..., None], z_dot)
-
-    def multiplier(self, phase: Phase) -> tuple[float, float]:
-        """Return what bᵀp and s are multiplied by in the C of ends that are joined."""
+        """Return accelerations and interface quantities of states of shape (..., 2n + 3)."""
+        u, v, y, z = self.ends(phase, X)
+        own = self.load - self.omega2 * X[..., self.A] - self.c * X[..., self.V]
+        if len(self.loads):
+            own = own + self.loads.values(X[..., self.T]) @ self.patterns
+        if self.spring.cubic_stiffness:
+            own = own - (self.spring.cubic_stiffness * y**3)[..., None] * self.top
+        C = self.contact_force(phase, own, y - u, z - v)
+        a, N = own + C[..., None] * self.between, np.zeros_like(u)
         if phase.seated:
-            return -1.0 / self.inverse_tip_mass, 0.0
-        share = 1.0 / (1.0 + self.mass * self.inverse_tip_mass)
-        return -self.mass * share, share
+            N = C - self.mass * (own @ self.top)
+            a[..., self.r :] = 0.0
+        return Motion(u, v, y, z, C, N, a, a @ self.top)
+
+    def contact_force(self, phase: Phase, own: np.ndarray, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """Return C [N] from the forces that act on x without it, and from the penetration and its rate."""
+        row = self.row(phase)
+        if row is not None:
+            return np.asarray(-(own @ row) / (row @ row))
+        return self.law.force(p, rate) if self.law.acts(phase.contact) and not self.alone else np.zeros_like(p)
+
+    def load_power(self, X: np.ndarray) -> np.ndarray:
+        """Return the power of the loads that vary [W] on states of shape (..., 2n + 3)."""
+        return np.asarray(np.sum(self.loads.values(X[..., self.T]) * (X[..., self.V] @ self.patterns.T), axis=-1))
 
     def dissipation_rate(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """Return α_b ȧᵀω²ȧ + α_s z², and what the law takes [W]."""
-        v, z = X[..., self.V], X[..., self.Z]
-        rate = np.asarray(self.alpha_b * (v**2 @ self.stiffness) + self.spring.damping * z**2)
+        """Return ẋᵀ c ẋ, and what the law takes [W]."""
+        rate = np.asarray(X[..., self.V] ** 2 @ self.c)
         if not (self.law.dissipative and self.law.counts(phase.contact)):
             return rate
-        penetration, closing = X[..., self.Y] - X[..., self.A] @ self.b, z - v @ self.b
-        return np.asarray(rate + self.law.dissipation(phase.contact, penetration, closing))
+        u, v, y, z = self.ends(phase, X)
+        return np.asarray(rate + self.law.dissipation(phase.contact, y - u, z - v))
+
+    def place(self, phase: Phase, X: np.ndarray, level: float) -> None:
+        """Put the spring's top, and the tip that is joined to it, at a height [m], in place."""
+        X[..., self.r : self.n] = self.root_mass * level
+        if self.joined(phase):
+            X[..., self.A] += (level - X[..., self.A] @ self.tip)[..., None] * (self.tip / (self.tip @ self.tip))
 
     def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """Remove from X, in place, what rounding leaves of the constraint, y = u or, seated, u = φ; return X."""
-        if self.held(phase):
-            towards = self.b / self.inverse_tip_mass
-            X[..., self.A] += (self.stop.position - X[..., self.A] @ self.b)[..., None] * towards
-            X[..., self.V] -= (X[..., self.V] @ self.b)[..., None] * towards
-        elif self.joined(phase):
-            X[..., self.Y] = X[..., self.A] @ self.b
-            X[..., self.Z] = X[..., self.V] @ self.b
+        """Remove from X, in place, what rounding leaves of the constraint, y = u or, seated, y = φ; return X."""
+        row = self.row(phase)
+        if phase.seated:
+            self.place(phase, X, self.stop.position)
+            X[..., self.n + self.r : 2 * self.n] = 0.0
+        elif row is not None:
+            X[..., self.A] -= (X[..., self.A] @ row)[..., None] * (row / (row @ row))
+        if row is not None:
+            X[..., self.V] -= (X[..., self.V] @ row)[..., None] * (row / (row @ row))
         return X
 
     def settle(self, phase: Phase, X: np.ndarray) -> float:
         """Bring what has no inertia to its place in a phase that begins; return the energy [J] that this takes."""
         return 0.0
+
+    # What rows show -------------------------------------------------------------------------------------------------
 
     def shapes(self, states: np.ndarray) -> np.ndarray | None:
         """Return deflections, bending moments and shear forces at `SHAPE_POINTS`, shape (k, 63), of k states.
@@ -137,32 +184,28 @@ class HybridSystem:
         """
         if self.beam is None:
             return None
-        a, v = states[:, self.A], states[:, self.V]
+        a, v = states[:, : self.r], states[:, self.n : self.n + self.r]
         return np.hstack([a @ self.beam.sampler.T, (a + self.alpha_b * v) @ self.beam.inner.T])
 
     def energies(self, X: np.ndarray, phase: Phase) -> dict[str, np.ndarray]:
-        """Return energies [J] of states of shape (k, 2r + 5); ``e_load`` is minus the work of the loads."""
-        a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
-        p = self.spring
-        spring = 0.5 * self.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4
-        contact = self.law.potential(y - a @ self.b) if self.law.counts(phase.contact) else np.zeros_like(y)
+        """Return energies [J] of states of shape (k, 2n + 3); ``e_load`` is minus the work of the loads."""
+        x, x_dot = X[..., self.A], X[..., self.V]
+        u, _, y, _ = self.ends(phase, X)
+        linear = 0.5 * (x_dot**2 + self.omega2 * x**2)
         return {
-            "e_beam": 0.5 * np.sum(v**2 + self.stiffness * a**2, axis=-1),
-            "e_spring": spring,
-            "e_contact": contact,
+            "e_beam": np.sum(linear[..., : self.r], axis=-1),
+            "e_spring": np.sum(linear[..., self.r :], axis=-1) + 0.25 * self.spring.cubic_stiffness * y**4,
+            "e_contact": self.law.potential(y - u) if self.law.counts(phase.contact) else np.zeros_like(y),
             "e_dissipated": X[..., self.D],
-            "e_load": -(a @ self.load) - p.external_force * y - X[..., self.W],
+            "e_load": -(x @ self.load) - X[..., self.W],
         }
 
     def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
         """Return what rounding leaves of a displacement, velocity or contact force that is exactly zero."""
-        a, v, b = np.abs(X[self.A]), np.abs(X[self.V]), np.abs(self.b)
+        x, x_dot, tip, top = np.abs(X[self.A]), np.abs(X[self.V]), np.abs(self.tip), np.abs(self.top)
         if unit == "m":
-            return NOISE * (float(a @ b) + abs(float(X[self.Y])) + abs(self.stop.position))
+            return NOISE * (float((tip + top) @ x) + abs(self.stop.position))
         if unit == "m/s":
-            return NOISE * (float(v @ b) + abs(float(X[self.Z])))
-        beam = float(b @ (self.stiffness * (a + self.alpha_b * v) + np.abs(self.load)))
-        p = self.spring
-        spring = abs(p.external_force) + p.damping * abs(float(X[self.Z])) + abs(p.linear_stiffness * float(X[self.Y]))
-        weight = self.inverse_tip_mass + self.inverse_mass
-        return NOISE * ((beam if weight == np.inf else beam / weight) + spring)
+            return NOISE * float((tip + top) @ x_dot)
+        own = np.abs(self.omega2) * x + self.c * x_dot + np.abs(self.load)
+        return NOISE * float((tip @ own) / self.mobility + self.mass * (top @ own))

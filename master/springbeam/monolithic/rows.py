@@ -62,8 +62,8 @@ class Rows:
             if s.has_spring:
                 values["a_y"] = m.z_dot
             if clamp is not None:
-                values["a_tip"] = m.a @ s.b
-                reaction = clamp.reaction(m.a, m.C, s.loads.values(states[index, s.T]))
+                values["a_tip"] = m.a @ s.tip
+                reaction = clamp.reaction(m.a[:, : s.r], m.C, s.loads.values(states[index, s.T]))
                 values["clamp_force"], values["clamp_moment"] = reaction
             for name, value in values.items():
                 columns.setdefault(name, np.zeros(len(phases)))[index] = value

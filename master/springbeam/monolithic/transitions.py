@@ -38,8 +38,6 @@ class HybridState:
         if system.scene.static and not system.law.rigid and m.u < m.y and self.phase.contact == "free":
             self.phase = Phase("touch")
 
-    # What a phase ends with -----------------------------------------------------------------------------------------
-
     def watched(self) -> list[Watch]:
         """Return the functions that are ≥ 0 as long as the phase lasts."""
         s, phi = self.system, self.system.stop.position
@@ -53,7 +51,7 @@ class HybridState:
     def happen(self, event: Watch) -> None:
         """Apply what happens where a watched function has become negative."""
         if event.level is not None:
-            self._place(event.level)
+            self.system.place(self.phase, self.X, event.level)
         if event.name == "meet":
             self._meet()
         elif event.name == "stop":
@@ -67,17 +65,16 @@ class HybridState:
     def start(self) -> None:
         """Make first contact, and its impact, where tip and obstacle touch at the start or are joined from there on."""
         s, X = self.system, self.X
+        m = s.motion(self.phase, X)
+        noise = s.noise("m", X)
         if s.law.start != "free":
             if self.phase.contact == "free":
                 self._meet()
-            return
-        m = s.motion(self.phase, X)
-        noise = s.noise("m", X)
-        if s.scene.coupled and float(m.u - m.y) <= noise:
+        elif s.scene.coupled and float(m.u - m.y) <= noise:
             if m.v <= m.z:
                 self._meet()
         elif s.alone and s.scene.stop is not None and m.u - s.stop.position <= noise:
-            onto_it = m.v < 0.0 or (m.v == 0.0 and m.a @ s.b < 0.0)
+            onto_it = m.v < 0.0 or (m.v == 0.0 and m.z_dot < 0.0)
             if onto_it:
                 self._hit_stop()
 
@@ -99,17 +96,13 @@ class HybridState:
         if not s.law.rigid:
             self._go_on("meet")
             return
-        X[s.A] += s.b * ((float(X[s.Y]) - float(X[s.A] @ s.b)) / s.inverse_tip_mass)  # the gap is 0 but for rounding
-        m = s.motion(self.phase, X)
-        before = self._mechanical_energy()
-        relative = float(m.z - m.v)
+        m, before = s.motion(self.phase, X), self._mechanical_energy()
         impulse = 0.0
         if s.scene.contact.impact == "tip":
-            X[s.Z] = m.v
+            X[s.n + s.r] = s.root_mass * m.v
         else:
-            impulse = relative / (s.inverse_tip_mass + s.inverse_mass)
-            X[s.V] += s.b * impulse
-            X[s.Z] -= impulse * s.inverse_mass
+            impulse = float(m.z - m.v) / s.mobility
+            X[s.V] += s.between * impulse
         was_seated = self.phase.seated
         contact, kind = self._after("meet")
         self.phase = Phase(contact)
@@ -126,42 +119,36 @@ class HybridState:
     def _hit_stop(self) -> None:
         """Apply Newton's impact law on the foundation, and seat what has bounced for the last time."""
         s, e = self.system, self.system.stop.restitution
-        self._place(s.stop.position)
-        arriving = self.X.copy()
-        before = self._mechanical_energy()
-        contact_impulse, foundation_impulse, speed = self._bounce(e)
-        free_phase = Phase(self.phase.contact)
+        free_phase, seated_phase = Phase(self.phase.contact), Phase(self.phase.contact, seated=True)
+        s.place(self.phase, self.X, s.stop.position)
+        before, arriving = self._mechanical_energy(), s.motion(self.phase, self.X)
+        velocity = self.X[s.V].copy()
+        self._bounce(e)
         m = s.motion(free_phase, self.X)
-        acceleration = float(m.z_dot) if s.has_spring else float(m.a @ s.b)
-        seats = e == 0.0 or 0.5 * speed**2 <= -acceleration * self.seat_height()
-        if seats and e > 0.0:
-            self.X = arriving
-            contact_impulse, foundation_impulse, _ = self._bounce(0.0)
-        self.phase = free_phase
+        seats = e == 0.0 or 0.5 * float(m.z) ** 2 <= -float(m.z_dot) * self.seat_height()
         if seats:
-            self.phase = Phase(self.phase.contact, seated=True)
-            self.X[s.Y], self.X[s.Z] = s.stop.position, 0.0
+            self.X[s.V], e = velocity, 0.0
+            self._bounce(e)
+        on_tip = -(1.0 + e) * float(arriving.v) / s.tip_mobility if s.joined(self.phase) else 0.0
+        self.phase = seated_phase if seats else free_phase
+        if seats:
             s.synchronise(self.phase, self.X)
         self._emit(
             "seated" if seats else "stop_impact",
-            impulse_contact=contact_impulse,
-            impulse_foundation=foundation_impulse,
+            impulse_contact=on_tip,
+            impulse_foundation=on_tip - (1.0 + e) * s.mass * float(arriving.z),
             energy_loss=before - self._mechanical_energy(),
         )
         if seats and s.motion(self.phase, self.X).N < 0.0:
             self._unseat()
 
-    def _bounce(self, e: float) -> tuple[float, float, float]:
-        """Apply restitution e; return the impulses on the tip and of the foundation [N·s] and the speed left [m/s]."""
-        s, X = self.system, self.X
-        on_tip = 0.0
+    def _bounce(self, e: float) -> None:
+        """Turn the velocity of the top, and of the tip that is joined to it, into −e times what it is."""
+        s, x_dot = self.system, self.X[self.system.V]
+        x_dot[s.r :] *= -e
         if s.joined(self.phase):
-            on_tip = -(1.0 + e) * float(X[s.V] @ s.b) / s.inverse_tip_mass
-            X[s.V] += s.b * on_tip
-        of_foundation = on_tip - (1.0 + e) * s.mass * float(X[s.Z])
-        X[s.Z] = -e * X[s.Z]
-        s.settle(self.phase, X)
-        return on_tip, of_foundation, float(X[s.Z])
+            x_dot -= s.tip * ((1.0 + e) * float(x_dot @ s.tip) / float(s.tip @ s.tip))
+        s.settle(self.phase, self.X)
 
     def _unseat(self) -> None:
         self.phase = Phase(self.phase.contact)
@@ -174,17 +161,10 @@ class HybridState:
         and the displacement by less than (velocity × remaining time) of the bounces left out.
         """
         s, phi = self.system, self.system.stop.position
-        deflection = float(np.abs(self.X[s.A]) @ np.abs(s.b))
+        deflection = float(np.abs(self.X[s.A]) @ np.abs(s.tip))
         return 1e-12 * max(abs(s.spring.equilibrium - phi), deflection, abs(phi), 1e-9)
 
     # All events -----------------------------------------------------------------------------------------------------
-
-    def _place(self, level: float) -> None:
-        """Put the spring top, and the tip that is joined to it, where the event has them but for rounding."""
-        s, X = self.system, self.X
-        X[s.Y] = level
-        if s.joined(self.phase):
-            X[s.A] += s.b * ((level - float(X[s.A] @ s.b)) / s.inverse_tip_mass)
 
     def _mechanical_energy(self) -> float:
         e = self.system.energies(self.X[None], self.phase)
@@ -194,14 +174,8 @@ class HybridState:
         s = self.system
         m = s.motion(self.phase, self.X)
         self.loss += values.get("energy_loss", 0.0)
-        self.events.append(
-            Event(
-                time=self.time,
-                kind=EventKind(kind),
-                y=float(m.y) if s.has_spring else None,
-                z=float(m.z) if s.has_spring else None,
-                u_tip=float(m.u) if s.beam is not None else None,
-                v_tip=float(m.v) if s.beam is not None else None,
-                **values,
-            )
-        )
+        if s.has_spring:
+            values |= {"y": float(m.y), "z": float(m.z)}
+        if s.beam is not None:
+            values |= {"u_tip": float(m.u), "v_tip": float(m.v)}
+        self.events.append(Event(self.time, EventKind(kind), **values))

@@ -1,9 +1,9 @@
 """What a good user of scipy would write instead: the modal equations of motion, handed to `scipy.integrate.solve_ivp`.
 
-The state is X = (a, ȧ, y, z), a the coordinates of the beam's modes, so that a right-hand side is a few products of
-vectors (with 20 modes one matrix product takes as long, with 100 half as long again). LSODA and Radau are given the
-Jacobian. Events are given to ``solve_ivp``, which stops at them. What they do to the state is the reference's
-(`HybridState`), so that both solve one problem; its time is not counted.
+The state is X = (x, ẋ), x the coordinates of the beam's modes and of the spring's top, so that a right-hand side is a
+few products of vectors (with 20 modes one matrix product takes as long, with 100 half as long again). LSODA and Radau
+are given the Jacobian. Events are given to ``solve_ivp``, which stops at them. What they do to the state is the
+reference's (`HybridState`), so that both solve one problem; its time is not counted.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ class Rival:
         s, wanted, seconds = self._system, np.asarray(times, dtype=float), 0.0
         evaluations = events = 0
         state = HybridState(s, *initial(s, 0.0))
-        n, found = s.T - 2, np.empty((len(wanted), s.T - 2))
-        found[wanted <= state.time] = state.X[:n]
+        n, found = 2 * s.n, np.empty((len(wanted), s.size))
+        found[wanted <= state.time] = state.X
         state.start()
         while state.time < wanted[-1]:
             if state.phase not in self._phases:
@@ -74,26 +74,26 @@ class Rival:
             rhs = phase.rhs if limit == np.inf else _limited(phase.rhs, perf_counter() + limit - seconds, limit)
             options["events"] = [phase.event(watch, state.X) for watch in watched]
             began = perf_counter()
-            solution = solve_ivp(rhs, (state.time, until), state.X[:n], method, **options)
+            solution = solve_ivp(rhs, (state.time, until), phase.start(state.X), method, **options)
             seconds += perf_counter() - began
             evaluations += solution.nfev
             if solution.status < 0:
                 raise ReferenceFailure(f"{method} failed in phase {state.phase.name}: {solution.message}")
-            states = np.reshape(solution.y, (n, -1)).T[: len(inside)]
-            found[inside[: len(states)]] = states
+            states = np.reshape(solution.y[:n], (n, -1)).T[: len(inside)]
+            found[inside[: len(states)], :n] = states
             happened = next((k for k, at in enumerate(solution.t_events or ()) if len(at)), None)
             state.time, X = (until, solution.y[:, -1]) if happened is None else (
                 float(solution.t_events[happened][-1]), solution.y_events[happened][-1]
             )  # fmt: skip
-            state.X[:n], state.X[s.T] = X, state.time
+            state.X[:n], state.X[s.T] = X[:n], state.time
             if happened is not None:
                 state.happen(watched[happened])
                 events += 1
                 if events > _MOST_EVENTS:
                     raise ReferenceFailure(f"{events} events by t = {state.time:.9g} s: they do not end")
-            found[wanted == state.time] = state.X[:n]
-        columns = {"u_tip": found[:, s.A] @ s.b} if self._scene.beam is not None else {}
-        return Solved(columns | ({"y": found[:, s.Y]} if s.has_spring else {}), seconds, evaluations)
+            found[wanted == state.time] = state.X
+        columns = {"u_tip": found[:, s.A] @ s.tip} if self._scene.beam is not None else {}
+        return Solved(columns | ({"y": found[:, s.A] @ s.top} if s.has_spring else {}), seconds, evaluations)
 
 
 def _limited(rhs: Callable[..., np.ndarray], deadline: float, limit: float) -> Callable[..., np.ndarray]:
@@ -111,37 +111,44 @@ class _Phase:
     """The equations of one phase of contact, and the functions that end it."""
 
     def __init__(self, s: HybridSystem, phase: Phase) -> None:
-        self._system, self._phase = s, phase
+        self._system, self._phase, self._row = s, phase, s.row(phase)
         self._soft = s.scene.coupled and not s.joined(phase) and s.law.acts(phase.contact)
-        self._by_beam, self._by_spring = s.multiplier(phase) if s.joined(phase) else (0.0, 0.0)
+        self._damped, self._hardening = bool(np.any(s.c)), s.spring.cubic_stiffness / s.spring.mass**2
         self.jacobian: Callable[[float, np.ndarray], np.ndarray] | None = None
         if not self._soft or s.law.linear is not None:  # linear but for the cubic spring
-            units, self.jacobian = np.eye(s.T - 2), self._jacobian
+            units, self.jacobian, top = np.eye(2 * s.n + 2 * s.alone), self._jacobian, s.n - 1
             self._linear = np.transpose([0.5 * (self.rhs(0.0, unit) - self.rhs(0.0, -unit)) for unit in units])
-            two = 2.0 * units[s.Y]
-            self._cubic = (0.25 * (self.rhs(0.0, two) - self.rhs(0.0, -two)) - self._linear[:, s.Y]) / 3.0
-            self._linear[:, s.Y] -= self._cubic
+            two = 2.0 * units[top]
+            self._cubic = (0.25 * (self.rhs(0.0, two) - self.rhs(0.0, -two)) - self._linear[:, top]) / 3.0
+            self._linear[:, top] -= self._cubic
+
+    def start(self, X: np.ndarray) -> np.ndarray:
+        """Return scipy's state, which has the tip above a stop as well, so that its error is controlled by itself."""
+        s = self._system
+        return np.concatenate((X[: 2 * s.n], (X[s.A] @ s.tip, X[s.V] @ s.tip) if s.alone else ()))
 
     def rhs(self, time: float, X: np.ndarray) -> np.ndarray:
-        s, spring = self._system, self._system.spring
-        a, v, (y, z) = X[s.A], X[s.V], X[s.Y :].tolist()
-        p = s.load - s.stiffness * (a + s.alpha_b * v if s.alpha_b else a)
-        S = spring.external_force - spring.damping * z - (spring.linear_stiffness + spring.cubic_stiffness * y * y) * y
+        s, n = self._system, self._system.n
+        x, x_dot = X[:n], X[n : 2 * n]
+        p = s.load - s.omega2 * x
+        if self._damped:
+            p -= s.c * x_dot
+        if self._hardening:
+            p[-1] -= self._hardening * x[-1] ** 3
         if len(s.loads):
-            values = s.loads.values(np.array(time))
-            p, S = p + values @ s.loads.patterns, S + values @ s.loads.on_spring
+            p += s.loads.values(np.array(time)) @ s.patterns
         if self._soft:
-            C = float(s.law.force(y - a @ s.b, z - v @ s.b))
-        else:
-            C = self._by_beam * (s.b @ p) + self._by_spring * S
-        p = p + s.b * C
+            level = s.stop.position if s.fixed(self._phase) else x @ s.top
+            p += s.between * float(s.law.force(level - x @ s.tip, x_dot @ (s.top - s.tip)))
+        elif self._row is not None:
+            p -= self._row * (self._row @ p / (self._row @ self._row))
         if self._phase.seated:
-            return np.concatenate((v, p, (0.0, 0.0)))
-        return np.concatenate((v, p, (z, s.b @ p if s.alone else (S - C) * s.inverse_mass)))
+            p[s.r :] = 0.0
+        return np.concatenate((x_dot, p, (X[-1], s.tip @ p) if s.alone else ()))
 
     def _jacobian(self, time: float, X: np.ndarray) -> np.ndarray:
-        J, y = self._linear.copy(), self._system.Y
-        J[:, y] += 3.0 * X[y] ** 2 * self._cubic
+        J, top = self._linear.copy(), self._system.n - 1
+        J[:, top] += 3.0 * X[top] ** 2 * self._cubic
         return np.asarray(J)
 
     def event(self, watch: Watch, start: np.ndarray) -> Callable[[float, np.ndarray], float]:
@@ -149,20 +156,22 @@ class _Phase:
 
         One that starts at zero, as after its own event, counts from where it first exceeds rounding, either way.
         """
-        s, state, b, A, y = self._system, np.zeros(self._system.size), self._system.b, self._system.A, self._system.Y
+        s, state, A = self._system, np.zeros(self._system.size), self._system.A
 
         def other(time: float, X: np.ndarray) -> float:
-            state[: len(X)], state[s.T] = X, time
+            state[: 2 * s.n], state[s.T] = X[: 2 * s.n], time
             return float(watch.function(s.motion(self._phase, state)))
 
         quick: dict[str, Callable[[float, np.ndarray], float]] = {
-            "meet": lambda _, X: b @ X[A] - X[y],
-            "stop": lambda _, X: X[y] - s.stop.position,
-            "release": lambda _, X: s.law.equilibrium - X[y],
-            "retie": lambda _, X: X[y] - s.law.equilibrium,
+            "meet": lambda _, X: s.between @ X[A],
+            "stop": lambda _, X: (X[-2] if s.alone else s.top @ X[A]) - s.stop.position,
+            "release": lambda _, X: s.law.equilibrium - s.top @ X[A],
+            "retie": lambda _, X: s.top @ X[A] - s.law.equilibrium,
         }
+        if s.scene.elastic_stop:
+            quick = {}
         function, noise = quick.get(watch.name, other), s.noise(watch.unit, start)
-        counts = function(float(start[s.T]), start[: s.T - 2]) > noise
+        counts = function(float(start[s.T]), self.start(start)) > noise
 
         def rising(time: float, X: np.ndarray) -> float:
             nonlocal counts
