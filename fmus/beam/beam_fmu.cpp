@@ -47,7 +47,7 @@ struct BeamModel final : fmi::Model {
     forecast = {};
     tip_response = {};
     if (forecasts()) tip_response = beam->tip_response(parameters.communication_step);
-    view_.reset();
+    forget_instant();
     look_ahead();
   }
 
@@ -56,7 +56,7 @@ struct BeamModel final : fmi::Model {
     beam->observe(tip_force[0], loads);
     resting = initial && parameters.initial_state == InitialState::at_rest;
     if (resting) beam->rest();
-    view_.reset();
+    forget_instant();
     if (forecasts() && (resting || beam->loads() != before)) look_ahead();
   }
 
@@ -72,7 +72,7 @@ struct BeamModel final : fmi::Model {
       throw fmi::Discarded(e.what());
     }
     resting = false;
-    view_.reset();
+    forget_instant();
     return {size, false};
   }
 
@@ -80,14 +80,14 @@ struct BeamModel final : fmi::Model {
     if (tip_impulse == 0.0) return;
     beam->apply_tip_impulse(tip_impulse);
     resting = false;
-    view_.reset();
+    forget_instant();
     look_ahead();
   }
 
   void save(std::vector<double>& state) const override { beam->save(state); }
   void restore(const std::vector<double>& state) override {
     beam->restore(state);
-    view_.reset();
+    forget_instant();
     look_ahead();
   }
 
@@ -96,19 +96,18 @@ struct BeamModel final : fmi::Model {
     loads.set(Loads::distributed, value);
   }
 
-  /// What is found for the present instant as a whole: the shape, and what follows forces without delay.
-  struct View {
+  /// The shape at the present instant, found as a whole.
+  struct Line {
     beam::Shape deflection, rotation;
-    Beam::Response response;
   };
-  const View& view() const {
-    if (!view_) {
-      view_.emplace();
-      view_->deflection = beam->deflection();
-      view_->rotation = beam->rotation();
-      view_->response = beam->response();
-    }
-    return *view_;
+  const Line& line() const {
+    if (!line_) line_ = Line{beam->deflection(), beam->rotation()};
+    return *line_;
+  }
+  /// What follows forces without delay. A tool that asks for it after each step does not pay for the shape.
+  const Beam::Response& response() const {
+    if (!response_) response_ = beam->response();
+    return *response_;
   }
   Beam::Response response_rate() const {
     Loads::Values rates{};
@@ -117,11 +116,16 @@ struct BeamModel final : fmi::Model {
   }
   /// Of `forces`, at the point where the bending moment is largest now.
   double bending_stress(const beam::InternalForces& forces) const {
-    const beam::Shape& moment = view().response.forces.moment;
+    const beam::Shape& moment = response().forces.moment;
     Eigen::Index most = 0;
     moment.cwiseAbs().maxCoeff(&most);
     const double sign = moment[most] < 0.0 ? -1.0 : 1.0;
     return sign * forces.moment[most] * parameters.section_height / (2.0 * parameters.second_moment_of_area);
+  }
+
+  void forget_instant() {
+    line_.reset();
+    response_.reset();
   }
 
   bool resting = false;  ///< at the start, where that is a state of rest
@@ -156,7 +160,8 @@ struct BeamModel final : fmi::Model {
     }
   }
 
-  mutable std::optional<View> view_;
+  mutable std::optional<Line> line_;
+  mutable std::optional<Beam::Response> response_;
 };
 
 template <class Value>
@@ -361,7 +366,7 @@ fmi::Table fmi::make_table() {
   everything.emplace_back("alpha_b");
   const auto instant = [&](const char* name, const char* unit, const char* text, auto of_response) {
     add.output(
-           name, unit, text, [=](const BeamModel& m) { return of_response(m, m.view().response); },
+           name, unit, text, [=](const BeamModel& m) { return of_response(m, m.response()); },
            [=](const BeamModel& m) { return of_response(m, m.response_rate()); })
         .from(everything);
     const auto follows = [&](const std::string& input, std::size_t load) {
@@ -386,17 +391,17 @@ fmi::Table fmi::make_table() {
   const auto shape = [&](const std::string& name, const char* unit, const std::string& text, auto values) {
     for (std::size_t i = 0; i < beam::shape_points; ++i) {
       add.local(name + "[" + std::to_string(i + 1) + "]", unit, text + " at x = L*" + std::to_string(i) + "/20",
-                [=](const BeamModel& m) { return values(m.view())[i]; })
+                [=](M m) { return values(m)[i]; })
           .elements = i == 0 ? beam::shape_points : 0;
     }
   };
-  using V = const BeamModel::View&;
-  shape("deflection", "m", "deflection", [](V v) -> const beam::Shape& { return v.deflection; });
-  shape("rotation", "rad", "rotation of the cross-section", [](V v) -> const beam::Shape& { return v.rotation; });
+  using S = const beam::Shape&;
+  shape("deflection", "m", "deflection", [](M m) -> S { return m.line().deflection; });
+  shape("rotation", "rad", "rotation of the cross-section", [](M m) -> S { return m.line().rotation; });
   shape("bending_moment", "N.m", "bending moment, positive where it bends the beam upwards",
-        [](V v) -> const beam::Shape& { return v.response.forces.moment; });
+        [](M m) -> S { return m.response().forces.moment; });
   shape("shear_force", "N", "shear force, upward on the part before it",
-        [](V v) -> const beam::Shape& { return v.response.forces.shear; });
+        [](M m) -> S { return m.response().forces.shear; });
   return t;
 }
 

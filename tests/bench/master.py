@@ -149,7 +149,7 @@ def profile(effort):
         "does one come inside": lambda: detector.first_event(state, step),
         "its record": lambda: master._record(step, end),
         "of it, energies of both bodies": lambda: (beam.energies(), spring.energies()),
-        "256 records checked and kept, and made": lambda: recorded(256),
+        "1024 records checked and kept, and made": lambda: recorded(1024),
         "a shape (400 a run)": lambda: master._shape(beam, early=False),
     }
     calls = 10 if effort.quick else 2000

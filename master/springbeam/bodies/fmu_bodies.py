@@ -392,7 +392,8 @@ class FmuBeam(OwnBody, BeamBody):
 
     def shape(self) -> np.ndarray:
         """See `BeamBody.shape`."""
-        return np.array(self._shape.get())
+        self._shape.get()
+        return np.array(self._shape.values)
 
 
 class FmuSpring(OwnBody, EndLoaded):

@@ -1,4 +1,4 @@
-"""Where a run leaves its records, events and shapes, some hundred steps at a time: in memory, or in a directory."""
+"""Where a run leaves its records, events and shapes, a thousand steps at a time: in memory, or in a directory."""
 
 from __future__ import annotations
 

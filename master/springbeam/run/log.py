@@ -1,4 +1,4 @@
-"""The log of a run: its records, which are checked some hundred at a time, or each second, and handed on."""
+"""The log of a run: its records, which are checked a thousand at a time, or each second, and handed on."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .ledger import Wrong
 from .outcome import RunStopped
 
 #: Most records that are checked and handed on together, and the longest that one waits for it [s].
-TOGETHER, _WAITS = 256, 1.0
+TOGETHER, _WAITS = 1024, 1.0
 #: Judges the next records of a run, shape (n,), beside its first one, shape (1,).
 Check = Callable[[np.ndarray, np.ndarray], Wrong | None]
 
@@ -28,7 +28,7 @@ class Log:
         self._scene, self._recorder, self._checks = scene, recorder, (self._finite, *checks)
         self.events = 0  #: number of events so far
         #: What the recorder does not have yet; records are as of `springbeam.results.steps.packed`.
-        self.records, self._events, self._shapes = list[bytes](), list[Event](), list[list[float]]()
+        self.records, self._events, self._shapes = list[bytes](), list[Event](), list[tuple[float, np.ndarray]]()
         self._first = np.empty(0, STEP)  #: record of the run
         self.due = monotonic() + _WAITS  #: when the next records are handed on, however few [s]
 
@@ -38,10 +38,8 @@ class Log:
         self._events.append(event)
 
     def show(self, time: float, shape: np.ndarray) -> None:
-        """Take the beam's shape, (63,), at the ``time`` [s] of the last record. Raises RunStopped."""
-        if not np.isfinite(shape).all():
-            raise RunStopped("the beam's shape is not finite", time)
-        self._shapes.append([time, *shape.tolist()])
+        """Take the beam's shape, (63,), at the ``time`` [s] of the last record."""
+        self._shapes.append((time, shape))
 
     def catch_up(self) -> None:
         """Take note of the records that the recorder has of a run that goes on."""
@@ -59,11 +57,18 @@ class Log:
         if not self.records:
             return
         steps, stopped = self._sound(np.frombuffer(b"".join(self.records), STEP))
+        shapes = np.empty((len(self._shapes), len(SHAPE_COLUMNS)))
+        for row, (row_time, shape) in zip(shapes, self._shapes, strict=True):
+            row[0], row[1:] = row_time, shape
+        finite = np.isfinite(shapes).all(axis=1)
+        wrong = shapes[~finite, 0]
+        if wrong.size and len(steps) and wrong[0] <= steps["time"][-1]:
+            steps = steps[steps["time"] <= wrong[0]]
+            stopped = RunStopped("the beam's shape is not finite", float(wrong[0]))
         last, known = (steps["time"][-1], int(steps["events"][-1])) if len(steps) else (-np.inf, self.events)
-        shapes = np.reshape(self._shapes, (-1, len(SHAPE_COLUMNS)))
         events = self._events[: len(self._events) - (self.events - known)] if len(steps) else []
         self.records, self._events, self._shapes = [], [], []
-        self._recorder.keep(steps, events, shapes[shapes[:, 0] <= last])
+        self._recorder.keep(steps, events, shapes[finite & (shapes[:, 0] <= last)])
         if stopped is not None:
             raise stopped
 
