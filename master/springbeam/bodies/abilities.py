@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ..scene import Scene
+from ..scene.messages import Rule, told
 from ..scene.tables import ORDINARY_SCHEMES
 
 
@@ -31,57 +33,96 @@ _LACKS = {
     "integrals": "it has not integral and integral_2",
     "impulse": "it has no impulse, or of a body of your own no apply_impulse",
 }
-_SLOPES = "its input takes no derivatives (canInterpolateInputs = false; FMI 3.0 has none)"
 _TO_BE_STRUCK = ("state", "any_size", "velocity", "impulse")
+_LEFT_OUT, _MULTIPLE = 'leave it out, or use scheme = "energy"', "use a multiple of {coupling.macro_step}"
 #: A share of a step that is rounding.
 _SAME = 1e-9
 
 
-def _lacking(scene: Scene, body: Abilities) -> Iterator[tuple[str, str, str]]:
-    """Yield what ``scene`` asks for and ``body`` cannot do: the key, what is missing, and what would work."""
-    coupling, contact = scene.coupling, scene.contact
-    scheme, degree = f'[coupling] scheme = "{coupling.scheme}"', f"[coupling] degree = {coupling.degree}"
-    ordinary = coupling.scheme in ORDINARY_SCHEMES
-    exchanged = 'use scheme = "jacobi" or "gauss_seidel" with [contact] law = "link" or "compliance", without [stop]'
-    left_out, softer = 'leave it out, or use scheme = "energy"', 'use "compliance", "link" or "tie"'
-    tolerances, law = "[coupling] relative_tolerance, absolute_tolerance", f'[contact] law = "{contact.law}"'
-    for is_so, asked, abilities, instead in (
-        (not ordinary, scheme, ("state",), exchanged),
-        (coupling.scheme == "hermite", scheme, ("velocity",), 'use scheme = "energy"'),
-        (ordinary and coupling.degree > 0, degree, ("velocity",), left_out),
-        (ordinary and contact.damping > 0.0, f"[contact] damping = {contact.damping}", ("velocity",), left_out),
-        (scene.joins and contact.facts.strikes, law, _TO_BE_STRUCK, softer),
-        (scene.stop is not None, "[stop]", _TO_BE_STRUCK, "leave it out"),
-        (coupling.adaptive, tolerances, ("any_size", "velocity", "integrals"), "use macro_step"),
-    ):
-        for ability in abilities if is_so else ():
-            if not getattr(body, ability) or (ability == "integrals" and body.integrals < 2):
-                yield asked, _LACKS[ability], instead
-    # Integrals of the gap that the scheme sets to 0.
-    needed = 0 if ordinary else coupling.degree - (coupling.scheme == "hermite")
-    lower = f"use degree = {body.slopes if ordinary else min(body.integrals, body.slopes)}"
-    if coupling.degree > body.slopes:
-        yield degree, f"its input takes derivatives of order {body.slopes} at most" if body.slopes else _SLOPES, lower
-    if needed > body.integrals:
-        yield degree, _LACKS["integrals"], lower
-    if not coupling.adaptive and not body.any_size:
-        H, multiple = scene.coupling.H, f"use a multiple of {scene.coupling.H:g}"
-        if scene.equal_steps[1] != 0.0:
-            yield f"[time] t_end = {scene.time.t_end}", _LACKS["any_size"], multiple
-        for number, load in enumerate(scene.loads):
-            kinks = [] if load.is_finer_than(H) else load.kinks
-            steps = [(kink - (scene.contact_time or 0.0)) / H for kink in kinks if kink < scene.time.t_end]
-            if any(step >= 0.0 and abs(step - round(step)) > _SAME for step in steps):
-                yield f"[loads.{number}]: a step ends where it jumps or bends", _LACKS["any_size"], multiple
+def _exchanges(scene: Scene) -> bool:
+    return scene.coupling.scheme in ORDINARY_SCHEMES
+
+
+def _integrals(scene: Scene) -> int:
+    """Return how many integrals of the gap the scheme sets to 0."""
+    return 0 if _exchanges(scene) else scene.coupling.degree - (scene.coupling.scheme == "hermite")
+
+
+def _falls_between(scene: Scene) -> bool:
+    """Return whether a load jumps or bends between equal macro steps."""
+    H, start = scene.coupling.H, scene.contact_time or 0.0
+    kinks = [t for load in scene.loads if not load.is_finer_than(H) for t in load.kinks]
+    steps = [(t - start) / H for t in kinks if start <= t < scene.time.t_end]
+    return any(abs(n - round(n)) > _SAME for n in steps)
+
+
+def _numbers(scene: Scene, body: Abilities, table: str) -> dict[str, Any]:
+    followed = body.slopes if _exchanges(scene) else min(body.integrals, body.slopes)
+    return {"table": table, "slopes": body.slopes, "followed": followed}
+
+
+def _needs(asked: str, when: Callable[[Scene], bool], instead: str, *abilities: str) -> list[Rule]:
+    """Return a rule for each of the ``abilities`` that a body must have for what is ``asked``."""
+    most = Abilities()
+    return [
+        Rule(
+            lambda s, body, table, ability=ability: when(s) and getattr(body, ability) < getattr(most, ability),
+            f"{asked}: the body in [{{table}}] cannot do that, {_LACKS[ability]}; {instead}",
+            _numbers,
+        )
+        for ability in abilities
+    ]
+
+
+#: What a scene asks of a body that it cannot do; a rule is asked of the scene, what the body can do, and its table.
+LACKING: tuple[Rule, ...] = (
+    *_needs(
+        "{coupling.scheme}",
+        lambda s: not _exchanges(s),
+        'use scheme = "jacobi" or "gauss_seidel" with [contact] law = "link" or "compliance", without [stop]',
+        "state",
+    ),
+    *_needs("{coupling.scheme}", lambda s: s.coupling.scheme == "hermite", 'use scheme = "energy"', "velocity"),
+    *_needs("{coupling.degree}", lambda s: _exchanges(s) and s.coupling.degree > 0, _LEFT_OUT, "velocity"),
+    *_needs("{contact.damping}", lambda s: _exchanges(s) and s.contact.damping > 0.0, _LEFT_OUT, "velocity"),
+    *_needs(
+        "{contact.law}",
+        lambda s: s.joins and s.contact.facts.strikes,
+        'use "compliance", "link" or "tie"',
+        *_TO_BE_STRUCK,
+    ),
+    *_needs("[stop]", lambda s: s.stop is not None, "leave it out", *_TO_BE_STRUCK),
+    *_needs(
+        "[coupling] relative_tolerance, absolute_tolerance",
+        lambda s: s.coupling.adaptive,
+        "use macro_step",
+        *("any_size", "velocity", "integrals"),
+    ),
+    Rule(
+        lambda s, body, table: s.coupling.degree > body.slopes,
+        "{coupling.degree}: the body in [{table}] cannot do that, its input takes derivatives of order {slopes} at "
+        "most (canInterpolateInputs; FMI 3.0 has none); use degree = {followed}",
+        _numbers,
+    ),
+    Rule(
+        lambda s, body, table: _integrals(s) > body.integrals,
+        f"{{coupling.degree}}: the body in [{{table}}] cannot do that, {_LACKS['integrals']}; "
+        "use degree = {followed}",
+        _numbers,
+    ),
+    *_needs("{time.t_end}", lambda s: not s.coupling.adaptive and s.equal_steps[1] != 0.0, _MULTIPLE, "any_size"),
+    *_needs(
+        "[[loads]]: a step ends where each jumps or bends",
+        lambda s: not s.coupling.adaptive and _falls_between(s),
+        _MULTIPLE,
+        "any_size",
+    ),
+)
 
 
 def refusals(scene: Scene, abilities: Mapping[str, Abilities]) -> list[str]:
     """Return why ``scene`` cannot be run with bodies of these ``abilities``, by table, each with a remedy."""
-    return [
-        f"{asked}: the body in [{table}] cannot do that, {lacks}; {instead}"
-        for table, body in abilities.items()
-        for asked, lacks, instead in _lacking(scene, body)
-    ]
+    return [line for table, body in abilities.items() for line in told(scene, LACKING, body, table)]
 
 
 #: What a capability allows, for people: (capability, how a body shows it, what is offered with it, what without it).

@@ -23,8 +23,8 @@ from .fmu_bodies import FmuBody
 from .functions import OK
 from .protocol import NO_FORCE, ROUNDED_IMPULSE, BodyFailed, Energies, FmuError, Force, Motion
 
-#: Corrections of a holding force; the velocity that it may leave, and the displacement, over those without it.
-_MAX_CORRECTIONS, _AT_REST, _STAYS = 20, 1e-12, 1e-6
+#: Relative tolerance of a holding force, and the share of motion without it that it may leave.
+_AT_REST, _STAYS = 1e-12, 1e-6
 
 
 @dataclass(frozen=True)
@@ -195,6 +195,8 @@ class ForeignBody(FmuBody, EndLoaded):
         """
         if self.state.held is not None and self.state.held[0] == displacement:
             return self.state.held[1]
+        from scipy.optimize import newton  # takes a tenth of a second to load: only for who rests on a foundation
+
         size = self.state.size or self._found.H
         load, self._on_end = self._on_end, NO_FORCE
 
@@ -203,12 +205,12 @@ class ForeignBody(FmuBody, EndLoaded):
             return self.advance(self.state.time, size, NO_FORCE, (upward, 0.0, 0.0))
 
         let_go = pushed(0.0)
-        last, left, found = 0.0, let_go.velocity, -self.mass * let_go.velocity / size
-        for _ in range(_MAX_CORRECTIONS):
-            end = pushed(found)
-            if abs(end.velocity) <= _AT_REST * abs(let_go.velocity) or end.velocity == left:
-                break
-            last, left, found = found, end.velocity, found - end.velocity * (found - last) / (end.velocity - left)
+        # A guess of 0 would be no second point.
+        guess = -self.mass * let_go.velocity / size or self.mass
+        tolerance = _AT_REST * abs(guess)
+        root, _ = newton(lambda f: pushed(f).velocity, 0.0, x1=guess, tol=tolerance, full_output=True, disp=False)
+        found = float(root)
+        end = pushed(found)
         self.rewind()
         self._on_end = load
         fallen = abs(let_go.displacement - displacement)
