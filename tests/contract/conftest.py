@@ -1,28 +1,16 @@
-"""The FMUs through their C API, by ctypes alone: statuses and messages are seen as an importer sees them."""
+"""The FMUs by FMPy's slaves: statuses and messages are seen as an importer sees them."""
 
 import ctypes as ct
 import math
 import shutil
+from copy import copy
 
 import fmpy
 import pytest
+from fmpy import fmi2, fmi3
+from fmpy.fmi1 import FMICallException
 
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
-CO_SIMULATION = 1
-
-Logger = ct.CFUNCTYPE(None, ct.c_void_p, ct.c_char_p, ct.c_int, ct.c_char_p, ct.c_char_p)
-Logger3 = ct.CFUNCTYPE(None, ct.c_void_p, ct.c_int, ct.c_char_p, ct.c_char_p)
-
-
-class Callbacks(ct.Structure):
-    _fields_ = [
-        ("logger", Logger),
-        ("allocate", ct.c_void_p),
-        ("free", ct.c_void_p),
-        ("finished", ct.c_void_p),
-        ("environment", ct.c_void_p),
-    ]
-
 
 #: The inputs of force and impulse, the motion of the end.
 ENDS = {
@@ -53,7 +41,8 @@ class Fmu:
         self.name = self.description.coSimulation.modelIdentifier
         platform = "linux64" if self.version == "2.0" else "x86_64-linux"
         self.binary = folder / "binaries" / platform / f"{self.name}.so"
-        self.library = ct.CDLL(str(self.binary))
+        given = {"guid": self.description.guid, "modelIdentifier": self.name, "unzipDirectory": str(folder)}
+        self.slave = {"2.0": fmi2.FMU2Slave, "3.0": fmi3.FMU3Slave}[self.version](**given)
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.outputs = [name for name in self.named("output") if self.variables[name].type in ("Real", "Float64")]
         self.instances = []
@@ -68,16 +57,17 @@ class Fmu:
             function = function.replace(name, before)
         return f"fmi2{function}"
 
-    def function(self, name):
-        return getattr(self.library, self.spelt(name))
-
     def named(self, causality):
         """The variables of a causality, but for the derivatives that are inputs in FMI 3.0."""
         return [n for n, v in self.variables.items() if v.causality == causality and not n.startswith("der(")]
 
+    def numbers(self, *names):
+        """The value references."""
+        return [self.variables[name].valueReference for name in names]
+
     def references(self, *names):
         """The value references, as C takes them."""
-        return (ct.c_uint * len(names))(*[self.variables[name].valueReference for name in names])
+        return (ct.c_uint * len(names))(*self.numbers(*names))
 
     def instance(self, **options):
         made = {"2.0": Instance, "3.0": Instance3}[self.version](self, **options)
@@ -94,46 +84,23 @@ class Fmu:
 
 
 class Instance:
-    """One instance of FMI 2.0; keeps the messages it sends."""
+    """One instance of FMI 2.0; keeps the messages it sends. A call that fails raises, unless its status is returned."""
 
-    def __init__(
-        self,
-        fmu,
-        name=b"test",
-        guid=None,
-        resources=None,
-        callbacks=True,
-        logging=False,
-        **options,
-    ):
-        self.fmu = fmu
-        self.messages = []
-        identity = fmu.description.guid.encode() if guid is None else guid
-        self.component = ct.c_void_p(self._instantiate(name, identity, resources, callbacks, logging, **options))
+    def __init__(self, fmu, name=b"test", guid=None, resources=None, callbacks=True, logging=False, **options):
+        self.fmu, self.slave, self.messages = fmu, copy(fmu.slave), []
+        self.identity = (name, fmu.description.guid.encode() if guid is None else guid, resources)
+        self.make(callbacks, logging, **options)
 
-    def _instantiate(
-        self,
-        name,
-        identity,
-        resources,
-        callbacks,
-        logging,
-        kind=CO_SIMULATION,
-    ):
-        self._logger = Logger(self._log)
-        struct = Callbacks(self._logger, None, None, None, None)
-        pointer = ct.byref(struct) if callbacks else None
-        instantiate = self.fmu.library.fmi2Instantiate
-        instantiate.restype = ct.c_void_p
-        made = instantiate(name, kind, identity, resources, pointer, 0, int(logging))
+    def make(self, callbacks=True, logging=False, kind=fmi2.fmi2CoSimulation):
+        self.logger = fmi2.fmi2CallbackLoggerTYPE(lambda _environment, _name, *message: self.log(*message))
+        struct = fmi2.fmi2CallbackFunctions(self.logger)
+        (name, guid, resources), pointer = self.identity, ct.byref(struct) if callbacks else None
+        self.slave.component = self.slave.fmi2Instantiate(name, kind, guid, resources, pointer, False, logging)
         # The FMU must have copied the struct.
         ct.memset(ct.byref(struct), 0xFF, ct.sizeof(struct))
-        return made
 
-    def _log(self, environment, name, status, category, message):
+    def log(self, status, category, message):
         self.messages.append((status, category.decode(), message.decode()))
-
-    BOOLEAN = ct.c_int
 
     def counted(self, n):
         """Return what follows an array of ``n`` values: FMI 3.0 asks for their number."""
@@ -144,66 +111,66 @@ class Instance:
         """The last one."""
         return self.messages[-1][2] if self.messages else ""
 
+    def status(self, call, *arguments):
+        """Return the status of a call, instead of an error."""
+        try:
+            call(*arguments)
+        except FMICallException as failed:
+            return failed.status
+        return OK
+
     def call(self, function, *arguments):
-        return int(self.fmu.function(function)(self.component, *arguments))
+        """Return the status of a function of C."""
+        return self.status(getattr(self.slave, self.fmu.spelt(function)), self.slave.component, *arguments)
 
     def access(self, function, references, n, values):
         """Get or set values of ``n`` variables."""
-        return self.call(function, references, ct.c_size_t(n), values, *self.counted(n))
+        return self.call(function, references, n, values, *self.counted(n))
 
     def free(self):
-        if self.component:
-            self.fmu.function("FreeInstance")(self.component)
-            self.component = ct.c_void_p()
+        if self.slave.component:
+            getattr(self.slave, self.fmu.spelt("FreeInstance"))(self.slave.component)
+            self.slave.component = None
 
-    def _experiment(self, start, stop, tolerance):
-        known = tolerance is not None, ct.c_double(tolerance or 0.0)
-        end = stop is not None, ct.c_double(stop or 0.0)
-        return [*known, ct.c_double(start), *end]
+    def initialise(self, *experiment):
+        """Say when the run starts and ends, and enter initialization mode."""
+        self.slave.setupExperiment(*experiment)
+        self.slave.enterInitializationMode()
 
     def try_enter(self, start=0.0, stop=None, tolerance=None):
-        """Say when the run starts and ends, and enter initialization mode."""
-        status = self.setup(start, stop, tolerance)
-        return status if status != OK else self.call("EnterInitializationMode")
-
-    def setup(self, start=0.0, stop=None, tolerance=None):
-        return self.call("SetupExperiment", *self._experiment(start, stop, tolerance))
+        return self.status(self.initialise, tolerance, start, stop)
 
     def enter(self, start_time=0.0, stop_time=None, tolerance=None, **values):
         """Enter initialization mode, with values of parameters and inputs."""
         for name, value in values.items():
             self.set(name, value)
-        assert self.try_enter(start_time, stop_time, tolerance) == OK, self.message
+        self.initialise(tolerance, start_time, stop_time)
         return self
 
     def start(self, **values):
         """Enter initialization mode and leave it."""
-        self.enter(**values)
-        assert self.call("ExitInitializationMode") == OK, self.message
+        self.enter(**values).slave.exitInitializationMode()
         return self
 
-    def try_set(self, name, value):
-        variable = self.fmu.variables[name]
-        reference = self.fmu.references(name)
-        if variable.type in ("Real", "Float64"):
-            return self.access("SetFloat64", reference, 1, (ct.c_double * 1)(value))
-        if variable.type == "Boolean":
-            return self.access("SetBoolean", reference, 1, (self.BOOLEAN * 1)(int(value)))
-        return self.access("SetInt32", reference, 1, (ct.c_int * 1)(int(value)))
-
     def set(self, name, value):
-        assert self.try_set(name, value) == OK, self.message
+        variable = self.fmu.variables[name]
+        given = value if variable.type in ("Real", "Float64") else int(value)
+        getattr(self.slave, f"set{variable.type}")([variable.valueReference], [given])
+
+    def try_set(self, name, value):
+        return self.status(self.set, name, value)
+
+    def values(self, names):
+        """Return real values by their names."""
+        return dict(zip(names, self.slave.getReal(self.fmu.numbers(*names)), strict=True))
 
     def get(self, *names):
         """Real values: one, or a list."""
-        values = (ct.c_double * len(names))(*[math.nan] * len(names))
-        assert self.access("GetFloat64", self.fmu.references(*names), len(names), values) == OK, self.message
-        return values[0] if len(names) == 1 else list(values)
+        found = self.values(names)
+        return found[names[0]] if len(names) == 1 else [found[name] for name in names]
 
     def integer(self, name):
-        value = (ct.c_int * 1)()
-        assert self.access("GetInt32", self.fmu.references(name), 1, value) == OK, self.message
-        return int(value[0])
+        return getattr(self.slave, f"get{self.fmu.variables[name].type}")(self.fmu.numbers(name))[0]
 
     def outputs(self):
         """The Real ones."""
@@ -211,110 +178,75 @@ class Instance:
 
     def derive(self, name, order, value):
         """Set an input's derivative."""
-        reference = self.fmu.references(name)
-        return self.call("SetRealInputDerivatives", reference, 1, (ct.c_int * 1)(order), (ct.c_double * 1)(value))
+        self.slave.setRealInputDerivatives(self.fmu.numbers(name), [order], [value])
 
     def derivative(self, name, order=1):
-        reference, value = self.fmu.references(name), (ct.c_double * 1)(math.nan)
-        arguments = (reference, ct.c_size_t(1), (ct.c_int * 1)(order), value, *self.counted(1))
-        return self.call("GetOutputDerivatives", *arguments), value[0]
+        derivatives = {"2.0": "getRealOutputDerivatives", "3.0": "getOutputDerivatives"}[self.fmu.version]
+        return getattr(self.slave, derivatives)(self.fmu.numbers(name), [order])[0]
 
-    def partials(self, outputs, name):
-        """Return the status, and the derivatives of the outputs by an input or, before the start, by a parameter."""
-        n, values = len(outputs), (ct.c_double * len(outputs))(*[math.nan] * len(outputs))
-        unknown, known, one = self.fmu.references(*outputs), self.fmu.references(name), (ct.c_double * 1)(1.0)
-        arguments = (unknown, ct.c_size_t(n), known, ct.c_size_t(1), one, *self.counted(1), values, *self.counted(n))
-        return self.call("GetDirectionalDerivative", *arguments), list(values)
+    def partials(self, outputs, *names, seed=(1.0,)):
+        """Return the derivatives of the outputs by inputs or, before the start, by parameters."""
+        return self.slave.getDirectionalDerivative(self.fmu.numbers(*outputs), self.fmu.numbers(*names), seed)
 
     def try_step(self, time, size):
-        return self.call("DoStep", ct.c_double(time), ct.c_double(size), 0)
+        return self.call("DoStep", time, size, False)
 
     def reached(self):
         """How far the last step came."""
-        reached = ct.c_double()
-        assert self.call("GetRealStatus", 2, ct.byref(reached)) == OK
-        return reached.value
+        return self.slave.getRealStatus(fmi2.fmi2LastSuccessfulTime)
 
     def step(self, time, size):
         assert self.try_step(time, size) == OK, self.message
 
     def state(self):
-        token = ct.c_void_p()
-        assert self.call("GetFMUState", ct.byref(token)) == OK, self.message
-        return token
+        return self.slave.getFMUState()
 
     def restore(self, token):
-        assert self.call("SetFMUState", token) == OK, self.message
+        self.slave.setFMUState(token)
 
     def serialized(self):
-        token, size = self.state(), ct.c_size_t()
-        assert self.call("SerializedFMUStateSize", token, ct.byref(size)) == OK
-        buffer = ct.create_string_buffer(size.value)
-        assert self.call("SerializeFMUState", token, buffer, size) == OK
-        assert self.call("FreeFMUState", ct.byref(token)) == OK
-        return buffer.raw
-
-    def try_deserialize(self, blob):
-        token = ct.c_void_p(0xDEADBEEF)  # an output only (FMI 2.0.4): JavaFMI passes what is not initialised
-        status = self.call("DeserializeFMUState", blob, ct.c_size_t(len(blob)), ct.byref(token))
-        return status, token
+        token = self.state()
+        blob = self.slave.serializeFMUState(token)
+        self.slave.freeFMUState(token)
+        return blob
 
     def deserialized(self, blob):
-        status, token = self.try_deserialize(blob)
-        assert status == OK, self.message
-        return token
+        # The token is an output only (FMI 2.0.4): JavaFMI passes what is not initialised.
+        return self.slave.deserializeFMUState(blob, ct.c_void_p(0xDEADBEEF))
 
 
 class Instance3(Instance):
     """One instance of FMI 3.0."""
 
-    BOOLEAN = ct.c_bool
-
-    def _instantiate(
-        self,
-        name,
-        identity,
-        resources,
-        callbacks,
-        logging,
-        events=False,
-        early=False,
-    ):
-        self._logger = Logger3(self._log3)
-        self.event, self.end, self.early = ct.c_bool(), ct.c_bool(), ct.c_bool()
-        self.last = ct.c_double()
-        instantiate = self.fmu.library.fmi3InstantiateCoSimulation
-        instantiate.restype = ct.c_void_p
-        logger = self._logger if callbacks else None
-        return instantiate(
-            *(name, identity, resources, False, logging, events, early, None, ct.c_size_t(0), None, logger, None)
-        )
-
-    def _log3(self, environment, status, category, message):
-        self.messages.append((status, category.decode(), message.decode()))
+    def make(self, callbacks=True, logging=False, events=False, early=False):
+        self.logger = fmi3.fmi3LogMessageCallback(lambda _environment, *message: self.log(*message))
+        self.event, self.end, self.early, self.last = ct.c_bool(), ct.c_bool(), ct.c_bool(), ct.c_double()
+        logger = self.logger if callbacks else fmi3.fmi3LogMessageCallback()
+        unused = (None, 0, None, logger, fmi3.fmi3IntermediateUpdateCallback())
+        options = (*self.identity, False, logging, events, early, *unused)
+        self.slave.component = self.slave.fmi3InstantiateCoSimulation(*options)
 
     def counted(self, n):
-        return (ct.c_size_t(n),)
+        return (n,)
 
-    def try_enter(self, start=0.0, stop=None, tolerance=None):
-        return self.call("EnterInitializationMode", *self._experiment(start, stop, tolerance))
+    def initialise(self, *experiment):
+        self.slave.enterInitializationMode(*experiment)
 
-    def get(self, *names):
-        """Real values, elements of arrays by index: one, or a list."""
+    def values(self, names):
+        """Return elements of arrays by index, too."""
         found = {}
         for array in {name if name in self.fmu.variables else name.split("[")[0] for name in names}:
-            n = math.prod(self.fmu.variables[array].shape or ())
-            values, size, one = (ct.c_double * n)(*[math.nan] * n), ct.c_size_t(n), ct.c_size_t(1)
-            assert self.call("GetFloat64", self.fmu.references(array), one, values, size) == OK, self.message
+            size = math.prod(self.fmu.variables[array].shape or ())
+            values = self.slave.getFloat64(self.fmu.numbers(array), size)
             found |= {array: values[0]} | {f"{array}[{i}]": value for i, value in enumerate(values, 1)}
-        return found[names[0]] if len(names) == 1 else [found[name] for name in names]
+        return found
 
     def derive(self, name, order, value):
-        return self.try_set(f"der({name}{'' if order == 1 else f',{order}'})", value)
+        self.set(f"der({name}{'' if order == 1 else f',{order}'})", value)
 
     def try_step(self, time, size):
         told = [ct.byref(value) for value in (self.event, self.end, self.early, self.last)]
-        return self.call("DoStep", ct.c_double(time), ct.c_double(size), False, *told)
+        return self.call("DoStep", time, size, False, *told)
 
     def reached(self):
         return self.last.value

@@ -148,8 +148,7 @@ def compare(k, outputs, name, change, own_change=None):
     """
     value = k.get(name)
     k.set(name, value)  # what was extrapolated is now as set
-    status, partials = k.partials(outputs, name)
-    assert status == 0, k.message
+    partials = k.partials(outputs, name)
     ends = []
     for sign in (1.0, -1.0):
         k.set(name, value + sign * change)
@@ -185,11 +184,9 @@ def test_directional_derivatives_are_those_of_the_outputs(case):
 def test_a_direction_is_the_sum_of_its_inputs(case):
     k, names = case.running(**COMMON[case.name]), {"beam": ("tip_force", "tip_load"), "spring": FORCES}[case.name]
     output = {"beam": "tip_acceleration", "spring": "acceleration"}[case.name]
-    one, two, seed, found = ct.c_size_t(1), ct.c_size_t(2), (ct.c_double * 2)(2.0, -3.0), (ct.c_double * 1)()
-    arguments = (case.references(output), one, case.references(*names), two, seed, *k.counted(2), found, *k.counted(1))
-    assert k.call("GetDirectionalDerivative", *arguments) == 0
-    a, b = (k.partials([output], name)[1][0] for name in names)
-    assert found[0] == 2.0 * a - 3.0 * b != 0.0
+    (found,) = k.partials([output], *names, seed=(2.0, -3.0))
+    a, b = (k.partials([output], name)[0] for name in names)
+    assert found == 2.0 * a - 3.0 * b != 0.0
 
 
 FORCES = ("contact_force", "external_force")
@@ -200,9 +197,9 @@ def test_the_law_inside_follows_the_rate_of_the_tip(spring):
     """C = k δ (1 + χ δ̇): ∂C/∂u̇ = −k δ χ."""
     law = {"contact_law": 2, "compliance_stiffness": 100.0, "compliance_exponent": 1.0, "compliance_damping": 0.5}
     k = spring.running(**law, displacement=0.1, tip_displacement=0.05)
-    assert k.derive("tip_displacement", 1, 0.2) == 0
-    assert k.partials(["reaction"], "der(tip_displacement)") == (0, [pytest.approx(-100.0 * 0.05 * 0.5)])
-    assert k.partials(["reaction"], "tip_velocity") == (0, [0.0])
+    k.derive("tip_displacement", 1, 0.2)
+    assert k.partials(["reaction"], "der(tip_displacement)") == [pytest.approx(-100.0 * 0.05 * 0.5)]
+    assert k.partials(["reaction"], "tip_velocity") == [0.0]
 
 
 def test_directional_derivatives_at_the_start_are_those_of_the_outputs(case):

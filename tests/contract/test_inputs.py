@@ -15,8 +15,8 @@ LOADS = [
 def polynomial(k, name, f, t=0.0):
     """Sets f₀ + f₁τ + f₂τ²/2 as it is seen from time t on."""
     k.set(name, f[0] + f[1] * t + f[2] * t * t / 2)
-    assert k.derive(name, 1, f[1] + f[2] * t) == OK
-    assert k.derive(name, 2, f[2]) == OK
+    k.derive(name, 1, f[1] + f[2] * t)
+    k.derive(name, 2, f[2])
 
 
 def test_derivatives_hold_for_one_step_the_value_stays(case):
@@ -44,15 +44,16 @@ def test_derivatives_that_are_set_in_one_call(case):
         assert together.access("SetFloat64", names, 2, values) == OK
         assert together.access("GetFloat64", names, 2, found) == OK
         assert list(found) == list(values)
-    assert apart.derive(case.force, 1, 5.0) == apart.derive(case.force, 2, -7.0) == OK
+    apart.derive(case.force, 1, 5.0)
+    apart.derive(case.force, 2, -7.0)
     for k in (together, apart):
         k.step(0.0, 0.05)
     assert together.outputs() == apart.outputs()
-    assert apart.derive(case.force, 2, -7.0) == OK
-    assert together.derive(case.force, 2, -7.0) == OK
+    apart.derive(case.force, 2, -7.0)
+    together.derive(case.force, 2, -7.0)
     for k in (together, apart):
         k.step(0.05, 0.05)
-    assert apart.derive(case.force, 2, 0.0) == OK  # it is 0 already
+    apart.derive(case.force, 2, 0.0)  # it is 0 already
     for k in (together, apart):
         k.step(0.1, 0.05)
     assert together.outputs() == apart.outputs()
@@ -72,14 +73,6 @@ def test_an_impulse_acts_once_at_the_start_of_the_next_step(case):
         k.step(i * H, H)
         assert k.get(case.impulse) == 0.0
         assert sum(k.get(*stored)) - before == pytest.approx(J * (2 * velocity + J / mass) / 2, rel=1e-9)
-
-
-def test_an_impulse_waits_where_its_step_is_discarded(spring):
-    k = spring.running(linear_stiffness=3.0, cubic_stiffness=-0.2)
-    k.set("impulse", 100.0)
-    assert k.try_step(0.0, 10.0) == 2
-    assert "has run away" in k.message
-    assert k.get("velocity", "impulse") == [0.0, 100.0]
 
 
 LOADED = {
@@ -121,21 +114,21 @@ def test_every_output_has_its_rate(case, variant):
     advance(h)
     rates = [k.derivative(n) for n in names]
     advance(h)
-    for name, (status, rate), a, b in zip(names, rates, before, k.get(*names), strict=True):
+    for name, rate, a, b in zip(names, rates, before, k.get(*names), strict=True):
         difference = (b - a) / (2 * h)
-        assert status == OK, name
         assert rate == pytest.approx(difference, rel=2e-4, abs=1e-7 + 1e-15 * abs(a) / h), name
         moving += rate != 0.0
     assert moving >= 6
-    assert all(k.derivative(n)[0] == OK for n in case.outputs)
+    for name in case.outputs:
+        k.derivative(name)
 
 
 def test_the_rate_of_the_acceleration_counts_all_rates_of_forces(spring):
     k = spring.running(mass=2.0, linear_stiffness=0.0)
     rates = {"external_force": 3.0, "foundation_force": 5.0, "contact_force": 11.0, "base_acceleration": 7.0}
     for name, rate in rates.items():
-        assert k.derive(name, 1, rate) == OK
-    assert k.derivative("acceleration") == (OK, pytest.approx((3.0 + 5.0 - 11.0) / 2.0 - 7.0))
+        k.derive(name, 1, rate)
+    assert k.derivative("acceleration") == pytest.approx((3.0 + 5.0 - 11.0) / 2.0 - 7.0)
 
 
 @pytest.mark.parametrize("load", LOADS)
@@ -199,29 +192,6 @@ def test_contact_force_is_ignored_by_the_law_inside(spring):
     assert plain.outputs() == pressed.outputs()
 
 
-@pytest.mark.parametrize("loads", [{}, {"external_force": 1.0, "base_acceleration": -0.7}])
-@pytest.mark.parametrize("law", [{}, {"contact_law": 2, "tip_displacement": -0.02, "compliance_damping": 0.3}])
-def test_energy_of_the_spring_closes(spring, loads, law):
-    """Through lossy impacts and rest, under loads that change within the steps, also with a law inside."""
-    k = spring.running(
-        linear_stiffness=30.0, cubic_stiffness=500.0, damping=0.2, velocity=-1.0, stop_enabled=True, mass=1.2,
-        stop_position=-0.05, restitution=0.4, relative_tolerance=1e-14, absolute_tolerance=1e-16, gravity=0.3, **law,
-    )  # fmt: skip
-    start, H, seated, impacts = 0.6 + k.get("contact_energy"), 0.02, 0, 0
-    for i in range(60):
-        for name, factor in loads.items():
-            polynomial(k, name, (-3.0 * factor, 150.0 * (-1) ** i * factor, -1e4 * factor))
-        k.step(i * H, H)
-        seated += k.get("stop_force") > 0.0
-        impacts += k.get("stop_impulse") > 0.0
-        stored = sum(k.get("kinetic_energy", "potential_energy", "contact_energy"))
-        total = stored + sum(k.get("dissipated_energy", "impact_loss")) - k.get("load_work")
-        assert total == pytest.approx(start, rel=1e-12), i
-    assert impacts >= 2
-    assert k.get("load_work") != 0.0  # that of gravity, if no other
-    assert (seated > 9) is bool(loads)
-
-
 def test_a_derivative_of_the_tip_that_is_set_counts_even_if_it_is_zero(spring):
     law = {"contact_law": 2, "mass": 1e9, "linear_stiffness": 0.0, "compliance_stiffness": 1e3}
     reactions = []
@@ -231,7 +201,7 @@ def test_a_derivative_of_the_tip_that_is_set_counts_even_if_it_is_zero(spring):
         k.set("tip_velocity", -0.2)
         token = k.state()
         for order, value in enumerate(derivatives, 1):
-            assert k.derive("tip_displacement", order, value) == OK
+            k.derive("tip_displacement", order, value)
         copied = k.deserialized(k.serialized())  # what is set belongs to the state
         k.restore(token)
         k.restore(copied)
@@ -245,11 +215,11 @@ def test_derivatives_of_inputs_are_seen_as_soon_as_they_are_set(spring):
     law = {"contact_law": 2, "compliance_stiffness": 100.0, "compliance_exponent": 1.0, "compliance_damping": 0.5}
     k = spring.running(**law, displacement=0.1, tip_displacement=0.05)
     assert k.get("reaction") == pytest.approx(5.0)
-    assert k.derive("tip_displacement", 1, 1.0) == OK
+    k.derive("tip_displacement", 1, 1.0)
     force = k.get("reaction")
     assert force == pytest.approx(5.0 * (1.0 - 0.5))
-    assert k.derive("tip_displacement", 2, -3.0) == OK
+    k.derive("tip_displacement", 2, -3.0)
     rise = -1.0  # of the depth
     acceleration = -(0.1 + force) + 3.0
     rate = 100.0 * rise * (1.0 + 0.5 * rise) + 5.0 * 0.5 * acceleration
-    assert k.derivative("reaction") == (OK, pytest.approx(rate))
+    assert k.derivative("reaction") == pytest.approx(rate)

@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from fmpy import fmi3
 
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
 
@@ -21,7 +22,7 @@ OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
 )
 def test_instantiation_is_refused_with_a_reason(case, options, why):
     k = case.instance(**options)
-    assert not k.component
+    assert not k.slave.component
     assert why in k.message
 
 
@@ -30,15 +31,15 @@ def test_only_co_simulation_is_provided(loaded, version):
     k = case.instance()
     if version == "2.0":
         k = case.instance(kind=0)
-        assert not k.component
+        assert not k.slave.component
         assert "only co-simulation" in k.message
         return
     name, token = b"test", case.description.guid.encode()
-    for function, more in (("InstantiateModelExchange", ()), ("InstantiateScheduledExecution", (None, None, None))):
-        made = case.function(function)
-        made.restype = ct.c_void_p
-        assert not made(name, token, None, False, False, None, k._logger, *more)
-        assert f"fmi3{function}: only co-simulation" in k.message
+    made = case.slave.fmi3InstantiateModelExchange(name, token, None, False, False, None, k.logger)
+    assert (made, "fmi3InstantiateModelExchange: only co-simulation" in k.message) == (None, True)
+    callbacks = [kind() for kind in (fmi3.fmi3ClockUpdateCallback, *[fmi3.fmi3LockPreemptionCallback] * 2)]
+    made = case.slave.fmi3InstantiateScheduledExecution(name, token, None, False, False, None, k.logger, *callbacks)
+    assert (made, "fmi3InstantiateScheduledExecution: only co-simulation" in k.message) == (None, True)
 
 
 @pytest.mark.parametrize(
@@ -89,16 +90,13 @@ def test_declared_log_categories_are_accepted(case):
 
 
 def test_types_platform_and_version(case, version):
-    expected = {"GetVersion": version} | ({"GetTypesPlatform": "default"} if version == "2.0" else {})
-    for name, text in expected.items():
-        function = case.function(name)
-        function.restype = ct.c_char_p
-        assert function() == text.encode()
+    assert case.slave.getVersion() == version
+    assert version == "3.0" or case.slave.getTypesPlatform() == "default"
 
 
-FIRST, NUMBER, FLAG, TEXT = (ct.c_uint * 1)(0), (ct.c_double * 1)(), (ct.c_int * 1)(), (ct.c_char_p * 1)()
-DESERIALIZE = (None, ct.c_size_t(0), ct.byref(ct.c_void_p()))
-DIRECTION = (FIRST, ct.c_size_t(1), None, ct.c_size_t(0), None, None)
+FIRST, NUMBER, TEXT = (ct.c_uint * 1)(0), (ct.c_double * 1)(), (ct.c_char_p * 1)()
+DESERIALIZE = (None, 0, ct.byref(ct.c_void_p()))
+DIRECTION = (FIRST, 1, None, 0, None, None)
 #: By phase: calls with arguments that are wrong, and the message.
 REFUSED = {
     "instantiated": [
@@ -117,16 +115,12 @@ REFUSED = {
             lambda k: k.access("GetFloat64", (ct.c_uint * 1)(4711), 1, NUMBER),
             "GetFloat64: .*value reference 4711 does not exist",
         ),
-        (lambda k: k.access("GetBoolean", FIRST, 1, FLAG), "GetBoolean: .*as Boolean: it is Real"),
+        (lambda k: k.status(k.slave.getBoolean, [0]), "GetBoolean: .*as Boolean: it is Real"),
         (lambda k: k.access("GetString", FIRST, 1, TEXT), "GetString: there are no variables of type String"),
         (lambda k: k.access("SetString", FIRST, 1, TEXT), "SetString: there are no variables of type String"),
         (lambda k: k.call("GetFMUState", None), "GetFMUState: the FMU state is NULL"),
         (lambda k: k.call("SetFMUState", None), "SetFMUState: the FMU state is NULL"),
         (lambda k: k.call("SerializedFMUStateSize", None, None), "SerializedFMUStateSize: .*size is NULL"),
-        (
-            lambda k: k.call("SerializeFMUState", k.state(), ct.create_string_buffer(16), ct.c_size_t(16)),
-            "SerializeFMUState: size = 16, needed are",
-        ),
         (lambda k: k.call("DeserializeFMUState", *DESERIALIZE), "DeserializeFMUState: serializedState is NULL"),
         (lambda k: k.try_set(k.fmu.force, math.nan), "SetFloat64: '(tip|contact)_force' = .*nan is not finite"),
         (lambda k: k.try_set(k.fmu.force, math.inf), "SetFloat64: '(tip|contact)_force' = inf is not finite"),
@@ -146,38 +140,45 @@ REFUSED = {
 }
 REFUSED2 = {
     "step complete": [
+        (lambda k: k.call("SerializeFMUState", k.state(), bytes(16), 16), "SerializeFMUState: size = 16, needed are"),
         (lambda k: k.call("GetStatus", 0, None), "GetStatus: value is NULL"),
         (
-            lambda k: k.call("SetRealInputDerivatives", FIRST, ct.c_size_t(1), (ct.c_int * 1)(1), None),
+            lambda k: k.call("SetRealInputDerivatives", FIRST, 1, (ct.c_int * 1)(1), None),
             "SetRealInputDerivatives: value is NULL",
         ),
-        (lambda k: k.derive(k.fmu.force, 0, 1.0), "SetRealInputDerivatives: derivative order 0"),
-        (lambda k: k.derive(k.fmu.force, 3, 1.0), "SetRealInputDerivatives: derivative order 3"),
-        (lambda k: k.derive(k.fmu.force, -1, 1.0), "SetRealInputDerivatives: derivative order -1"),
-        (lambda k: k.derive(k.fmu.impulse, 1, 1.0), "SetRealInputDerivatives: '(tip_)?impulse' is not an input that"),
+        (lambda k: k.status(k.derive, k.fmu.force, 0, 1.0), "SetRealInputDerivatives: derivative order 0"),
+        (lambda k: k.status(k.derive, k.fmu.force, 3, 1.0), "SetRealInputDerivatives: derivative order 3"),
+        (lambda k: k.status(k.derive, k.fmu.force, -1, 1.0), "SetRealInputDerivatives: derivative order -1"),
         (
-            lambda k: k.call("GetOutputDerivatives", FIRST, ct.c_size_t(1), None, NUMBER),
+            lambda k: k.status(k.derive, k.fmu.impulse, 1, 1.0),
+            "SetRealInputDerivatives: '(tip_)?impulse' is not an input that",
+        ),
+        (
+            lambda k: k.call("GetOutputDerivatives", FIRST, 1, None, NUMBER),
             "GetOutputDerivatives: order is NULL",
         ),
         (lambda k: k.call("GetDirectionalDerivative", *DIRECTION), "GetDirectionalDerivative: the array of results is"),
     ],
 }
-ONE, NOTHING = ct.c_size_t(1), ct.c_size_t(0)
 REFUSED3 = {
     "step complete": [
-        (lambda k: k.call("GetFloat64", FIRST, ONE, NUMBER, ct.c_size_t(2)), "GetFloat64: nValues = 2, but .* have 1"),
-        (lambda k: k.call("SetFloat64", FIRST, ONE, NUMBER, NOTHING), "SetFloat64: nValues = 0, but .* have 1"),
+        (lambda k: k.call("GetFloat64", FIRST, 1, NUMBER, 2), "GetFloat64: nValues = 2, but .* have 1"),
+        (lambda k: k.call("SetFloat64", FIRST, 1, NUMBER, 0), "SetFloat64: nValues = 0, but .* have 1"),
         (
-            lambda k: k.call("GetOutputDerivatives", FIRST, ONE, None, NUMBER, ONE),
+            lambda k: k.call("GetOutputDerivatives", FIRST, 1, None, NUMBER, 1),
             "GetOutputDerivatives: order is NULL",
         ),
         (
-            lambda k: k.call("GetDirectionalDerivative", FIRST, ONE, None, NOTHING, None, NOTHING, None, ONE),
+            lambda k: k.call("GetDirectionalDerivative", FIRST, 1, None, 0, None, 0, None, 1),
             "GetDirectionalDerivative: the array of values is NULL",
         ),
-        (lambda k: k.access("GetFloat32", FIRST, 1, NUMBER), "GetFloat32: there are no variables of type Float32"),
-        (lambda k: k.access("SetUInt64", FIRST, 1, NUMBER), "SetUInt64: there are no variables of type UInt64"),
-        (lambda k: k.call("DoStep", ct.c_double(0.0), ct.c_double(1.0), *[None] * 5), "DoStep: eventHandlingNeeded is"),
+        (
+            lambda k: k.call("SerializeFMUState", k.state(), (ct.c_uint8 * 16)(), 16),
+            "SerializeFMUState: size = 16, needed are",
+        ),
+        (lambda k: k.status(k.slave.getFloat32, [0]), "GetFloat32: there are no variables of type Float32"),
+        (lambda k: k.status(k.slave.setUInt64, [0], [1]), "SetUInt64: there are no variables of type UInt64"),
+        (lambda k: k.call("DoStep", 0.0, 1.0, *[None] * 5), "DoStep: eventHandlingNeeded is"),
     ],
 }
 

@@ -70,20 +70,6 @@ class Pair:
         return np.array(rows).T
 
 
-def test_steps_with_a_held_force_are_repeated_bit_by_bit(beam, spring):
-    pair = Pair(beam, spring, 1e-3).start()
-    pair.run(0.02)
-    token, rows = pair.spring.state(), []
-    assert pair.spring.get("reaction") > 0.0
-    for again in (False, True):
-        if again:
-            pair.spring.restore(token)
-        for i in range(3):
-            pair.spring.step(pair.time + i * pair.size, pair.size)
-            rows.append(pair.spring.outputs())
-    assert rows[:3] == rows[3:]
-
-
 def at_milliseconds(rows):
     return np.interp(np.arange(1, round(rows[0, -1] * 1e3) + 1) * 1e-3, rows[0], rows[1])
 

@@ -13,7 +13,7 @@ def advance(case, k, time, steps, impulse):
     rows = []
     for i in range(steps):
         k.set(case.force, 0.1 * (i + 1))
-        assert k.derive(case.force, 1, -0.3 * i) == OK
+        k.derive(case.force, 1, -0.3 * i)
         if i == 1:
             k.set(case.impulse, impulse)
         size = 0.01 * (1 + i % 3)
@@ -84,7 +84,8 @@ def test_a_state_carries_the_set_up_of_the_run_and_derivatives_of_inputs(case, s
     k = case.moving(**loose, stop_time=0.15, tolerance=1e-13)
     other = case.moving(**loose) if same else case.running(tolerance=1e-13)
     k.set(case.force, 0.3)
-    assert k.derive(case.force, 1, 50.0) == k.derive(case.force, 2, -700.0) == OK
+    k.derive(case.force, 1, 50.0)
+    k.derive(case.force, 2, -700.0)
     other.restore(other.deserialized(k.serialized()))
     for one in (k, other):
         one.step(0.0, 0.1)
@@ -113,12 +114,12 @@ def damaged(blob, position):
 def test_foreign_bytes_are_refused_with_the_reason(case, damage, why):
     k = case.moving()
     blob = k.serialized()
-    assert k.try_deserialize(damage(blob))[0] == ERROR
+    assert k.status(k.deserialized, damage(blob)) == ERROR
     assert why in k.message
 
 
 def test_a_state_of_the_other_fmu_is_refused(beam, spring):
     blob = beam.running().serialized()
     k = spring.running()
-    assert k.try_deserialize(blob)[0] == ERROR
+    assert k.status(k.deserialized, blob) == ERROR
     assert f"not written by the FMU {spring.description.guid}" in k.message
