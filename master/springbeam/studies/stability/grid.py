@@ -193,15 +193,16 @@ def ended(kind: str, reason: str = "") -> Row:
 
 def run_cell(cell: dict[str, Any]) -> Row:
     """Run a cell and return how it ended."""
-    accepted, cause = 0, ""
+    cause = ""
     try:
         simulation = Simulation(scene_from_dict(scene_dict(cell), source="cell"))
     except (SceneError, FmuError) as error:
         return ended("refused", str(error))
     with simulation:
         try:
-            while simulation.step() and accepted < _MOST_STEPS:
-                accepted += 1
+            for _ in range(_MOST_STEPS):
+                if not simulation.step():
+                    break
         except RunStopped as stopped:
             cause = stopped.cause
         found = simulation.run

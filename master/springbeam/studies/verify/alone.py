@@ -13,7 +13,7 @@ from math import cos, pi, sqrt
 from typing import Any
 
 import numpy as np
-from scipy.linalg import expm
+from scipy.linalg import expm, hankel, svd
 from scipy.optimize import brentq
 
 from ...bodies.fmu_bodies import FmuBeam, FmuSpring
@@ -22,6 +22,8 @@ from ...scene import Beam, Spring
 from ..exact import duffing_period
 from .check import EPS, UNIT_FORCE, Check, section
 
+#: Half the rows in which frequencies are looked for, and what of them is rounding.
+_SAMPLES, _ROUNDING = 300, 1e-11
 _VARIANTS: dict[str, dict[str, Any]] = {
     "full, all modes": {},
     "full, 1 mode": {"n_modes": 1},
@@ -59,7 +61,7 @@ def frequencies(kappa: float) -> Iterator[Check]:
     root, n, degree = sqrt(kappa), 8, 8
     mesh = {"n_elements": n, "element_degree": degree, "n_modes": 6}
     beam = Beam.with_ones(young_modulus=kappa, shear_modulus=kappa, **mesh)
-    measured = _measured_frequencies(beam, 0.1 / root, 300) / root
+    measured = _measured_frequencies(beam, 0.1 / root) / root
     for i, w in enumerate(clamped_free_frequencies()[:6], 1):
         yield Check(
             f"κ = {kappa:g}: ω{i}",
@@ -90,7 +92,7 @@ def bar_frequencies(name: str) -> Iterator[Check]:
     n, rigid, stiff = 50, 1e14, 1e3
     beam, dispersed = _BARS[name]
     bar = Beam.with_ones(n_modes=6, second_moment_of_area=rigid, young_modulus=stiff, **beam)
-    measured = _measured_frequencies(bar, 0.1, 300)
+    measured = _measured_frequencies(bar, 0.1)
     for j in (1, 3, 6):
         w = n * dispersed((j - 0.5) * pi / n)
         reason = "rounding: ε N² in an eigenproblem of N = 2n unknowns"
@@ -160,28 +162,21 @@ def transfer_rate(w: float, softer: complex = 1.0) -> np.ndarray:
     return np.array([[0, softer, 0, 0], [-w * w, 0, 0, -1], [1, 0, 0, softer], [0, 0, -w * w, 0]])
 
 
-def _measured_frequencies(beam: Beam, size: float, samples: int) -> np.ndarray:
-    """Return the frequencies [rad/s] in the tip's velocity after an impulse, from 2 ``samples`` rows at ``size`` [s].
+def _measured_frequencies(beam: Beam, size: float) -> np.ndarray:
+    """Return the frequencies [rad/s] in the tip's velocity after an impulse, from rows at steps of ``size`` [s].
 
-    The samples Σ aᵢ cos(ωᵢ k H) = Σ aᵢ T_k(xᵢ), aᵢ > 0, are the Chebyshev moments of a measure with its masses at
-    xᵢ = cos ωᵢH; with 2 T_j T_k = T_{j+k} + T_{|j−k|} they fill the Gram matrix of T_0, T_1, … and that of
-    multiplication by x, whose eigenvalues relative to it are the xᵢ.
+    By ESPRIT (Roy & Kailath 1989): shifted by a row, the space that the rows span turns by the angles ωH.
     """
     with closing(FmuBeam(beam, 0.0, 0.0)) as body:
         body.apply_impulse(1.0)
         velocity = [body.motion().velocity]
-        for step in range(2 * samples):
+        for step in range(2 * _SAMPLES):
             body.advance(step * size, size, NO_FORCE)
             velocity.append(body.motion().velocity)
-    c = np.array(velocity)
-    j, k = np.indices((samples, samples))
-    gram = (c[j + k] + c[abs(j - k)]) / 2.0
-    times_x = (c[j + 1 + k] + c[abs(j + 1 - k)] + c[abs(j - 1 + k)] + c[abs(j - 1 - k)]) / 4.0
-    masses, vectors = np.linalg.eigh(gram)
-    kept = masses > 1e-11 * masses[-1]
-    basis = vectors[:, kept] / np.sqrt(masses[kept])
-    x = np.linalg.eigvalsh(basis.T @ times_x @ basis)
-    return np.asarray(np.arccos(np.clip(x, -1.0, 1.0)) / size)
+    vectors, shares, _ = svd(hankel(velocity[:_SAMPLES], velocity[_SAMPLES - 1 :]))
+    space = vectors[:, shares > _ROUNDING * shares[0]]
+    turns = np.linalg.eigvals(np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0])
+    return np.asarray(np.abs(np.angle(turns)) / size)
 
 
 def _nearest(values: np.ndarray, to: float) -> float:
