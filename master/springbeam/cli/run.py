@@ -196,9 +196,7 @@ def _draw(console: Console, directory: RunDirectory) -> str | None:
 
     try:
         pictures = plot_run(load_trajectory(directory.path), directory.path)
-    except KeyboardInterrupt:
-        return "interrupted while drawing"
-    except OSError as error:
+    except (KeyboardInterrupt, OSError) as error:
         return f"no pictures: {cause_of(error, directory.path)}"
     if pictures:
         console.print(Text(f"pictures  {directory.path / '*.png'} ({len(pictures)})"), soft_wrap=True)

@@ -15,7 +15,7 @@ from rich.text import Text
 from scipy.optimize import brentq
 
 from ..scene import Scene, SceneError
-from .metrics import heading, known, named
+from .metrics import Metric, heading, metrics_of
 from .study import Findings, Pictures, Row, Study
 from .tables import number, table
 
@@ -76,9 +76,9 @@ class Converge(Study):
     metric: tuple[str, ...] = ()  #: those of `QUANTITIES` that the scene has if there are none
 
     @property
-    def metrics(self) -> Sequence[str]:
+    def metrics(self) -> dict[str, Metric]:
         """Those asked for."""
-        return self.metric or QUANTITIES
+        return metrics_of(self.metric or QUANTITIES)
 
     def cases(self) -> dict[str, Row]:
         """Return the meshes by what is refined, coarse to fine; ``unknowns`` are the modes that take part.
@@ -91,7 +91,7 @@ class Converge(Study):
         beam = self.scene.beam
         if beam is None or self.scene.massless:
             raise SceneError("[beam]: the scene has no mesh to refine")
-        known(self.metrics)
+        _ = self.metrics
         more = [_RATIO**k for k in range(self.levels)]
         found = [("elements", beam.n_elements * k, beam.n_modes) for k in more]
         if beam.integrator == "modal" and beam.modes_kept >= more[-1]:
@@ -120,8 +120,7 @@ class Converge(Study):
     def quantities(self, records: Mapping[str, Row]) -> list[str]:
         """Return what is compared: what was asked for, or what the scene has."""
         first = next(iter(records.values()))
-        names = [named(text)[0] for text in self.metrics]
-        return [name for name in names if self.metric or first[name] is not None]
+        return [name for name in self.metrics if self.metric or first[name] is not None]
 
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
         """Return a row per run; errors are from the limits of its sequence."""

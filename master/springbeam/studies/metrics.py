@@ -156,12 +156,26 @@ def heading(name: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-def named(text: str) -> tuple[str, Metric]:
-    """Return the name of a metric, and the metric. Raises SceneError if it is unknown, or one's own is none."""
+def metrics_of(texts: Sequence[str], *, several: bool = False) -> dict[str, Metric]:
+    """Return the metrics that ``texts`` name.
+
+    Raises SceneError if one is unknown, is named twice, or is ``several`` numbers where it may not be.
+    """
+    found: dict[str, Metric] = {}
+    for text in texts:
+        name, metric = _named(text)
+        if name in found:
+            raise SceneError(f"--metric {name}: given twice")
+        if metric.several and not several:
+            raise SceneError(f"--metric {name}: is several numbers of a run; springbeam sweep keeps and draws them")
+        found[name] = metric
+    return found
+
+
+def _named(text: str) -> tuple[str, Metric]:
     if text in METRICS:
         return text, METRICS[text]
-    name, separator, what = text.partition("=")
-    name, what = name.strip(), what.strip()
+    name, separator, what = (part.strip() for part in text.partition("="))
     if not separator or not name.isidentifier():
         raise SceneError(
             f"--metric {text}: unknown; {nearest(text, METRICS)}allowed: {', '.join(METRICS)}, and your own, as in "
@@ -194,17 +208,6 @@ def _own(name: str, what: str) -> Metric:
     parts = () if formula is None else formula.names
     takes = (column for part in parts for column in (METRICS[part].takes if part in METRICS else (part,)))
     return Metric("", what, of, takes=tuple(takes))
-
-
-def known(names: Sequence[str], *, several: bool = False) -> tuple[str, ...]:
-    """Return the metrics as given. Raises SceneError if one is unknown, or is several numbers where it may not be."""
-    columns, metrics = zip(*map(named, names), strict=True) if names else ((), ())
-    for name, metric in zip(columns, metrics, strict=True):
-        if metric.several and not several:
-            raise SceneError(f"--metric {name}: is several numbers of a run; springbeam sweep keeps and draws them")
-    if doubled := sorted({name for name in columns if columns.count(name) > 1}):
-        raise SceneError(f"--metric {doubled[0]}: given twice")
-    return tuple(names)
 
 
 def costs(run: Trajectory) -> dict[str, int]:

@@ -19,7 +19,7 @@ import multiprocessing
 import os
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, load_scene, with_changes
 from ..scene.scene import split_key
 from .accuracy import simulate
-from .metrics import costs, named
+from .metrics import Metric, costs
 from .tables import write_csv, write_parquet
 
 FILE = "study.jsonl"
@@ -90,9 +90,9 @@ class Study(BaseModel, ABC):
     remarks: tuple[str, ...] = ()  #: said before what is found
 
     @property
-    def metrics(self) -> Sequence[str]:
-        """The numbers that are kept of each run, as `springbeam.studies.metrics.named` knows them."""
-        return ()
+    def metrics(self) -> dict[str, Metric]:
+        """The numbers that are kept of each run. Raises SceneError if one is unknown."""
+        return {}
 
     @abstractmethod
     def cases(self) -> Mapping[str, Row]:
@@ -104,7 +104,7 @@ class Study(BaseModel, ABC):
         ``status`` is ``done``, ``stopped`` (early) or ``refused`` (bad input), ``error`` says why. Wall times, loading
         included [s], are kept where cases follow one another.
         """
-        metrics = dict(map(named, self.metrics))
+        metrics = self.metrics
         row: Row = {"status": "done", "error": "", "warnings": "", **dict.fromkeys(metrics)}
         began = perf_counter()
         try:

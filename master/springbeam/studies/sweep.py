@@ -10,7 +10,7 @@ critical peak is that at which the metric first reaches its limit, linear betwee
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -21,7 +21,7 @@ from rich.text import Text
 from ..scene import Load, Scene, SceneError
 from ..scene.reference import unit_of
 from .design import Axis, Sampling, compatible, design, parse_axis
-from .metrics import PRINCIPAL, USUAL, heading, known, named
+from .metrics import PRINCIPAL, USUAL, Metric, heading, metrics_of
 from .study import Findings, Pictures, Row, Study
 from .tables import table, write_csv
 
@@ -54,32 +54,24 @@ class Sweep(Study):
         return tuple(parse_axis(text) for text in self.vary)
 
     @property
-    def metrics(self) -> Sequence[str]:
+    def metrics(self) -> dict[str, Metric]:
         """Those asked for."""
-        asked = self.metric or USUAL
-        return asked if not self.boundary or self._limit[0] in self._columns else (*asked, self._limit[0])
-
-    @property
-    def _columns(self) -> list[str]:
-        return [named(text)[0] for text in self.metric or USUAL]
-
-    @property
-    def _limit(self) -> tuple[str, float]:
-        return limit_of(self.boundary, self._columns)
+        asked = metrics_of(self.metric or USUAL, several=True)
+        limited = self._limit[0] if self.boundary else ""
+        return asked if not limited or limited in asked else asked | metrics_of([limited])
 
     @property
     def _shown(self) -> Sequence[str]:
-        return [named(text)[0] for text in self.metric] or PRINCIPAL
+        return list(metrics_of(self.metric, several=True)) or PRINCIPAL
 
     def cases(self) -> dict[str, Row]:
         """Return the values of the axes. Raises SceneError if a key or a metric is not there."""
-        known(self.metrics, several=True)
-        axes = self.axes
+        _, axes = self.metrics, self.axes
         compatible(self.scene, axes)
         if self.boundary:
-            pulse_axes(self.scene, axes)
-        values = design(axes, self.samples, self.seed, self.sampling)
+            self._pulse()
         names = [axis.name for axis in axes]
+        values = design(axes, self.samples, self.seed, self.sampling)
         return {str(index): dict(zip(names, several, strict=True)) for index, several in enumerate(values)}
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
@@ -102,9 +94,6 @@ class Sweep(Study):
         cells = [[_in_words(row[name]) for name in names] for row in rows[:_FIRST_ROWS]]
         return table(names, cells, f"the first {_FIRST_ROWS} of {len(rows)} rows" if len(rows) > _FIRST_ROWS else "")
 
-    def _critical(self, records: Mapping[str, Row]) -> list[Row]:
-        return boundary(*pulse_axes(self.scene, self.axes), self.rows(records), *self._limit)
-
     def write(self, records: Mapping[str, Row], directory: Path, *, pictures: bool) -> list[Path]:
         """Write the table, the damage boundary if it is wanted, and with ``pictures`` these."""
         files = super().write(records, directory, pictures=pictures)
@@ -126,6 +115,55 @@ class Sweep(Study):
             labels = ("velocity change [unit of the load × s]", "peak [unit of the load]")
             figures["sweep-boundary"] = curves(points, f"damage boundary: {self.boundary}", *labels, (7.0, 4.0))
         return figures
+
+    # Damage boundary
+
+    @property
+    def _limit(self) -> tuple[str, float]:
+        """The metric of the boundary, and what it must not reach. Raises SceneError for anything else."""
+        metric, _, value = self.boundary.rpartition("=")
+        try:
+            limit = float(value)
+        except ValueError:
+            limit = 0.0
+        if not limit > 0.0:
+            raise SceneError(
+                f"--boundary {self.boundary}: must be METRIC=LIMIT with a limit above 0, as in max_clamp_moment=0.3"
+            )
+        return metric.strip(), limit
+
+    def _pulse(self) -> tuple[Load, str, str]:
+        """Return the pulse that varies, and the names of the axes of its amplitude and its duration.
+
+        Raises SceneError if the sweep is over anything else.
+        """
+        names = {axis.name for axis in self.axes}
+        table = next(iter(names), "").rpartition(".")[0]
+        amplitude, duration = f"{table}.amplitude", f"{table}.duration"
+        if names != {amplitude, duration} or not table.startswith("loads."):
+            raise SceneError("--boundary: takes --vary loads.0.amplitude=… and --vary loads.0.duration=… of one pulse")
+        load = self.scene.loads[int(table.partition(".")[2])]
+        if load.duration is None:
+            raise SceneError(f'--boundary: the load is no pulse; its signal is "{load.signal}", without a duration')
+        return load, amplitude, duration
+
+    def _critical(self, records: Mapping[str, Row]) -> list[dict[str, float]]:
+        """Return the critical pulses by duration; none at durations whose runs stay below the limit.
+
+        A critical pulse has its ``duration`` [s], its ``peak``, in the load's unit, and its ``velocity_change``, the
+        integral of the load.
+        """
+        (load, amplitude, duration), (metric, limit), found = self._pulse(), self._limit, []
+        known = [row for row in self.rows(records) if row[metric] is not None]
+        for length in sorted({row[duration] for row in known}):
+            pairs = sorted((abs(row[amplitude]), abs(row[metric])) for row in known if row[duration] == length)
+            peaks, values = np.array([(0.0, 0.0), *pairs]).T
+            if k := int(np.argmax(values >= limit)):
+                peak = float(np.interp(limit, values[k - 1 : k + 1], peaks[k - 1 : k + 1]))
+                pulse = load.model_copy(update={"amplitude": 1.0, "duration": length, "start": 0.0})
+                mean = float(pulse.value((np.arange(_POINTS) + 0.5) * length / _POINTS).mean())
+                found.append({"duration": length, "velocity_change": peak * mean * length, "peak": peak})
+        return found
 
 
 def rows(directory: str | Path) -> dict[str, list[Any]]:
@@ -151,60 +189,6 @@ def _labelled(axis: Axis) -> str:
     table, _, key = axis.name.rpartition(".")
     unit = unit_of(table, key)
     return f"{axis.name} [{unit}]" if unit != "–" else axis.name
-
-
-# -- damage boundary --------------------------------------------------------------------------------------------------
-
-
-def limit_of(text: str, own: Sequence[str] = ()) -> tuple[str, float]:
-    """Read ``METRIC=LIMIT``, what must not be reached, the metric being one of ``own`` or known.
-
-    Raises SceneError for anything else.
-    """
-    metric, _, value = text.rpartition("=")
-    try:
-        limit = float(value)
-    except ValueError:
-        limit = 0.0
-    if not limit > 0.0:
-        raise SceneError(f"--boundary {text}: must be METRIC=LIMIT with a limit above 0, as in max_clamp_moment=0.3")
-    return metric.strip() if metric.strip() in own else named(metric.strip())[0], limit
-
-
-def pulse_axes(scene: Scene, axes: Sequence[Axis]) -> tuple[Load, str, str]:
-    """Return the pulse that a sweep varies, and the names of the axes of its amplitude and its duration.
-
-    Raises SceneError if the sweep is over anything else.
-    """
-    names = {axis.name for axis in axes}
-    table = next(iter(names)).rpartition(".")[0]
-    amplitude, duration = f"{table}.amplitude", f"{table}.duration"
-    if names != {amplitude, duration} or not table.startswith("loads."):
-        raise SceneError("--boundary: takes --vary loads.0.amplitude=… and --vary loads.0.duration=… of one pulse")
-    load = scene.loads[int(table.partition(".")[2])]
-    if load.duration is None:
-        raise SceneError(f'--boundary: the load is no pulse; its signal is "{load.signal}", without a duration')
-    return load, amplitude, duration
-
-
-def boundary(
-    load: Load, amplitude: str, duration: str, rows: Iterable[Mapping[str, Any]], metric: str, limit: float
-) -> list[dict[str, float]]:
-    """Return the critical pulses by duration; none at durations whose runs stay below the limit.
-
-    ``rows`` are those of the sweep, ``amplitude`` and ``duration`` the names of its axes. A critical pulse has its
-    ``duration`` [s], its ``peak``, in the load's unit, and its ``velocity_change``, the integral of the load.
-    """
-    known, found = [row for row in rows if row[metric] is not None], []
-    for length in sorted({row[duration] for row in known}):
-        pairs = sorted((abs(row[amplitude]), abs(row[metric])) for row in known if row[duration] == length)
-        peaks, values = np.array([(0.0, 0.0), *pairs]).T
-        if k := int(np.argmax(values >= limit)):
-            peak = float(np.interp(limit, values[k - 1 : k + 1], peaks[k - 1 : k + 1]))
-            pulse = load.model_copy(update={"amplitude": 1.0, "duration": length, "start": 0.0})
-            mean = float(pulse.value((np.arange(_POINTS) + 0.5) * length / _POINTS).mean())
-            found.append({"duration": length, "velocity_change": peak * mean * length, "peak": peak})
-    return found
 
 
 def _told(found: Sequence[Mapping[str, float]], limit: str) -> list[str]:
