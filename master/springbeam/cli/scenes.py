@@ -184,9 +184,6 @@ def _lines(p: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name in ("spring", "contact"):
         if p[f"{name}_frequency"] is not None:
             yield name, f"ωH = {p[f'{name}_frequency'] * H:.3g} at its stiffest"
-    if (gain := p["displacement_gain"]) is not None:
-        verdict = "diverges" if gain > 1.0 else "converges"
-        yield "exchange", f"of displacement against force: gain 2m/(ZH) = {gain:.3g}, {verdict}"
 
 
 def _listed(*told: tuple[str, float | None]) -> str:

@@ -48,76 +48,70 @@ def predict(scene: Scene) -> dict[str, Any]:
         * ``omega_1``, ``omega_max``: lowest and highest frequency kept of the beam; ``spring_frequency`` of the
           linearised spring, 0 where it does not oscillate; ``contact_frequency`` of tip and spring top on the
           linearised contact law [rad/s];
-        * ``tip_mass`` [kg]; ``impedance`` Z = √(KAG ρA) [N·s/m]; ``displacement_gain`` 2m/(ZH) of rigid laws: of an
-          exchange of displacement against force;
+        * ``tip_mass`` [kg]; ``impedance`` Z = √(KAG ρA) [N·s/m];
         * ``modes`` of the beam, ``resolved_modes`` among them, with ωH ≤ `RESOLVED`, and ``static_shapes`` that are
           kept beside them where not all modes are;
         * ``schemes``: a row each, with ``spectral_radius`` at H and ``critical_step``, the smallest unstable H [s];
         * ``auto``: the scheme that fits, which ``scheme = "auto"`` takes; ``notes``.
     """
-    H, beam = scene.coupling.H, scene.beam
+    H, beam, modal, pair = scene.coupling.H, scene.beam, None, None
+    names = ("omega_1", "omega_max", "tip_mass", "resolved_modes", "modes", "static_shapes", "contact_frequency")
+    found: dict[str, Any] = {
+        "estimates": _estimates(scene),
+        "frequencies": [],
+        "macro_step": H,
+        "threshold": THRESHOLD,
+        "spring_frequency": None if scene.spring is None else spring_frequency(scene),
+        "impedance": None if beam is None else math.sqrt(shear_stiffness(beam) * beam.density * beam.area),
+        "schemes": [],
+        "auto": None,
+    } | dict.fromkeys(names)
     notes = suspicions(scene)
     notes += [f"[{table}] is not our own body: its frequencies are not known beforehand" for table in scene.partners]
     if scene.accuracy is not None:
         notes.append(f"accuracy = {scene.accuracy:g} picks scheme and macro step by itself; this is about those given")
-    modal = None
-    names = ("omega_1", "omega_max", "tip_mass", "resolved_modes", "modes", "static_shapes")
-    of_modes: dict[str, Any] = dict.fromkeys(names)
+    rates = {f"loads.{i} turns": load.rate for i, load in enumerate(scene.loads) if load.rate * H > RESOLVED}
     if scene.massless:
         notes.append("a quasi-static beam has no inertia and no step of its own: nothing to predict")
     elif beam is not None:
         reduced = _reduced(beam)
         modal, kept = modal_beam(reduced), reduced.modes_kept
-        resolved = int(np.sum(modal.omega[:kept] * H <= RESOLVED))
+        resolved, frequencies = int(np.sum(modal.omega[:kept] * H <= RESOLVED)), modal.omega / (2.0 * math.pi)
+        ends = (float(modal.omega[0]), float(modal.omega[-1]), 1.0 / modal.inverse_tip_mass)
+        found |= dict(zip(names, (*ends, resolved, kept, len(modal.omega) - kept), strict=False))
+        found["frequencies"] = frequencies[:3].tolist()
         if reduced is not beam:
             notes.append(f"predicted with the lowest {MOST_MODES} modes of the beam")
         if beam.integrator == "generalized_alpha":
             notes.append("predicted for exact modes; generalized_alpha with rho_inf = 1 adds no energy of its own")
-        ends = (float(modal.omega[0]), float(modal.omega[-1]), 1.0 / modal.inverse_tip_mass)
-        of_modes = dict(zip(names, (*ends, resolved, kept, len(modal.omega) - kept), strict=True))
-    of_the_paper = scene.contact.algorithm
-    pair = None if modal is None or of_the_paper else linear_pair(scene, modal)
-    schemes: list[dict[str, Any]] = []
-    if of_the_paper:
+        if not resolved:
+            rates["the beam's lowest mode turns"] = ends[0]
+    if scene.contact.algorithm:
         notes.append("Algorithm 1 (law = 'paper') overwrites the tip's position: no matrix of this kind")
-    elif pair is None and not notes:
-        notes.append("nothing to couple: a scene with one body and no stop under its tip")
-    elif pair is not None:
-        schemes = [
+    elif modal is not None:
+        pair = linear_pair(scene, modal)
+    if pair is not None:
+        found["contact_frequency"] = pair.contact_frequency if pair.soft else None
+        found["auto"] = choice(scene)
+        found["schemes"] = [
             {"scheme": scheme, "degree": degree, "spectral_radius": spectral_radius(pair, scheme, degree, H),
              "critical_step": critical_step(pair, scheme, degree)}
             for scheme, degree in (SOFT if pair.soft else RIGID)
             if beam is None or beam.integrator == "modal" or degree == 0
         ]  # fmt: skip
-        if any(s["scheme"] == "hermite" and s["critical_step"] is not None for s in schemes):
+        if any(s["scheme"] == "hermite" and s["critical_step"] is not None for s in found["schemes"]):
             notes.append(
                 "hermite is unstable in bands of H: some narrower than 3 % may lie below its critical H, none has been "
                 f"seen below ω_max H = {STABLE:g}, {STABLE / _frequencies(pair)[0]:.3g} s here"
             )
-    rates = {f"loads.{i} turns": load.rate for i, load in enumerate(scene.loads) if load.rate * H > RESOLVED}
-    if modal is not None and not of_modes["resolved_modes"]:
-        rates["the beam's lowest mode turns"] = of_modes["omega_1"]
+    elif not notes:
+        notes.append("nothing to couple: a scene with one body and no stop under its tip")
     notes += [
         f"the motion is not resolved: {what} {rate * H:.3g} rad in a macro step; H <= {RESOLVED / rate:.3g} s resolves "
         "it"
         for what, rate in rates.items()
     ]
-    Z = None if beam is None else math.sqrt(shear_stiffness(beam) * beam.density * beam.area)
-    exchanged = Z is not None and scene.spring is not None and not (pair and pair.soft)
-    return {
-        "estimates": _estimates(scene),
-        "frequencies": [] if modal is None else (modal.omega[:3] / (2.0 * math.pi)).tolist(),
-        "macro_step": H,
-        "threshold": THRESHOLD,
-        **of_modes,
-        "spring_frequency": None if scene.spring is None else spring_frequency(scene),
-        "contact_frequency": None if pair is None or not pair.soft else pair.contact_frequency,
-        "impedance": Z,
-        "displacement_gain": 2.0 * scene.spring.mass / (Z * H) if exchanged and Z and scene.spring else None,
-        "schemes": schemes,
-        "auto": choice(scene) if schemes else None,
-        "notes": notes,
-    }
+    return found | {"notes": notes}
 
 
 def _estimates(scene: Scene) -> dict[str, float | None]:
