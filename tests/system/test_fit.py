@@ -66,10 +66,10 @@ def test_residuals_are_those_of_each_curve(tmp_path):
 BAD = {
     "time,y\n0,1": "1 lines with numbers; there must be two at least",
     "0,1\n1,2": "the first line must name the columns",
-    "time,y\n0,1\n0,2": "times must increase",
+    "time,y\n0,1\n0,2": "is not after that of the line before",
     "time,y\n0,1\n1,x": "line 3, column y: 'x' is not a finite number",
     "time,y\n0,1\n1,nan": "line 3, column y: 'nan' is not a finite number",
-    "time,y\n0,1\n1,2,3": "line 3: 3 columns; the first line has 2",
+    "time,y\n0,1\n1,2,3": "line 3: 3 columns; there must be as many as",
     "time,w\n0,1\n1,2": "no column is called as one of the run (time, y",
     "time,y [kg]\n0,1\n1,2": "column y: [kg] is no unit of what a run has in m",
     "time,y [wurst]\n0,1\n1,2": "[wurst] is no unit",

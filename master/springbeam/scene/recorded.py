@@ -24,37 +24,31 @@ class Recorded:
     """The columns of a file. Raises ValueError, which names line and column, or OSError."""
 
     def __init__(self, path: Path) -> None:
-        try:
-            lines = enumerate(path.read_text(encoding="utf-8-sig").splitlines(), 1)
-        except UnicodeDecodeError as error:
-            raise ValueError(f"not a text in UTF-8: {error.reason} at byte {error.start}; save it as that") from error
+        lines = enumerate(path.read_text(encoding="utf-8-sig").splitlines(), 1)
         kept = [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
         separator = max(",;\t", key=kept[0][1].count) if kept else ","
-        self._rows = [(number, next(csv.reader([line], delimiter=separator))) for number, line in kept]
-        first = self._rows[0][1] if kept else []
+        rows = [(number, next(csv.reader([line], delimiter=separator))) for number, line in kept]
+        first = rows[0][1] if rows else []
         named = bool(first) and isnan(_number(first[0]))
         #: Names of the columns, none where the file has none.
         self.names = [_NAME_AND_UNIT.sub(r"\1", cell) for cell in first if named]
         #: Their units, "" where the file has none.
         self.units = [_NAME_AND_UNIT.sub(r"\2\3", cell) if named else "" for cell in first]
         self._labels = self.names or [str(k + 1) for k in range(len(first))]
-        del self._rows[:named]
-        if len(first) == 1:
-            raise ValueError(f"line {kept[0][0]}: one column; there must be two at least, with , or ; or a tab between")
+        self._rows = rows[named:]
+        for number, row in rows:
+            if len(row) != max(2, len(first)):
+                what = "as many as the first line, and two at least, with , or ; or a tab between"
+                raise ValueError(f"line {number}: {len(row)} columns; there must be {what}")
         if len(self._rows) < 2:
             raise ValueError(f"{len(self._rows)} lines with numbers; there must be two at least")
-        for number, row in self._rows:
-            if len(row) != len(first):
-                raise ValueError(f"line {number}: {len(row)} columns; the first line has {len(first)}")
 
     def times(self) -> np.ndarray:
         """Return the first column [s], ascending, shape (n,)."""
         times = self.column(0, "s")
         if not (rising := np.diff(times) > 0.0).all():
-            (_, before), (number, after) = self._rows[(row := int(np.argmin(rising))) : row + 2]
-            raise ValueError(
-                f"line {number}: time {after[0].strip()} comes after {before[0].strip()}; times must increase"
-            )
+            number, row = self._rows[1 + int(np.argmin(rising))]
+            raise ValueError(f"line {number}: time {row[0].strip()} is not after that of the line before")
         return times
 
     def column(self, k: int, wanted: str = "") -> np.ndarray:
@@ -64,10 +58,7 @@ class Recorded:
             number, row = self._rows[int(np.argmin(finite))]
             remedy = "decimals have a point" if "," in row[k] else "leave the line out, or begin it with #"
             raise ValueError(f"line {number}, {label}: {row[k].strip()[:40]!r} is not a finite number; {remedy}")
-        try:
-            return values * _factor(self.units[k], wanted)
-        except ValueError as error:
-            raise ValueError(f"{label}: [{self.units[k]}] is no unit of what a run has in {wanted}: {error}") from error
+        return values * _factor(self.units[k], wanted, label)
 
 
 def _number(text: str) -> float:
@@ -77,7 +68,7 @@ def _number(text: str) -> float:
         return nan
 
 
-def _factor(unit: str, wanted: str) -> float:
+def _factor(unit: str, wanted: str, label: str) -> float:
     """Return what a value in ``unit`` is multiplied by to have it in ``wanted``; 1 where one of them is not known."""
     if not unit or wanted in ("", unit):
         return 1.0
@@ -88,4 +79,4 @@ def _factor(unit: str, wanted: str) -> float:
     try:
         return float(Quantity(1.0, unit.replace("·", "*")).to(wanted.replace("·", "*")).magnitude)
     except (PintError, AssertionError) as error:
-        raise ValueError(str(error)) from error
+        raise ValueError(f"{label}: [{unit}] is no unit of what a run has in {wanted}: {error}") from error

@@ -87,8 +87,11 @@ def lowest_frequency(beam: Beam) -> float:
 
 def load_shape(beam: Beam, fractions: np.ndarray) -> np.ndarray:
     """Return the deflection [m] at x = ``fractions``·L under the loads."""
-    ends = (beam.length * (1.0 - fractions)).tolist()
-    return np.array([_work(beam, end, partial(_unit_force, end)) for end in ends])
+
+    def under(end: float) -> float:
+        return _work(beam, end, lambda t: (np.ones_like(t), t - end))  # the forces of 1 N at the distance ``end``
+
+    return np.array([under(end) for end in (beam.length * (1.0 - fractions)).tolist()])
 
 
 def tip_load_deflection(beam: Beam) -> float:
@@ -107,11 +110,6 @@ def load_forces(beam: Beam, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     s = np.minimum(t, h)
     force = c * (s - s**2 / (2.0 * h))
     return f * t + force, f * t**2 / 2.0 + c * (s**2 / 2.0 - s**3 / (6.0 * h)) + c * h / 2.0 * (t - s)
-
-
-def _unit_force(end: float, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (q, m) of 1 N at the distance ``end`` from the tip, at distances ``t`` beyond it."""
-    return np.ones_like(t), t - end
 
 
 def _work(beam: Beam, start: float, virtual: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> float:

@@ -197,24 +197,22 @@ SUSPICIOUS_LOADS = (
 
 def _counts(
     places: str,
-    counts: Callable[[Scene], bool],
+    counts: Callable[[Any], bool],
     where: str,
     numbers: Callable[[Scene], Mapping[str, Any]] = lambda s: {},
 ) -> list[Rule]:
     """Return rules for keys that are given, and not as their default, in scenes where they do not count."""
 
-    def rule(place: str) -> Rule:
-        table, _, key = place.partition(".")
-        model = TABLES[table]
+    def rule(table: str, key: str) -> Rule:
+        default = TABLES[table].model_fields[key].default
 
-        def given(scene: Scene) -> bool:
+        def idle(scene: Scene) -> bool:
             content = scene.under(table)
-            return type(content) is model and getattr(content, key) != model.model_fields[key].default
+            return type(content) is TABLES[table] and getattr(content, key) != default and not counts(scene)
 
-        text = f"{{{place}}}: plays no part here; {where}"
-        return Rule(lambda s: given(s) and not counts(s), text, numbers)
+        return Rule(idle, f"{{{table}.{key}}}: plays no part here; {where}", numbers)
 
-    return [rule(place) for place in places.split()]
+    return [rule(*place.split(".")) for place in places.split()]
 
 
 def _of_law(key: str) -> list[Rule]:
@@ -229,11 +227,6 @@ def _of_law(key: str) -> list[Rule]:
 
 def _dynamic(scene: Scene) -> bool:
     return scene.beam is not None and not scene.massless
-
-
-def _integrator(scene: Scene) -> str | None:
-    """Return the integrator of our beam, ``None`` if nothing is integrated."""
-    return scene.beam.integrator if scene.beam is not None and not scene.massless else None
 
 
 #: Where the keys count that do not always. ``[[loads]]`` refuses such keys itself; here they are told, so that a key
@@ -256,12 +249,12 @@ EFFECTS: tuple[Rule, ...] = (
     ),
     *_counts(
         "beam.n_modes",
-        lambda s: _integrator(s) == "modal" and not s.contact.algorithm,
+        lambda s: _dynamic(s) and s.beam.integrator == "modal" and not s.contact.algorithm,
         'it counts with fidelity = "dynamic" and integrator = "modal", other integrators keep all modes',
     ),
     *_counts(
         "beam.rho_inf",
-        lambda s: _integrator(s) == "generalized_alpha",
+        lambda s: _dynamic(s) and s.beam.integrator == "generalized_alpha",
         'it counts with fidelity = "dynamic" and integrator = "generalized_alpha"',
     ),
     *_counts("stop.restitution", lambda s: not s.contact.algorithm, "Algorithm 1 has no loss on the foundation"),

@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.signal import cont2discrete, lfilter
 
 from ..results.trajectory import Trajectory
 from ..scene import SceneError
@@ -61,23 +61,18 @@ def shock_spectrum(velocity: np.ndarray, step: float, frequencies: np.ndarray, q
         raise SceneError(f"quality {quality:g}: must be above 0.5, the quality of an oscillator that does not swing")
     if not ((frequencies > 0.0) & (frequencies * step < 0.5)).all():
         raise SceneError(f"frequencies: must lie between 0 and half the sampling rate, {0.5 / step:g} Hz")
-    acceleration = np.diff(velocity) / step
-    answers = (_answer(acceleration, step, f, quality) for f in frequencies)
+    answers = (_answer(velocity, step, f, quality) for f in frequencies)
     highest, lowest = np.maximum([(answer.max(), -answer.min()) for answer in answers], 0.0).T
     return ShockSpectrum(frequencies, np.maximum(highest, lowest), highest, lowest)
 
 
-def _answer(acceleration: np.ndarray, step: float, frequency: float, quality: float) -> np.ndarray:
+def _answer(velocity: np.ndarray, step: float, frequency: float, quality: float) -> np.ndarray:
     """Return ẍ, up to one period after the base has come to its last velocity."""
-    omega, zeta = 2.0 * np.pi * frequency, 0.5 / quality
-    swing = omega * np.sqrt(1.0 - zeta**2)
-    decay = np.exp(-zeta * omega * step)
-    cosine, sine = decay * np.cos(swing * step), decay * np.sin(swing * step)
-    held = cosine + zeta * omega / swing * sine
-    after = np.zeros(int(np.ceil(1.0 / (frequency * step))) + 1)
-    denominator = (1.0, -2.0 * cosine, decay**2)
-    numerator = (1.0 + held - 2.0 * cosine, decay**2 - held)
-    return np.asarray(lfilter(numerator, denominator, np.concatenate([acceleration, after])))
+    omega = 2.0 * np.pi * frequency
+    after = np.full(int(np.ceil(1.0 / (frequency * step))) + 1, velocity[-1])
+    of_velocity = (omega / quality, omega**2, 0.0), (1.0, omega / quality, omega**2)  # s H(s)
+    numerator, denominator, _ = cont2discrete(of_velocity, step, "foh")
+    return np.asarray(lfilter(numerator[0], denominator, np.concatenate([velocity, after]) - velocity[0]))
 
 
 def shock_of_run(run: Trajectory, end: str, frequencies: np.ndarray, quality: float = 10.0) -> ShockSpectrum:
