@@ -5,8 +5,7 @@ from bodies import DuffingBody, Upper
 
 from springbeam.bodies.protocol import NO_FORCE, Motion
 from springbeam.coupling.protocol import Step
-from springbeam.run.local_error import LocalError
-from springbeam.run.macro_steps import AdaptiveSteps
+from springbeam.run.adaptive import AdaptiveSteps
 from springbeam.run.stepping import Pair
 from springbeam.scene import load_scene, with_changes
 
@@ -21,4 +20,4 @@ def test_no_more_than_rounding_is_forgiven(share, holds):
     # In a step of 1 s from rest to rest: ∫ of the cubic is the mean of its ends, ∫∫ (7 f0 + 3 f1)/20.
     end = Motion(1.0 + way, 0.0, 1.0 + way / 2.0 + beside, 0.5 + 0.15 * way + beside / 2.0)
     step = Step(0.0, 1.0, NO_FORCE, NO_FORCE, (start, rest), (end, rest))
-    assert LocalError(scene, pair, AdaptiveSteps(0.0, 9.0)).holds(pair.initial_state(0.0), step, "") is holds
+    assert AdaptiveSteps(scene, pair, 0.0, 9.0).holds(pair.initial_state(0.0), step, "") is holds

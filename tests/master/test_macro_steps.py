@@ -4,15 +4,21 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from bodies import DuffingBody, Upper
 
 from springbeam import Motion, RunStopped
 from springbeam.bodies import force
 from springbeam.coupling.hermite import gap_inside
-from springbeam.run.crowd import count_crowd
-from springbeam.run.macro_steps import AdaptiveSteps, MacroGrid
-from springbeam.run.stepping import State
+from springbeam.run.adaptive import AdaptiveSteps
+from springbeam.run.macro_steps import MacroGrid
+from springbeam.run.stepping import Pair, State
+from springbeam.scene import load_scene
 
 LENGTH = 3.0
+
+
+def adaptive():
+    return AdaptiveSteps(load_scene("soft"), Pair(load_scene("soft"), Upper(1.0), DuffingBody(1.0)), 0.0, LENGTH)
 
 
 def after(steps, *judgements):
@@ -48,7 +54,7 @@ def test_the_grid_ends_where_the_run_does(end):
 @pytest.mark.parametrize("order", [2, 5])
 def test_the_next_size_has_the_error_of_the_tolerance(order):
     """error = (size/s)^order with s = 0.9⁻¹ times a size there is: from either side the steps settle on that size."""
-    steps = AdaptiveSteps(0.0, LENGTH)
+    steps = adaptive()
     fitting = LENGTH * 2.0 ** (-37 / 4)
     for _ in range(40):
         after(steps, ((0.9 * 1.001 * steps.size / fitting) ** order, order))
@@ -62,7 +68,7 @@ def test_the_next_size_has_the_error_of_the_tolerance(order):
 
 
 def test_a_step_after_a_rejected_one_does_not_grow():
-    steps = AdaptiveSteps(0.0, LENGTH)
+    steps = adaptive()
     rejected = after(steps, (1.1, 4))
     assert rejected < LENGTH * 2.0**-14
     assert after(steps, (1e-9, 4)) == rejected
@@ -73,7 +79,7 @@ def test_a_step_after_a_rejected_one_does_not_grow():
 @pytest.mark.parametrize(("share", "error", "change"), [(0.5, 0.9, 1.0), (0.5, 1e-9, 2.0), (0.2, 1e-30, 1.0)])
 def test_a_step_that_a_kink_has_cut_makes_the_next_one_longer_or_leaves_it(share, error, change):
     """A cut step that was much shorter than a whole one tells nothing of these."""
-    steps = AdaptiveSteps(0.0, LENGTH)
+    steps = adaptive()
     size = steps.size
     assert steps.judge(share * size, error, 4, to_kink=True)
     assert steps.size == pytest.approx(change * size, rel=1e-9)
@@ -81,7 +87,7 @@ def test_a_step_that_a_kink_has_cut_makes_the_next_one_longer_or_leaves_it(share
 
 def test_the_last_step_ends_the_run():
     """A remainder of up to a quarter more is taken at once, and none is ever shorter than a quarter of the size."""
-    steps = AdaptiveSteps(0.0, LENGTH)
+    steps = adaptive()
     size = steps.size
     assert steps.next(LENGTH - 1.2 * size) == (LENGTH, pytest.approx(1.2 * size, rel=1e-9))
     assert steps.next(LENGTH - 1.3 * size) == (pytest.approx(LENGTH - 0.3 * size), size)
@@ -114,6 +120,6 @@ def test_events_that_crowd_stop_the_run(apart, most, words):
     H = 1e-3
     state = State(0.0, (Motion(0.0, 0.0, 0.0, 0.0),) * 2)
     for k in range(most):
-        count_crowd(state, apart * k * H, apart * H, H)
+        state.count_cut(apart * k * H, apart * H, H)
     with pytest.raises(RunStopped, match=words):
-        count_crowd(state, apart * most * H, apart * H, H)
+        state.count_cut(apart * most * H, apart * H, H)

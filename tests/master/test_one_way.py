@@ -11,7 +11,7 @@ from springbeam.coupling.one_way import OneWay
 from springbeam.coupling.protocol import NotConverged, Step
 from springbeam.coupling.soft import SoftSolver
 from springbeam.results.steps import STEP
-from springbeam.run.neglect import Past, neglected
+from springbeam.run.neglect import Neglect
 
 LAW = (100.0, 1.0)
 
@@ -95,20 +95,20 @@ def steps_under(forces, depths):
 def test_what_is_neglected_is_twice_the_variation_of_the_force_over_the_stiffness():
     """In one look or in several."""
     steps = steps_under([(c, 0.0, 0.0) for c in (2.0, 5.0, 1.0, 0.0)], [0.02, 0.05, 0.01, -0.2])
-    bound = neglected(steps, 50.0, Past())
-    assert bound.motion == pytest.approx(2.0 * np.cumsum([2.0, 3.0, 4.0, 1.0]) / 50.0)
-    assert bound.share == pytest.approx(bound.motion / [0.02, 0.05, 0.05, 0.05])
-    past, event = Past(), np.zeros(1, STEP)  # a row that ends no step changes nothing
+    motion, share = Neglect(scene().coupling, 50.0).by(steps)
+    assert motion == pytest.approx(2.0 * np.cumsum([2.0, 3.0, 4.0, 1.0]) / 50.0)
+    assert share == pytest.approx(motion / [0.02, 0.05, 0.05, 0.05])
+    in_parts, event = Neglect(scene().coupling, 50.0), np.zeros(1, STEP)  # a row that ends no step changes nothing
     for part in (steps[:1], event, steps[1:3], steps[3:]):
-        motion, _, past = neglected(part, 50.0, past)
-    assert motion[-1] == bound.motion[-1]
-    assert past == bound.past
+        last, beside = in_parts.by(part)
+    assert (last[-1], beside[-1]) == (motion[-1], share[-1])
 
 
 def test_the_bound_counts_the_turns_of_a_polynomial_force():
     """∫|Ċ| of 1 − 6τ + 6τ² over [0, 1]: from 1 down to −1/2 and up again, 3; the jump to its start, 1."""
     for force, expected in (((1.0, 0.0, 0.0), 1.0), ((1.0, -6.0, 0.0), 7.0), ((1.0, -6.0, 12.0), 4.0)):
-        assert neglected(steps_under([force], [0.0]), 2.0, Past()).motion[0] == pytest.approx(expected)
+        motion, _ = Neglect(scene().coupling, 2.0).by(steps_under([force], [0.0]))
+        assert motion[0] == pytest.approx(expected)
 
 
 def test_a_run_stops_when_the_bound_passes_the_tolerance():

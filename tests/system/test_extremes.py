@@ -45,7 +45,7 @@ def test_bodies_neither_overlap_nor_part_and_energy_is_kept(name):
 
 def test_bouncing_without_end_stops_by_name(monkeypatch):
     """A damped beam on a lossless stop: its rebounds shrink, but never by enough to be the last."""
-    monkeypatch.setattr("springbeam.run.crowd._MAX_IN_STEP", 300)
+    monkeypatch.setattr("springbeam.run.stepping._MAX_IN_STEP", 300)
     beam = {"density": 672.6, "area": 0.07, "shear_modulus": 53.6, "alpha_b": 1.0, "n_elements": 6}
     tables = {
         "time": {"t_end": 1.5},

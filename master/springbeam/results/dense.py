@@ -21,14 +21,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from math import comb
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
 from ..scene import Scene
 from .columns import columns
-from .extremes import Extremes
 from .paths import Path
 from .steps import joined
 from .trajectory import Event, Trajectory
@@ -45,6 +45,18 @@ MOTION = ("u_tip", "v_tip", "y", "z", "gap")
 _TOGETHER = 65536
 #: Times closer than this share are one.
 _SAME = 1e-12
+#: Degree of the polynomials.
+_DEGREE = 5
+#: From powers of s in [0, 1] to Bernstein coefficients: these enclose the polynomial, the outer two are its end values.
+_BERNSTEIN = np.array(
+    [[comb(i, k) / comb(_DEGREE, k) if k <= i else 0.0 for k in range(_DEGREE + 1)] for i in range(_DEGREE + 1)]
+)
+#: Bernstein coefficients on [0, ½] from those on [0, 1], by de Casteljau; turned about, those on [½, 1].
+_FIRST_HALF = np.array(
+    [[comb(i, k) / 2.0**i if k <= i else 0.0 for k in range(_DEGREE + 1)] for i in range(_DEGREE + 1)]
+)
+#: Values that differ by less than this share of the largest one are alike: well above what halving rounds off.
+_ALIKE = 1e-13
 
 
 def at(run: Trajectory, times: Any) -> Trajectory:
@@ -90,19 +102,38 @@ def at_multiples(run: Trajectory, interval: float) -> dict[str, np.ndarray]:
     return rows_at(run, np.clip(times, run.time[0], run.time[-1])).columns
 
 
+class Extremes(NamedTuple):
+    """Lowest and highest value of a column, and their times [s]."""
+
+    lowest: float
+    lowest_time: float
+    highest: float
+    highest_time: float
+
+    @classmethod
+    def of_rows(cls, times: np.ndarray, values: np.ndarray) -> Extremes:
+        """Return those of ``values`` at ``times`` [s], shapes (n,)."""
+        low, high = int(np.argmin(values)), int(np.argmax(values))
+        return cls(float(values[low]), float(times[low]), float(values[high]), float(times[high]))
+
+
 def extremes(scene: Scene, steps: np.ndarray, name: str) -> Extremes:
     """Return the lowest and the highest value of the motion on the curve that `at` follows.
 
     ``name`` is one of `MOTION`; ``steps`` are all records of a run of ``scene``.
     """
     parts = [steps[f"{part}_after"] for part in (("u_tip", "y") if name == "gap" else (name,))]
-    found = Extremes.of_rows(steps["time"], parts[0] - parts[1] if name == "gap" else parts[0])
+    found = list(Extremes.of_rows(steps["time"], parts[0] - parts[1] if name == "gap" else parts[0]))
     made = np.flatnonzero(steps["size"] > 0.0)
     for begin in range(0, len(made), _TOGETHER):
         after = made[begin : begin + _TOGETHER]
         before, size = steps[after - 1], steps["size"][after]
-        found = found.beside(motion(scene, before, steps[after])[name], before["time"], size)
-    return found
+        powers = motion(scene, before, steps[after])[name]
+        for place, sign in ((0, 1.0), (2, -1.0)):
+            value, step, share = _lowest(sign * powers, below=sign * found[place])
+            if step >= 0:
+                found[place : place + 2] = sign * value, float(before["time"][step] + share * size[step])
+    return Extremes(*found)
 
 
 def motion(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
@@ -176,3 +207,32 @@ def _impulses(after: np.ndarray, events: Sequence[Event]) -> np.ndarray:
     """Return the impulse on the tip by the last event up to the end of each step [N·s], 0 before the first."""
     impulses = np.array([0.0, *(event.impulse_contact for event in events)])
     return np.asarray(impulses[after["events"].astype(int)])
+
+
+def _lowest(powers: np.ndarray, below: float) -> tuple[float, int, float]:
+    """Return the lowest value on [0, 1] of any of n polynomials, which one has it, and where.
+
+    The number is -1 if none is lower than ``below``, but for rounding. Steps are halved as long as their Bernstein
+    coefficients leave room for a value lower than the lowest one found.
+
+    Parameters
+    ----------
+    powers
+        Coefficients of 1, s … s⁵, shape (6, n).
+    below
+        A value that is known.
+    """
+    best, step, share = below, -1, 0.0
+    coefficients = _BERNSTEIN @ powers
+    number, begin = np.arange(coefficients.shape[1]), np.zeros(coefficients.shape[1])
+    width, tolerance = 1.0, _ALIKE * float(np.abs(coefficients).max(initial=0.0))
+    while number.size:
+        ends = coefficients[-1]  # where it begins another one ends, or there is a row
+        if ends.min() < best:
+            at = int(np.argmin(ends))
+            best, step, share = float(ends[at]), int(number[at]), float(begin[at]) + width
+        room = coefficients.min(axis=0) < best - tolerance
+        coefficients, number, begin, width = coefficients[:, room], number[room], begin[room], 0.5 * width
+        coefficients = np.hstack([_FIRST_HALF @ coefficients, (_FIRST_HALF @ coefficients[::-1])[::-1]])
+        number, begin = np.tile(number, 2), np.concatenate([begin, begin + width])
+    return (best, step, share) if best < below - tolerance else (below, -1, 0.0)

@@ -2,6 +2,6 @@
 
 Imports everything below: `coupling`, `contact`, `bodies`, `results`, `scene`. ``runner`` makes the parts of a scene and
 runs them, ``master`` is the loop (start there), ``stepping`` one step and the state of the run, ``detection`` the event
-that ends it, ``macro_steps`` and ``local_error`` its size, ``crowd`` when events are too many, ``log`` what is handed
-over, ``ledger`` what judges the energy, ``checkpoint`` how a killed run goes on.
+that ends it, ``macro_steps`` and ``adaptive`` its size, ``log`` what is handed over, ``ledger`` what judges the energy,
+``checkpoint`` how a killed run goes on.
 """

@@ -23,7 +23,8 @@ from ..coupling.protocol import Step
 from ..results.paths import Path, Sample
 from ..results.trajectory import Event, EventKind
 from ..scene import Scene
-from .macro_steps import AdaptiveSteps, MacroGrid
+from .adaptive import AdaptiveSteps
+from .macro_steps import MacroGrid
 from .separation import Separation
 from .stepping import Pair, State
 

@@ -33,10 +33,6 @@ def bounds(scene: Scene) -> tuple[float, float]:
     return min(max(EXACT, _TOLERANCES * tolerance), APPROXIMATE), APPROXIMATE
 
 
-#: A record that is wrong, how many before it or with it are kept, and the cause that stops the run there.
-Wrong = tuple[int, int, str]
-
-
 class Errors(NamedTuple):
     """By how much the energy is off at each of some records."""
 
@@ -74,22 +70,26 @@ class Balance:
             self._warns = self._stops = inf
         self._scale = 0.0  #: the largest energy so far [J]
 
-    def check(self, steps: np.ndarray, first: np.ndarray) -> Wrong | None:
-        """Return at which of the next records too much of the energy has changed; parameters as of `errors`."""
+    def check(self, steps: np.ndarray, first: np.ndarray) -> tuple[int, str] | None:
+        """Return at which of the next records too much of the energy has changed, and why; see `Log`."""
         found = errors(self._scene, steps, first, self._scale, of_interface=True)
         self._scale = float(found.scale[-1])
         wrong = self._wrong(found) > self._stops
         row = int(np.argmax(wrong))
-        return (row, row + 1, self._cause(float(abs(found.share[row])), steps)) if wrong[row] else None
+        return (row, self._cause(float(abs(found.share[row])), steps)) if wrong[row] else None
 
     def _wrong(self, found: Errors) -> np.ndarray:
         """Return the share of the energy that has changed; what numerical damping takes is not an error."""
         return found.share if self._numerically_damped else np.abs(found.share)
 
-    def report(self, steps: np.ndarray) -> Report:
-        """Return what all records of the run, shape (n,), say of its energy."""
+    def report(self, steps: np.ndarray) -> tuple[dict[str, Any], list[str], bool]:
+        """Return what all records of the run, shape (n,), say of its energy.
+
+        That is residuals and what bodies and contact law have dissipated [J], warnings, and whether so much has changed
+        that the motion is in doubt.
+        """
         if not len(steps):
-            return Report({"max_energy_residual": 0.0, "max_energy_residual_joule": 0.0}, [], False)
+            return {"max_energy_residual": 0.0, "max_energy_residual_joule": 0.0}, [], False
         own, judged = (errors(self._scene, steps, steps[:1], 0.0, of_interface=judged) for judged in (False, True))
         of_own, of_judged = (float(np.abs(found.share).max()) for found in (own, judged))
         last = steps[-1]
@@ -111,7 +111,7 @@ class Balance:
                 f"the energies that the FMUs tell are off by {100.0 * of_own:.2g} %, by their own "
                 f"solvers: the coupling has kept those of the interface to {of_judged:.1e}"
             )
-        return Report(summary, warnings, bool(self._wrong(judged).max() > self._warns))
+        return summary, warnings, bool(self._wrong(judged).max() > self._warns)
 
     def _cause(self, share: float, steps: np.ndarray) -> str:
         """Return in words why a ``share`` of the energy has changed, and what would help."""
@@ -131,11 +131,3 @@ class Balance:
             remedies.append("the results are not to be trusted; try another coupling.macro_step")
         percent = 100.0 * share
         return f"{' with '.join(causes)} {CHANGED} by {percent:.2g} %: {'; '.join(remedies)}"
-
-
-class Report(NamedTuple):
-    """What the energy of a run amounts to."""
-
-    summary: dict[str, Any]  #: residuals, and what bodies and contact law have dissipated [J]
-    warnings: list[str]
-    changed: bool  #: whether so much has changed that the motion is in doubt

@@ -12,20 +12,20 @@ from ..results.recording import Recorder
 from ..results.steps import STEP
 from ..results.trajectory import SHAPE_COLUMNS, Event
 from ..scene import Scene
-from .ledger import Wrong
 from .outcome import RunStopped
 
 #: Most records that are checked and handed on together, and the longest that one waits for it [s].
 TOGETHER, _WAITS = 1024, 1.0
-#: Judges the next records of a run, shape (n,), beside its first one, shape (1,).
-Check = Callable[[np.ndarray, np.ndarray], Wrong | None]
+#: Judges the next records of a run, shape (n,), beside its first one, shape (1,): returns the number of the first that
+#: is wrong, and the cause that stops the run there, or ``None``.
+Check = Callable[[np.ndarray, np.ndarray], tuple[int, str] | None]
 
 
 class Log:
-    """What a run says of its steps, on its way to ``recorder``; ``checks`` judge the records beside the log."""
+    """What a run says of its steps, on its way to ``recorder``; ``checks`` judge records whose numbers are finite."""
 
     def __init__(self, scene: Scene, recorder: Recorder, *checks: Check) -> None:
-        self._scene, self._recorder, self._checks = scene, recorder, (self._finite, *checks)
+        self._scene, self._recorder, self._checks = scene, recorder, checks
         self.events = 0  #: number of events so far
         #: What the recorder does not have yet; records are as of `springbeam.results.steps.packed`.
         self.records, self._events, self._shapes = list[bytes](), list[Event](), list[tuple[float, np.ndarray]]()
@@ -65,28 +65,24 @@ class Log:
         if wrong.size and len(steps) and wrong[0] <= steps["time"][-1]:
             steps = steps[steps["time"] <= wrong[0]]
             stopped = RunStopped("the beam's shape is not finite", float(wrong[0]))
-        last, known = (steps["time"][-1], int(steps["events"][-1])) if len(steps) else (-np.inf, self.events)
-        events = self._events[: len(self._events) - (self.events - known)] if len(steps) else []
+        last, known = (steps["time"][-1], int(steps["events"][-1])) if len(steps) else (-np.inf, 0)
+        events = self._events[: max(known - self.events + len(self._events), 0)]
         self.records, self._events, self._shapes = [], [], []
         self._recorder.keep(steps, events, shapes[finite & (shapes[:, 0] <= last)])
         if stopped is not None:
             raise stopped
 
     def _sound(self, steps: np.ndarray) -> tuple[np.ndarray, RunStopped | None]:
-        """Return the next records up to where the run has gone wrong, and how."""
+        """Return the next records up to where the run has gone wrong, and how; those not finite are left out."""
         if not self._first.size:
             self._first = steps[:1].copy()
-        stopped = None
+        stopped, time, infinite = None, steps["time"], first_not_finite(self._scene, steps, self._first)
+        if infinite is not None:
+            row, what = infinite
+            cause = f"{what} at t = {float(time[row])!r} s: not a finite number"
+            stopped, steps = RunStopped(cause, float(time[row])), steps[:row]
         for check in self._checks:
             if len(steps) and (wrong := check(steps, self._first)) is not None:
-                row, sound, cause = wrong
-                stopped = RunStopped(cause, float(steps["time"][row]))
-                steps = steps[:sound]
+                row, cause = wrong
+                stopped, steps = RunStopped(cause, float(time[row])), steps[: row + 1]
         return steps, stopped
-
-    def _finite(self, steps: np.ndarray, first: np.ndarray) -> Wrong | None:
-        found = first_not_finite(self._scene, steps, first)
-        if found is None:
-            return None
-        row, what = found
-        return row, row, f"{what} at t = {float(steps['time'][row])!r} s: not a finite number"

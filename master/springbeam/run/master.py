@@ -8,7 +8,6 @@ the run goes on from there. The records are checked a thousand at a time, or eac
 
 from __future__ import annotations
 
-from itertools import islice
 from math import inf
 from time import monotonic
 from typing import Any
@@ -30,16 +29,15 @@ from ..results.trajectory import Event, EventKind
 from ..scene import Scene
 from ..scene.automatic import with_scheme_chosen
 from ..scene.resolution import force_window, peak_force_doubt
-from .crowd import SIMULTANEOUS, count_crowd
+from .adaptive import AdaptiveSteps
 from .detection import Detector
 from .ledger import Balance
-from .local_error import LocalError
 from .log import TOGETHER, Log
-from .macro_steps import AdaptiveSteps, MacroGrid
-from .neglect import Neglect, Past, neglected
+from .macro_steps import MacroGrid
+from .neglect import Neglect
 from .observed import NOT_SHOWN, observed, why_not_resolved
 from .outcome import OVERFLOW, RunStopped, raised_here
-from .stepping import Pair, State
+from .stepping import SIMULTANEOUS, Pair, State
 
 #: A load that jumps or bends within this fraction of H has done so.
 _SAME_TIME = 1e-9
@@ -85,13 +83,10 @@ class Master(Stateful):
         admit(scene, start_time, beam, spring)
         self._pair = Pair(scene, beam, spring)
         self.state = self._pair.initial_state(start_time, contact)
-        self._steps: MacroGrid | AdaptiveSteps
-        self._error = None
+        end, self._adaptive = scene.time.t_end, None
         if scene.coupling.adaptive:
-            self._steps = AdaptiveSteps(start_time, scene.time.t_end)
-            self._error = LocalError(scene, self._pair, self._steps)
-        else:
-            self._steps = MacroGrid(start_time, scene.time.t_end, scene.coupling.H)
+            self._adaptive = AdaptiveSteps(scene, self._pair, start_time, end)
+        self._steps = self._adaptive or MacroGrid(start_time, end, scene.coupling.H)
         self._detector = Detector(scene, self._pair, self._steps, self._fastest)
         self._transitions = Transitions(
             scene,
@@ -167,7 +162,6 @@ class Master(Stateful):
         parts = {
             "run": self,
             "steps": self._steps,
-            "error": self._error,
             "transitions": self._transitions,
             "coupling": pair.joined,
             "beam": pair.beam,
@@ -183,10 +177,10 @@ class Master(Stateful):
         whole = event is None and abs(step.size - size) <= 1e-9 * steps.size
         end = target if whole else state.time + step.size
         if step.size < steps.size:
-            count_crowd(state, end, step.size, steps.size)
+            state.count_cut(end, step.size, steps.size)
         if step.size > 0.0:
-            if self._error is not None:
-                self._error.accept(step)
+            if self._adaptive is not None:
+                self._adaptive.accept(step)
             pair.joined.accept(step)
             state.accept(step, end)
             state.macro_steps += 1
@@ -214,7 +208,7 @@ class Master(Stateful):
                 if at_start is not None:
                     return Step(state.time, 0.0, state.contact, state.foundation, start, start), at_start
                 step = pair.attempt(state, size, start)
-                if self._error is None or self._error.holds(state, step, cause, to_kink=to_kink):
+                if self._adaptive is None or self._adaptive.holds(state, step, cause, to_kink=to_kink):
                     return self._detector.first_event(state, step)
                 pair.rewind()
                 size = self._steps.size
@@ -244,8 +238,8 @@ class Master(Stateful):
         # The ledger starts with the bodies as they arrive, before an impact.
         arriving = np.frombuffer(self._packed(step, start), STEP)
         state.energy_at_start = float(ledger(self._scene, arriving)["e_total"][0])
-        if self._error is not None:
-            self._error.note(abs(state.energy_at_start))
+        if self._adaptive is not None:
+            self._adaptive.note(abs(state.energy_at_start))
         if pair.opens_softly and start[1].displacement - start[0].displacement > self._detector.tolerance(start):
             state.phase = Phase(Joint.TOUCH)
             self._happened(EventKind.IMPACT, Impact(), 0.0)
@@ -335,9 +329,9 @@ class Master(Stateful):
             contact, foundation = state.contact, state.foundation
         (u, v, _, _), (y, z, _, _) = ends
         of_upper, of_lower, booked = pair.upper.energies(), pair.lower.energies(), pair.joined.booking(ends)
-        if self._error is not None:
+        if self._adaptive is not None:
             energies = abs(of_upper.kinetic + of_upper.potential) + abs(of_lower.kinetic + of_lower.potential)
-            self._error.note(energies + booked.stored)
+            self._adaptive.note(energies + booked.stored)
         return packed(
             *(state.time, size, *before[0], *before[1], *contact, *foundation),
             *(u, v, y, z, state.phase.number, self._log.events, state.smoothed, booked.law_force),
@@ -368,19 +362,19 @@ class Master(Stateful):
         """Counts, residuals, warnings and results, as they go into ``summary.json``: of what the recorder has."""
         scene, steps = self._scene, self._recorder.steps()
         known = int(steps["events"][-1]) if len(steps) else 0  # a full disk may have events without their records
-        events = list(islice(self._recorder.events(), known))
+        events = self._recorder.events()[:known]
         made, joined = int(np.count_nonzero(np.diff(steps["time"]))), self._pair.joined
         inside = steps[:0] if joined.decides else steps  # what tells of the motion inside steps
-        balance, seen = self._balance.report(steps), observed(scene, self._pair, inside, events)
+        energies, warnings, changed = self._balance.report(steps)
+        seen = observed(scene, self._pair, inside, events)
         free_at_end = not are_joined(inside[-1:]).any()
         of_coupling, warned = joined.report(made)
-        warnings = [*balance.warnings, *warned]
         unresolved = why_not_resolved(scene, self._steps.size, seen, inside, events, free_at_end=free_at_end)
-        warnings += filter(None, [unresolved or peak_force_doubt(scene), NOT_SHOWN if seen.hidden else None])
+        warnings += filter(None, [*warned, unresolved or peak_force_doubt(scene), NOT_SHOWN if seen.hidden else None])
         neglect = {}
         if scene.driver_stiffness is not None and len(steps):
-            bound = neglected(steps, scene.driver_stiffness, Past())
-            neglect = {"neglected_motion": float(bound.motion[-1]), "neglected_share": float(bound.share[-1])}
+            motion, share = Neglect(scene.coupling, scene.driver_stiffness).by(steps)
+            neglect = {"neglected_motion": float(motion[-1]), "neglected_share": float(share[-1])}
         window = force_window(scene, stiffest(scene) if scene.contact.facts.opens else 0.0)
         return {
             **neglect,
@@ -389,10 +383,10 @@ class Master(Stateful):
             "macro_steps": made,
             "events": len(events),
             "halved_steps": self.state.halvings,
-            **({"rejected_steps": self._steps.state.rejections} if isinstance(self._steps, AdaptiveSteps) else {}),
+            **({} if self._adaptive is None else {"rejected_steps": self._adaptive.state.rejections}),
             **of_coupling,
-            **balance.summary,
-            "resolved": unresolved is None and not balance.changed,
+            **energies,
+            "resolved": unresolved is None and not changed,
             "warnings": warnings,
             **({"max_velocity_mismatch": seen.mismatch} if len(inside) else {}),
             **(totals(scene, steps, events, window, free_at_end=free_at_end) if len(inside) else {}),

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..results.contact_times import contact_time_difference, impulse_difference
-from ..results.dense import MOTION, extremes
-from ..results.extremes import Extremes
+from ..results.dense import MOTION, Extremes, extremes
 from ..results.totals import LOSS_NAMES, TOTALS
 from ..results.trajectory import COLUMNS, TOLD, EventKind, Trajectory
 from ..scene import SceneError

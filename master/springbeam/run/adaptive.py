@@ -1,0 +1,161 @@
+"""Steps as long as their error allows; a step itself tells how wrong it is.
+
+Nothing is computed twice for it: conditions of higher order than those the scheme has imposed are looked at where the
+step has them anyway (``docs/coupling.md``, "Adaptive macro steps").
+"""
+
+from __future__ import annotations
+
+from math import ceil, inf, log2
+
+from ..bodies.stateful import Memory, Stateful
+from ..contact.phases import Phase
+from ..coupling.protocol import Scales, Step
+from ..results.paths import Path
+from ..scene import Scene
+from ..scene.statics import tip_compliance
+from .macro_steps import SAME, SHORT_REMAINDER
+from .outcome import RunStopped
+from .stepping import Pair, State
+
+#: Sizes are the run's length times 2^(−k/4): few enough for the coupling to remember its response to each.
+_PER_OCTAVE = 4
+#: k/4 of the first step, of the longest and of the shortest.
+_FIRST, _LONGEST, _SHORTEST = 14, 2, 40
+#: A step is changed by at most these factors at once, and aims below the tolerance by the safety factor.
+_SHRINK, _GROW, _SAFETY = 0.125, 2.0, 0.9
+#: Displacements are rounded to so many ulp.
+_ROUNDING = 16.0 * 2.0**-52
+#: Order of the cubic.
+_CUBIC = 4
+
+
+class Adapted(Memory):
+    """The size of the next step, and how far the motion has come."""
+
+    ways: list[tuple[float, float]]  #: lowest and highest position of each end [m]
+    fastest: float = 0.0  #: [m/s]
+    energy: float = 0.0  #: the largest [J]
+    number: int = _FIRST * _PER_OCTAVE  #: k of the size
+    just_rejected: bool = False
+    rejections: int = 0
+
+
+class AdaptiveSteps(Stateful):
+    """Sizes that keep the error of each step at the tolerances of a scene.
+
+    The error of a step of size H goes as H^order, so the next one is 0.9 (tolerance/error)^(1/order) times as long,
+    rounded down to the sizes there are. A step above the tolerance is rejected and repeated; the one after it does not
+    grow. A step that an event has cut says nothing about the next.
+
+    Parameters
+    ----------
+    scene, pair
+        What is simulated.
+    start, end
+        The run [s].
+    """
+
+    state: Adapted
+
+    def __init__(self, scene: Scene, pair: Pair, start: float, end: float) -> None:
+        self._pair, self._end, self._length = pair, end, end - start
+        self._relative = scene.coupling.relative_tolerance or 0.0
+        self._absolute = scene.coupling.absolute_tolerance or 0.0
+        #: By how much a unit of the contact force bends the beam [m/N].
+        self._compliance = 0.0 if scene.beam is None else tip_compliance(scene.beam)
+        self.state = Adapted([(at.displacement, at.displacement) for at in pair.ends()])
+
+    @property
+    def size(self) -> float:
+        """H [s] of a whole step from here."""
+        return self._length * float(2.0 ** (-self.state.number / _PER_OCTAVE))
+
+    def next(self, time: float, kink: float = inf) -> tuple[float, float]:
+        """The time at which the step from ``time`` should end, and its size; ``kink`` as of `MacroGrid`."""
+        size, left = self.size, self._end - time
+        if kink < time + (1.0 + SHORT_REMAINDER) * size:
+            return kink, kink - time
+        return (self._end, left) if left <= (1.0 + SHORT_REMAINDER) * size else (time + size, size)
+
+    def struck(self, time: float) -> None:
+        """Do nothing: error estimates tell how long steps may be."""
+
+    def note(self, energy: float) -> None:
+        """Note that all energies together have been as large as this [J]."""
+        self.state.energy = max(energy, self.state.energy)
+
+    def accept(self, step: Step) -> None:
+        """The motion has come so far."""
+        self.state.ways, self.state.fastest = self._ways(step), self._fastest(step)
+
+    def holds(self, state: State, step: Step, refused: str, *, to_kink: bool = False) -> bool:
+        """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set.
+
+        ``refused`` says why longer ones were, or nothing; ``to_kink``, whether it was to end on a kink of a load.
+        Raises RunStopped if there is no shorter one.
+        """
+        error, order = self._estimate(state, step)
+        if self.judge(step.size, error, order, to_kink=to_kink):
+            return True
+        if self.state.number > _SHORTEST * _PER_OCTAVE:
+            short = f"the error stays above the tolerance, down to a macro step of {step.size:.3g} s, where it is"
+            raise RunStopped(refused or f"{short} {error:.3g} of it", step.time)
+        return False
+
+    def judge(self, size: float, error: float, order: int, *, to_kink: bool = False) -> bool:
+        """Whether a step of ``size`` [s] with ``error`` (1 is the tolerance) holds; `size` is then that of the next.
+
+        ``to_kink`` says whether it was to end on a kink.
+        """
+        state, factor = self.state, _SAFETY * error ** (-1.0 / order) if error > 0.0 else _GROW
+        if error <= 1.0:
+            # A step that ended on a kink tells of whole ones by the order, unless it was much shorter.
+            wanted = min(size * factor, self.size * (1.0 if state.just_rejected else _GROW))
+            if not (to_kink and (wanted < self.size or size < SHORT_REMAINDER * self.size)):
+                state.number = self._rung_below(wanted)
+            state.just_rejected = False
+            return True
+        state.rejections += 1
+        state.just_rejected = True
+        state.number = max(state.number + 1, self._rung_below(size * max(factor, _SHRINK)))
+        return False
+
+    def _rung_below(self, size: float) -> int:
+        return max(_LONGEST * _PER_OCTAVE, ceil(_PER_OCTAVE * log2(self._length / size) - SAME))
+
+    def _estimate(self, state: State, step: Step) -> tuple[float, int]:
+        """The step's error, 1 is the tolerance, and the order in which it falls with the size of the step.
+
+        No step is too long for what is rounding, though from rest the motion so far is shorter still. The tip is the
+        sum of what the loads make of it and the contact force, which may be larger than it.
+        """
+        curve, spans = 0.0, []
+        least = [max(abs(low), abs(high), self._compliance * abs(state.contact[0])) for low, high in self.state.ways]
+        ends = zip(step.start, step.end, self._ways(step), least, strict=True)
+        for start, end, (low, high), size in ends:
+            means = end.integral / step.size, end.integral_2 / step.size**2
+            beside = Path.through(start[:2], end[:2], step.size, means).moments_beside_cubic
+            way, rounding = high - low, _ROUNDING * size
+            if way > 0.0:
+                curve = max(curve, beside / (self._absolute + self._relative * way + rounding))
+            if way > rounding:
+                spans.append(way)
+        if not spans:
+            return 0.0, _CUBIC
+        span, pair = min(spans), self._pair
+        scales = Scales(span, self._fastest(step), self.state.energy, pair.reduced_mass(Phase()))
+        tolerance = self._relative + self._absolute / span
+        told = pair.coupling(state.phase).local_errors(step, scales)
+        return max((curve, _CUBIC), *((error / tolerance, order) for error, order in told)) if told else (curve, _CUBIC)
+
+    def _ways(self, step: Step) -> list[tuple[float, float]]:
+        """Return the lowest and the highest position of each end [m], with ``step``."""
+        told = zip(self.state.ways, step.start, step.end, strict=True)
+        return [
+            (min(low, a.displacement, b.displacement), max(high, a.displacement, b.displacement))
+            for (low, high), a, b in told
+        ]
+
+    def _fastest(self, step: Step) -> float:
+        return max(self.state.fastest, *(abs(end.velocity) for end in (*step.start, *step.end)))
