@@ -12,15 +12,16 @@ from typing import NamedTuple
 
 from ..bodies import force
 from ..bodies.protocol import Force
-from ..contact.events import EventFunction, Height, gap
+from ..contact.events import EventFunction, Height, gap, locate
 from ..contact.phases import Joint, Phase
 from ..coupling.protocol import Step
+from ..results.paths import Sample
 from ..results.polynomials import sign_changes
 from ..results.trajectory import EventKind
 from .stepping import Pair, State
 
-#: Trial steps to find where the contact force vanishes, and the shortest of them as a share of the macro step.
-_MAX_LOOKS, _SHORTEST_LOOK = 8, 0.25
+#: Of the macro step: the shortest trial step to find where the contact force vanishes, and how well it is found.
+_SHORTEST_LOOK, _SHARP = 0.25, 1e-9
 #: Share of a step after which ends that are let go, and meet again before its end, are looked at.
 _EARLY = 0.1
 
@@ -59,7 +60,9 @@ class Separation:
         falling = [tau for tau in sign_changes((f[0], f[1], 0.5 * f[2]), 0.0, step.size) if f[1] + tau * f[2] < 0.0]
         if not falling:
             return None
-        zero = falling[0] if by_line else self._sharpened(falling[0], coupling.sharpest, state, step, push, macro_step)
+        zero = falling[0]
+        if not by_line:
+            zero = self._sharpened(zero, abs(f[1] + zero * f[2]), state, step, push, macro_step)
         return self._pair.attempt(state, zero, step.start), push.event
 
     def no_step(self, step: Step) -> Step:
@@ -76,21 +79,20 @@ class Separation:
             return Push(EventKind.SEPARATION, lambda step: step.contact)
         return None
 
-    def _sharpened(self, zero: float, best: float, state: State, step: Step, push: Push, macro_step: float) -> float:
-        """Return where the force of a step vanishes, near ``zero`` [s]; it is the most accurate at the share ``best``.
+    def _sharpened(self, zero: float, slope: float, state: State, step: Step, push: Push, macro_step: float) -> float:
+        """Return where the force of a step vanishes, near ``zero`` [s], where it falls by ``slope`` [N/s].
 
-        Trial steps bring the zero there.
+        Trial steps bring the zero to where in a step the force is the most accurate.
         """
+        best = self._pair.coupling(state.phase).sharpest
         room = self._pair.loads.next_kink(state.time + self._no_time * macro_step, macro_step) - state.time
-        for _ in range(_MAX_LOOKS):
+
+        def evaluate(zero: float) -> Sample:
             size = min(max(zero / best, _SHORTEST_LOOK * macro_step), room)
-            g = self._without_mismatch(state, self._pair.attempt(state, size, step.start), push)
-            value, slope = force.value(g, zero), g[1] + zero * g[2]
-            change = -value / slope if slope < 0.0 else 0.0
-            if not 0.0 < zero + change < step.size or abs(change) <= 1e-12 * macro_step:
-                break
-            zero += change
-        return zero
+            f = self._without_mismatch(state, self._pair.attempt(state, size, step.start), push)
+            return force.value(f, zero), f[1] + zero * f[2]
+
+        return locate(evaluate, zero, step.size, _SHARP * macro_step * slope, state.time)
 
     def _without_mismatch(self, state: State, step: Step, push: Push) -> Force:
         """The force that pushes, without what the scheme adds to the contact's."""
