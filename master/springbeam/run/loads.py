@@ -7,10 +7,9 @@ signal jumps or bends, a step ends. Nothing here is shared with the references, 
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import pairwise
 from math import cos, inf, pi, sin
 
 import numpy as np
@@ -22,33 +21,25 @@ from ..scene.loads import LINES_IN_STEP
 
 #: Which loads act on which body.
 ON_BEAM, ON_SPRING = ("beam", "tip", "base"), ("spring", "base")
-#: Points of a quadrature, and one more for each radian that a signal without a closed form turns.
-_POINTS = 8
+#: Points of the quadrature of a table, whose pieces are cubic at most, and of another signal, which has one more for
+#: each radian that it turns.
+_OF_TABLE, _POINTS = 3, 8
 #: A jump closer to an end of a step than this share of it is at that end.
 _SAME = 1e-9
-#: Gauss–Legendre nodes on [−1, 1], and (2k + 1)/2 P_k there times the weights: exact for a cubic times P_2.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
-_VALUES = np.polynomial.legendre.legvander(_NODES, 2)
+#: (2k + 1)/2, by which a moment against P_k on [−1, 1] becomes the coefficient of P_k.
 _NORMS = np.array([0.5, 1.5, 2.5])
-
-
-@lru_cache(maxsize=64)
-def _quadrature(points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return Gauss nodes in [−1, 1], and what takes values there to the three Legendre coefficients."""
-    nodes, weights = np.polynomial.legendre.leggauss(points)
-    return nodes, _NORMS[:, None] * np.polynomial.legendre.legvander(nodes, 2).T * weights
+_gauss = lru_cache(maxsize=64)(np.polynomial.legendre.leggauss)
 
 
 class Signal:
     """One load over the steps of a run."""
 
     def __init__(self, load: Load) -> None:
-        self._load = load
-        self._end = load.end
+        self._load, self._begins, self._end = load, load.begins, load.end
         #: When the load jumps or bends and a step ends [s].
         self.kinks = load.kinks
-        #: Lines of a table [s], which is a polynomial between them.
-        self._lines = load.start + load.record.x if load.signal == "table" else None
+        #: Times [s] between which it is smooth: of a table the polynomial between two lines.
+        self._edges = (load.start + load.record.x).tolist() if load.signal == "table" else self.kinks
 
     def next_kink(self, time: float, size: float) -> float:
         """Return when it next jumps or bends after ``time`` [s] in a way that is worth the end of a step; ∞ if not.
@@ -64,46 +55,24 @@ class Signal:
 
     def over(self, time: float, size: float) -> Force:
         """Return the projection onto a step of ``size`` [s] from ``time`` [s] on."""
+        load, middle, same = self._load, time + 0.5 * size, _SAME * size
         if time >= self._end:
             return NO_FORCE
-        if self._lines is not None:
-            return force.derivatives(self._of_table(self._lines, time, size), size)
-        same = _SAME * size
-        cuts = [time, *(kink for kink in self.kinks if time + same < kink < time + size - same), time + size]
-        if len(cuts) == 2:
-            return force.derivatives(self._legendre(time, size), size)
-        total = np.zeros(3)
-        for a, b in pairwise(cuts):
-            values = _VALUES @ self._legendre(a, b - a)
-            s = (2.0 * a + (b - a) * (_NODES + 1.0) - 2.0 * time) / size - 1.0
-            total += (b - a) / size * (_WEIGHTS * values) @ np.polynomial.legendre.legvander(s, 2)
-        return force.derivatives((_NORMS * total).tolist(), size)
-
-    def _legendre(self, start: float, size: float) -> Sequence[float]:
-        """Return the three Legendre coefficients over a piece without a jump inside."""
-        load, middle = self._load, start + 0.5 * size
-        elapsed = middle - load.start
-        if load.signal != "constant" and not load.start <= middle < self._end:
-            return (0.0, 0.0, 0.0)
-        if load.signal == "harmonic":
-            return _wave(load.amplitude, load.rate, elapsed, load.phase, size)
-        if load.signal == "half_sine":
-            assert load.duration is not None
-            return _wave(load.amplitude, pi / load.duration, elapsed, 0.0, size)
-        if load.signal in ("constant", "step") or (load.signal == "ramp" and elapsed >= (load.duration or 0.0)):
+        cuts = self._edges[bisect_right(self._edges, time + same) : bisect_left(self._edges, time + size - same)]
+        if load.signal in ("harmonic", "half_sine") and not cuts:
+            if not self._begins <= middle < self._end:
+                return NO_FORCE
+            omega = load.rate or pi / (load.duration or inf)
+            return force.derivatives(_wave(load.amplitude, omega, middle - load.start, load.phase, size), size)
+        if load.signal in ("constant", "step") and not cuts:
             return (float(load.value(middle)), 0.0, 0.0)
-        nodes, projection = _quadrature(_POINTS + int(load.rate * size))
-        return list(projection @ load.value(middle + 0.5 * size * nodes))
-
-    def _of_table(self, lines: np.ndarray, start: float, size: float) -> Sequence[float]:
-        """Return the coefficients by the pieces between ``lines`` [s], each a polynomial of degree 3 at most."""
-        first, last = np.searchsorted(lines, (start, start + size), side="right")
-        edges = np.concatenate([[start], lines[first:last], [start + size]])
+        nodes, weights = _gauss(_OF_TABLE if load.signal == "table" else _POINTS + int(load.rate * size))
+        edges = np.array([-1.0, *(2.0 * (cut - time) / size - 1.0 for cut in cuts), 1.0])
         half = 0.5 * np.diff(edges)[:, None]
-        t = edges[:-1, None] + half * (_NODES + 1.0)
-        weights = half * _WEIGHTS * self._load.value(t)
-        polynomials = np.polynomial.legendre.legvander((2.0 * (t - start) / size - 1.0).ravel(), 2)
-        return list(2.0 / size * _NORMS * (weights.ravel() @ polynomials))
+        s = edges[:-1, None] + half * (nodes + 1.0)
+        weighted = half * weights * load.value(time + 0.5 * size * (s + 1.0))
+        moments = weighted.ravel() @ np.polynomial.legendre.legvander(s.ravel(), 2)
+        return force.derivatives((_NORMS * moments).tolist(), size)
 
 
 def _wave(amplitude: float, omega: float, elapsed: float, phase: float, size: float) -> Sequence[float]:
