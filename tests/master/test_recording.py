@@ -352,7 +352,7 @@ def swapped(old, new):
         ("shapes.csv", swapped(b"\n0.0,", b"\n0.0,0.5,"), r"shapes\.csv: after the header: .* row"),
         ("summary.json", lambda content: content[:-20], r"summary\.json: not JSON: .* line"),
         ("summary.json", lambda content: b"[]", r"summary\.json: no scene"),
-        ("summary.json", lambda content: b'{"scene": {}}', r"\[time\]: missing table"),
+        ("summary.json", lambda content: b'{"scene": {}}', r"scene: time: missing"),
         ("summary.json", None, r"summary\.json: missing; .* is not a run directory"),
     ],
 )
