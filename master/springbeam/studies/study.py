@@ -381,8 +381,8 @@ def dask_cluster(scheduler: str) -> Iterator[Executor]:
         raise ConnectionError(f"--scheduler {scheduler}: cannot be reached: {error}") from error
     with client:
         own = metadata.version("springbeam")
-        workers = client.get_versions(packages=["springbeam"])["workers"]
-        theirs = {address: worker["packages"]["springbeam"] for address, worker in workers.items()}
+        told: Any = client.get_versions(packages=["springbeam"])
+        theirs = {address: worker["packages"]["springbeam"] for address, worker in told["workers"].items()}
         if set(theirs.values()) != {own}:
             others = ", ".join(f"{address} has {version}" for address, version in theirs.items()) or "there are none"
             raise ConnectionError(f"the workers need springbeam {own}, as is here; {others}")

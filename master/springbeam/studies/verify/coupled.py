@@ -15,8 +15,8 @@ from scipy.special import ai_zeros, itairy, spherical_jn
 from ...bodies.fmu_bodies import FmuBeam, FmuSpring, Reals
 from ...bodies.protocol import NO_FORCE
 from ...run.runner import simulate
-from ...scene import Beam, Coupling, Scene, Spring, Time, load_scene, scene_from_dict, with_changes
-from .alone import IDA, clamped_free_frequencies, free_end, ida_error, transfer_rate
+from ...scene import Beam, Coupling, Scene, Spring, Time, load_scene, with_changes
+from .alone import IDA, clamped_free_frequencies, free_end, ida_error, scene_of, transfer_rate
 from .check import EPS, UNIT_FORCE, Check, section
 
 
@@ -191,12 +191,6 @@ def _airy_overshoot() -> float:
 _N = 2 * 2 * 8  #: unknowns of the beam
 
 
-def _loaded(t_end: float, macro_step: float, loads: list[dict[str, Any]], **bodies: Any) -> Scene:
-    tables = {name: body.model_dump(exclude_none=True) for name, body in bodies.items()}
-    coupling = {"macro_step": macro_step, "degree": 2}
-    return scene_from_dict({**tables, "time": {"t_end": t_end}, "coupling": coupling, "loads": loads})
-
-
 def _beam(**changes: Any) -> Any:
     return Beam.with_ones(n_elements=2, element_degree=8, approach="elastic", **changes)
 
@@ -214,7 +208,7 @@ def resonance(factor: float) -> Iterator[Check]:
     # The slowest transient, e^{−α_b ω₁² t/2}, is below rounding of the amplitude.
     periods = int(40.0 / (0.5 * alpha * first**2) * w / (2.0 * pi)) + 1
     drive = {"on": "tip", "signal": "harmonic", "frequency": w / (2.0 * pi)}
-    run = simulate(_loaded(periods * per_period * H, H, [drive], beam=_beam(alpha_b=alpha)))
+    run = simulate(scene_of(periods * per_period * H, H, [drive], beam=_beam(alpha_b=alpha)))
     last = slice(-per_period, None)
     found = 2j * np.mean(run.u_tip[last] * np.exp(-1j * w * run.time[last]))
     exact = _tip_receptance(w, alpha)
@@ -244,7 +238,9 @@ def pulse() -> Iterator[Check]:
     y = -scale * r * sin(w * duration) / (1.0 - r * r)
     z = scale * rate * (-1.0 - cos(w * duration)) / (1.0 - r * r)
     shock = {"on": "spring", "signal": "half_sine", "amplitude": force, "start": start, "duration": duration}
-    run = simulate(_loaded(start + duration + 1.25, 0.01, [shock], spring=Spring.with_ones(linear_stiffness=stiffness)))
+    run = simulate(
+        scene_of(start + duration + 1.25, 0.01, [shock], spring=Spring.with_ones(linear_stiffness=stiffness))
+    )
     at = int(np.argmin(np.abs(run.time - start - duration)))
     bound = 1e-9 * scale
     reason = "IDA's tolerance, 1e-12 a step; the pulse loses 7 j₃(ΩH/2)² < 1e-9 of itself"
@@ -276,7 +272,7 @@ def slow_ramp(name: str, load: dict[str, Any], exact: float) -> Iterator[Check]:
     ∫ f (ξ²(3 − ξ)/6EI + ξ/KAG) dx, exact on any mesh that holds the static shape of a tip force.
     """
     ramp = {**load, "signal": "ramp", "duration": 3.0}
-    run = simulate(_loaded(200.0, 1.0, [ramp], beam=_beam(alpha_b=1.0)))
+    run = simulate(scene_of(200.0, 1.0, [ramp], beam=_beam(alpha_b=1.0)))
     yield Check(
         f"{name}: u_tip [m]", exact, float(run.u_tip[-1]), _N**2 * EPS, "rounding: ε N², N unknowns of the beam"
     )
@@ -293,7 +289,7 @@ def moving_base() -> Iterator[Check]:
         {**signal, "on": "spring", "amplitude": -5.0 * 0.7},
     ]
     runs = [
-        simulate(_loaded(0.2, 1e-3, loads, beam=beam, spring=spring))
+        simulate(scene_of(0.2, 1e-3, loads, beam=beam, spring=spring))
         for loads in ([{**signal, "on": "base"}], equivalent)
     ]
     reason = "rounding of the modes and IDA's tolerance, 200 steps"
