@@ -220,10 +220,6 @@ def test_what_is_wrong_comes_first(summary, words):
     found = shown(**summary)
     assert found.ids[0] == "warnings"
     assert words in found["warnings"]
-    run = a_trajectory(v_tip=np.where(np.arange(400) % 2, 1.0, -1.0))
-    found = shown(dataclasses.replace(run, summary=summary))
-    assert "tip v(t, L): alternates from step to step" in found["warnings"]
-    assert "alternates from step to step" in found["over-time"]
     assert "warnings" not in shown().ids
 
 

@@ -109,7 +109,6 @@ LEVELS = {
     "Ψ": Look(BLACK, "rest of the spring Ψ", Line(0.8, dashed=True)),
     "φ": Look(BLACK, "foundation φ", Line(1.3)),
 }
-ALTERNATES = "alternates from step to step"
 #: Columns of pixels of a time axis, roughly; more points than a few per column cannot be seen.
 PIXEL_COLUMNS = 1000
 
@@ -146,15 +145,6 @@ def decimated(time: np.ndarray, values: np.ndarray, columns: int = PIXEL_COLUMNS
     return np.unique(keep)
 
 
-def pairs(times: np.ndarray, number: int) -> np.ndarray:
-    """Return the rows of ``number`` pairs of successive times, evenly spread.
-
-    Single rows of what alternates from row to row might all be of one kind.
-    """
-    first = np.searchsorted(times, np.linspace(times[0], times[-1], number))
-    return np.unique(np.append(first, first + 1).clip(max=len(times) - 1))
-
-
 class EventMark(NamedTuple):
     """The events of one kind: look and marker with how many they are, times [s] and what each lost [J]."""
 
@@ -180,17 +170,6 @@ def event_marks(trajectory: Trajectory) -> list[EventMark]:
     return found
 
 
-def alternates(values: np.ndarray) -> bool:
-    """Tell whether ``values`` mostly jump up and down from row to row, which means that the steps are too long."""
-    if len(values) < 20:
-        return False
-    jumps = np.diff(values)
-    signs = np.sign(jumps)  # a product of the jumps themselves may leave the range of numbers
-    reversals = np.mean(signs[1:] * signs[:-1] < 0.0)
-    usual_range = np.subtract(*np.quantile(values, (0.95, 0.05)))
-    return bool(reversals > 0.6 and np.mean(np.abs(jumps)) > 0.15 * usual_range)
-
-
 #: The mark of pictures whose run says of itself that it is `springbeam.scene.resolution.not_resolved`.
 NOT_RESOLVED = "NOT RESOLVED by the macro step: see the warnings"
 
@@ -198,12 +177,6 @@ NOT_RESOLVED = "NOT RESOLVED by the macro step: see the warnings"
 def mark(trajectory: Trajectory) -> str:
     """Return `NOT_RESOLVED`, or nothing if the run has resolved its motion."""
     return "" if trajectory.summary.get("resolved", True) else NOT_RESOLVED
-
-
-def alternating(trajectory: Trajectory) -> list[str]:
-    """Return words for the quantities that alternate from step to step."""
-    looks = POSITIONS | VELOCITIES | FORCES
-    return [looks[name].words for name in present(trajectory, looks) if alternates(trajectory[name])]
 
 
 def phase_intervals(

@@ -22,7 +22,6 @@ from .drawing import (
     length_along,
     much_smaller,
     near_levels,
-    pairs,
     present,
     readable_unit,
 )
@@ -176,7 +175,7 @@ def frames_of(trajectory: Trajectory) -> Frames | None:
     if len(time) < 2 or time[-1] <= time[0]:
         return None
     if len(time) > MOST_FRAMES:
-        some = pairs(time, MOST_FRAMES // 2)
+        some = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], MOST_FRAMES)))
         time, deflection = time[some], None if deflection is None else deflection[some]
     row = np.searchsorted(rows, time, side="right") - 1
     y = trajectory["y"][row] if "y" in trajectory.columns else None

@@ -26,12 +26,10 @@ from .drawing import (
     LEVELS,
     POSITIONS,
     VELOCITIES,
-    alternates,
     drawable,
     length_along,
     level_side,
     near_levels,
-    pairs,
     present,
     readable_unit,
 )
@@ -58,12 +56,11 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
         The files written.
     """
     written = []
-    with matplotlib.rc_context(STYLE):
-        for name, file in zip(_DRAWINGS, PICTURES, strict=True):
+    for name, file in zip(_DRAWINGS, PICTURES, strict=True):
+        with matplotlib.rc_context(STYLE):
             if (figure := _drawn(trajectory, name)) is not None:
-                path = Path(directory) / file
-                figure.savefig(path, dpi=DPI)
-                written.append(path)
+                written.append(Path(directory) / file)
+                figure.savefig(written[-1], dpi=DPI)
     return written
 
 
@@ -82,48 +79,36 @@ def _drawn(trajectory: Trajectory, picture: str) -> Figure | None:
     return _DRAWINGS[picture](trajectory) if drawable(trajectory) else None
 
 
-# -- (A), (B): the beam's shape -----------------------------------------------------------------------------------
+# -- (A), (B), (G): along the beam ---------------------------------------------------------------------------------
 
 
-def _since_contact(trajectory: Trajectory, values: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return the times [s] since the tip first met something, or all, and ``values`` at these; without any, shapes [m].
-
-    There are none without a beam.
-    """
-    if trajectory.shapes is None:
-        return np.empty(0), np.empty((0, len(SHAPE_POINTS)))
-    times, shapes = trajectory.shapes
+def _since_contact(trajectory: Trajectory) -> tuple[np.ndarray, slice]:
+    """Return the times [s] of the shapes since the tip first met something, or of all, and which these are."""
+    times = np.empty(0) if trajectory.shapes is None else trajectory.shapes[0]
     meetings = (event.time for event in trajectory.events if event.kind.collision)
-    first = int(np.searchsorted(times, next(meetings, trajectory.time[0])))
-    return times[first:], (shapes if values is None else values)[first:]
+    since = slice(int(np.searchsorted(times, next(meetings, trajectory.time[0]))), None)
+    return times[since], since
 
 
 def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
-    times, shapes = (values[:_SHAPES_EARLY] for values in _since_contact(trajectory))
-    if len(times) < 2:
+    times, since = _since_contact(trajectory)
+    if len(times) < 2 or trajectory.shapes is None:
         return None
+    times, shapes = times[:_SHAPES_EARLY], trajectory.shapes[1][since][:_SHAPES_EARLY]
     figure = figure_for(trajectory, "(A) The beam right after first contact", 3.6)
     left, right = figure.subplots(1, 2)
+    _curves(left, trajectory, times, shapes, "deflection u", "m")
     steps = np.diff(times)
-    some = steps > 1e-6 * np.max(steps, initial=0.0)  # between rows of one event Δu is rounding
-    velocities = np.diff(shapes, axis=0)[some] / steps[some, None]
-    _curves(left, trajectory, times, shapes, "deflection u", "m", bar=False)
-    middles = 0.5 * (times[1:] + times[:-1])[some]
-    _curves(right, trajectory, middles, velocities, "mean velocity Δu/Δt", "m/s", bar=True)
-    seen = (trajectory["time"] >= times[0]) & (trajectory["time"] <= times[-1])
-    fastest = float(np.max(np.abs(trajectory["v_tip"][seen]), initial=0.0))
-    if fastest > 3.0 * float(np.max(np.abs(velocities))):
-        unit = readable_unit([np.array([fastest])], "m/s")
-        right.set_title(
-            f"mean from shape to shape; the tip's own velocity reaches {unit.factor * fastest:.2g} {unit.name}:\n"
-            "the motion is faster than the steps",
-            **REMARK,
-        )
+    some = steps > 1e-6 * np.max(steps)  # between rows of one event Δu is rounding
+    middles, velocities = 0.5 * (times[1:] + times[:-1])[some], np.diff(shapes, axis=0)[some] / steps[some, None]
+    _key(right, _curves(right, trajectory, middles, velocities, "mean velocity Δu/Δt", "m/s"))
     return figure
 
 
 def _shapes_later(trajectory: Trajectory) -> Figure | None:
-    return _later(trajectory, "(B) Subsequent motion of the beam", {"deflection u": ("m", None)})
+    if trajectory.shapes is None:
+        return None
+    return _later(trajectory, "(B) Subsequent motion of the beam", {"deflection u": ("m", trajectory.shapes[1])})
 
 
 def _moments(trajectory: Trajectory) -> Figure | None:
@@ -134,54 +119,48 @@ def _moments(trajectory: Trajectory) -> Figure | None:
     return _later(trajectory, "(G) Bending moment and shear force along the beam", drawn)
 
 
-def _later(
-    trajectory: Trajectory, title: str, quantities: Mapping[str, tuple[str, np.ndarray | None]]
-) -> Figure | None:
+def _later(trajectory: Trajectory, title: str, quantities: Mapping[str, tuple[str, np.ndarray]]) -> Figure | None:
     """Draw quantities along the beam, a row each: curves at some times with their envelope, and a map of all."""
-    times, shapes = _since_contact(trajectory)
+    times, since = _since_contact(trajectory)
     if len(times) < _SHAPES_EARLY:
         return None
     figure = figure_for(trajectory, title, 0.6 + 3.0 * len(quantities))
     rows = figure.subplots(len(quantities), 2, squeeze=False, gridspec_kw={"wspace": 0.06})
-    jumpy = alternates(shapes[:, -1])
-    evenly = np.searchsorted(times, np.linspace(times[0], times[-1], _SHAPES_LATER))
-    some = pairs(times, _SHAPES_LATER // 2) if jumpy else np.unique(evenly)
+    some = np.unique(np.searchsorted(times, np.linspace(times[0], times[-1], _SHAPES_LATER)))
     for (left, right), (what, (unit, found)) in zip(rows, quantities.items(), strict=True):
-        _, values = _since_contact(trajectory, found)
-        x, factor = _curves(left, trajectory, times[some], values[some], what, unit, bar=True)
-        for limit in (values.max(axis=0), values.min(axis=0)):
-            left.plot(x, factor * limit, color=BLACK, lw=0.8, ls=":")
+        values = found[since]
+        _key(left, _curves(left, trajectory, times[some], values[some], what, unit))
+        factor, x = readable_unit([values[some]], unit).factor, _along_the_beam(left, trajectory)
+        left.plot(x, factor * np.transpose([values.max(axis=0), values.min(axis=0)]), color=BLACK, lw=0.8, ls=":")
+        left.set_title("dotted: envelope of all", **REMARK)
         _map(right, trajectory, times, values, what, unit)
-        remark = "pairs of successive shapes: they alternate\nfrom step to step; " * jumpy + "dotted: envelope of all"
-        left.set_title(remark, **REMARK)
     return figure
 
 
 def _curves(
-    ax: Axes, trajectory: Trajectory, times: np.ndarray, curves: np.ndarray, what: str, unit: str, *, bar: bool
-) -> tuple[np.ndarray, float]:
-    """Draw curves over x, coloured from early (dark) to late; beside deflections [m] the levels that are near.
-
-    Returns the places and the factor of the values, as drawn.
-    """
+    ax: Axes, trajectory: Trajectory, times: np.ndarray, curves: np.ndarray, what: str, unit: str
+) -> LineCollection:
+    """Draw curves over x, coloured from early (dark) to late; beside deflections [m] the levels that are near."""
     readable, clock = readable_unit([curves], unit), readable_unit([times], "s")
     x = _along_the_beam(ax, trajectory)
     segments = [np.column_stack([x, readable.factor * curve]) for curve in curves]
-    lines = LineCollection(segments, array=clock.factor * times, cmap=_CLOCK, linewidths=1.0)
+    label = f"time t [{clock.name}]"
+    lines = LineCollection(segments, array=clock.factor * times, cmap=_CLOCK, linewidths=1.0, label=label)
     ax.add_collection(lines)
     ax.axhline(0.0, color=GREY, lw=0.5, zorder=0)
-    ax.set_xlim(x[0], x[-1])
-    ax.set_ylabel(f"{what} [{readable.name}]")
+    ax.set(xlim=(x[0], x[-1]), ylabel=f"{what} [{readable.name}]")
     ax.autoscale_view(scalex=False)
-    if unit == "m":
-        near = near_levels(trajectory.scene, [curves])
-        for symbol, height in near.items():
-            ax.axhline(readable.factor * height, xmin=0.93, zorder=1, **line_style(LEVELS[symbol]))
-            ax.annotate(symbol, (1.0, readable.factor * height), xycoords=("axes fraction", "data"), fontsize=8.0,
-                        xytext=(3.0, 0.0), textcoords="offset points", va=level_side(symbol, near))  # fmt: skip
-    if bar:
-        ax.figure.colorbar(lines, ax=ax, label=f"time t [{clock.name}]", pad=0.05, aspect=30)
-    return x, readable.factor
+    near = near_levels(trajectory.scene, [curves]) if unit == "m" else {}
+    for symbol, height in near.items():
+        ax.axhline(readable.factor * height, xmin=0.93, zorder=1, **line_style(LEVELS[symbol]))
+        ax.annotate(symbol, (1.0, readable.factor * height), xycoords=("axes fraction", "data"), fontsize=8.0,
+                    xytext=(3.0, 0.0), textcoords="offset points", va=level_side(symbol, near))  # fmt: skip
+    return lines
+
+
+def _key(ax: Axes, lines: LineCollection) -> None:
+    """Show beside curves which time each colour is."""
+    ax.figure.colorbar(lines, ax=ax, label=lines.get_label(), pad=0.05, aspect=30)
 
 
 def _map(ax: Axes, trajectory: Trajectory, times: np.ndarray, shapes: np.ndarray, what: str, unit: str) -> None:

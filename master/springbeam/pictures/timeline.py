@@ -50,8 +50,6 @@ WIDTH = 8.2  # inches
 TITLE_WIDTH = 110  # characters
 _MARK_HEIGHT, _MARK_ROW = 1.045, 0.04
 _KEY_COLUMNS = 4
-#: Characters of a line of a remark beside a panel.
-_NOTE_WIDTH = 24
 
 
 def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Figure:
@@ -78,23 +76,23 @@ def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Fig
 
 
 def _mark_events(axes: list[Axes], trajectory: Trajectory) -> list[Line2D]:
-    """Mark events above the first panel, in a row for each kind, and by lines through all; many only by ticks.
+    """Mark events above the first panel, in a row for each kind, and by lines through all unless they are many.
 
     Returns what the key shows.
     """
-    many, factor = len(trajectory.events) > MANY_EVENTS, time_unit(trajectory).factor
+    factor = time_unit(trajectory).factor
     handles: list[Line2D] = []
+    through = axes if len(trajectory.events) <= MANY_EVENTS else []
     for event in event_marks(trajectory):
-        height = _MARK_HEIGHT + _MARK_ROW * len(handles)  # so that those of two kinds do not cover each other
-        shape, size = ("|", 4.0) if many else (event.marker.matplotlib, event.marker.size)
-        look: dict[str, Any] = {"color": event.look.colour, "marker": shape, "markersize": size, "ls": "none"}
-        times, first = factor * event.times, axes[0]
-        first.plot(times, np.full(len(times), height), transform=first.get_xaxis_transform(), clip_on=False, **look)
-        for ax in [] if many else axes:
-            across = ax.get_xaxis_transform()
-            ax.vlines(times, 0.0, 1.0, transform=across, color=event.look.colour, lw=0.4, alpha=0.6, zorder=1)
-        key = {"markersize": 8.0, "markeredgewidth": 1.5} if many else {}
-        handles.append(Line2D([], [], label=event.look.words, **(look | key)))
+        times, height = factor * event.times, _MARK_HEIGHT + _MARK_ROW * len(handles)  # a row for each kind
+        look: dict[str, Any] = {
+            "color": event.look.colour, "marker": event.marker.matplotlib, "markersize": event.marker.size, "ls": "none"
+        }  # fmt: skip
+        handles.append(Line2D([], [], label=event.look.words, **look))
+        across = axes[0].get_xaxis_transform()
+        axes[0].plot(times, np.full(len(times), height), transform=across, clip_on=False, **look)
+        for ax in through:
+            ax.vlines(times, 0.0, 1.0, transform=ax.get_xaxis_transform(), color=event.look.colour, lw=0.4, alpha=0.6)
     return handles
 
 
@@ -134,9 +132,6 @@ def paint(ax: Axes, panel: Panel, clock: Unit) -> None:
     ax.set_ylabel(panel.axis)
     # The key stands beside the panel.
     ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), frameon=False, borderaxespad=0.0, handlelength=1.6)
-    if panel.remarks:
-        note = "\n".join(textwrap.fill(remark, _NOTE_WIDTH) for remark in panel.remarks)
-        ax.text(1.012, 0.0, note, transform=ax.transAxes, va="bottom", **REMARK)
 
 
 def _paint_curve(ax: Axes, curve: Curve, time: np.ndarray, values: np.ndarray, panel: Panel) -> None:
@@ -148,10 +143,7 @@ def _paint_curve(ax: Axes, curve: Curve, time: np.ndarray, values: np.ndarray, p
         ax.plot(time, values, color=colour, linestyle="none", label=words, marker=marker.matplotlib,
                 markersize=marker.size, markerfacecolor=face)  # fmt: skip
         return
-    style = line_style(curve.look)
-    if curve.alternates:
-        style |= {"linewidth": 0.25, "marker": ".", "markersize": 1.6, "markeredgewidth": 0.0}
-    ax.plot(time, values, label=words, **style)
+    ax.plot(time, values, label=words, **line_style(curve.look))
 
 
 def line_style(look: Look) -> dict[str, Any]:

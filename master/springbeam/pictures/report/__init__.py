@@ -22,12 +22,10 @@ from ...scene.automatic import with_scheme_chosen
 from ...scene.partners import kind_of
 from ...scene.statics import bending_stiffness, shear_stiffness
 from ..drawing import (
-    ALTERNATES,
     EVENT_LOOKS,
     FORCES,
     GLOSSARY,
     POSITIONS,
-    alternating,
     event_marks,
     mark,
     present,
@@ -115,8 +113,6 @@ def _warnings(trajectory: Trajectory) -> list[str]:
         when = f" at t = {summary['time']:.9g} s" if isinstance(summary.get("time"), float) else ""
         found.append(f"The run was {status}{when}: {summary.get('cause', 'cause unknown')}")
     found += [str(warning) for warning in summary.get("warnings", ())]
-    if len(trajectory) and (words := alternating(trajectory)):
-        found.append(f"{', '.join(words)}: {ALTERNATES}. Single values and frames mean little there.")
     return found
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,8 +24,6 @@ from ..frames import Frames, Sketch
 from ..panels import Curve, Panel, panels
 
 _GRID = "#E3E3E3"
-#: Numbers of single precision are smaller, and larger than its inverse.
-_LARGEST = 1e37
 #: A curve that varies by less than this share of its values keeps its double precision.
 _FINE = 1e-3
 #: Pixels of the page for a point of the pictures.
@@ -36,12 +34,11 @@ _PIXELS_PER_INCH, _PIXELS_BESIDE = 82, 110
 
 @dataclass
 class Chart:
-    """A figure with its heading, and remarks to print beside it."""
+    """A figure with its heading."""
 
     name: str
     heading: str
     figure: go.Figure
-    remarks: list[str] = field(default_factory=list)
 
     @property
     def points(self) -> int:
@@ -95,7 +92,7 @@ def _of_panel(trajectory: Trajectory, panel: Panel) -> Chart:
             type="log", range=[begin, end], tick0=0.0, dtick=max(1, round((end - begin) / 4.0)), exponentformat="e",
             zeroline=False,
         )  # fmt: skip
-    return Chart(panel.name, panel.heading, figure, panel.remarks)
+    return Chart(panel.name, panel.heading, figure)
 
 
 def _timeline(trajectory: Trajectory) -> Chart:
@@ -142,12 +139,10 @@ def moving_chart(sketch: Sketch, frames: Frames) -> Chart:
 
 def _single(values: np.ndarray) -> np.ndarray:
     """Return ``values`` in single precision, which is finer than any screen, unless it lacks the room or the digits."""
-    sizes = np.abs(values[values != 0.0])
-    if not sizes.size or (
-        sizes.max() < _LARGEST and sizes.min() > 1.0 / _LARGEST and np.ptp(values) > _FINE * sizes.max()
-    ):
-        return values.astype(np.float32)
-    return values
+    with np.errstate(over="ignore", under="ignore"):
+        single = values.astype(np.float32)
+    kept = np.all(np.isfinite(single)) and not np.any((single == 0.0) & (values != 0.0))
+    return single if kept and np.ptp(values) >= _FINE * np.max(np.abs(values), initial=0.0) else values
 
 
 def _height_of(inches: float) -> int:
@@ -197,12 +192,6 @@ def _style(curve: Curve, panel: Panel) -> dict[str, Any]:
             "marker": {**_marker_style(marker), "color": colour},
             "error_y": {**stems, "width": 0, "thickness": 1.5},
             "cliponaxis": False,
-        }
-    if curve.alternates:
-        return {
-            "mode": "lines+markers",
-            "line": {"color": colour, "width": 0.4},
-            "marker": {"size": 2.5, "color": colour},
         }
     return {"mode": "lines", "line": _line_style(curve.look), "opacity": line.opacity}
 
