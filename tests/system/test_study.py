@@ -73,12 +73,18 @@ def test_another_study_is_not_mixed_in(tmp_path):
         Records(plan(), tmp_path / "t")
 
 
-def test_a_killed_worker_loses_its_own_case_alone_and_only_if_it_dies_again(tmp_path):
+def test_a_killed_worker_loses_its_own_case_alone_and_only_if_it_dies_again(tmp_path, monkeypatch):
+    """What workers unpack is gone when they are."""
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    monkeypatch.setattr("tempfile.tempdir", None)
     study = plan(Deadly, "1,3,2,4", note=str(tmp_path / "note"))
     with Records(study, tmp_path / "s") as records:
         found = record_all(study, records, workers=2)
     assert [record["status"] for record in found.values()] == ["done", "lost", "done", "done"]
     assert len(records.by_name) == 3
+    assert not list(temporary.iterdir())
 
 
 def test_an_interrupted_study_says_how_it_goes_on_and_does(tmp_path, monkeypatch):

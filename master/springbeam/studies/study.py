@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from importlib import import_module, metadata
 from itertools import islice
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any, ClassVar
 
@@ -354,18 +355,23 @@ def _as_done(
 
 @contextmanager
 def _processes(workers: int) -> Iterator[Callable[..., Future[Row]]]:
-    """Open a pool of processes, of which one that dies is replaced; they are ended at once if its user gives up."""
-    environment = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(_ONE_THREAD)
-    pool = ProcessPool(workers, context=multiprocessing.get_context("spawn"))
-    try:
-        yield lambda function, case: pool.schedule(function, (case,))
-        pool.close()
-    finally:
-        pool.stop()
-        pool.join()
-        for name, value in environment.items():
-            os.environ.pop(name) if value is None else os.environ.update({name: value})
+    """Open a pool of processes, of which one that dies is replaced; they are ended at once if its user gives up.
+
+    They end without clearing up after themselves, so the folder of their temporary files is removed here.
+    """
+    with TemporaryDirectory(prefix="springbeam-", ignore_cleanup_errors=True) as folder:
+        own = {**_ONE_THREAD, "TMPDIR": folder}
+        before = {name: os.environ.get(name) for name in own}
+        os.environ.update(own)
+        pool = ProcessPool(workers, context=multiprocessing.get_context("spawn"))
+        try:
+            yield lambda function, case: pool.schedule(function, (case,))
+            pool.close()
+        finally:
+            pool.stop()
+            pool.join()
+            for name, value in before.items():
+                os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
 @contextmanager
