@@ -54,21 +54,25 @@ def _body(
         return IsolatedBody(spec, spec is scene.upper, start_time, found)
     if isinstance(spec, Spring):
         return FmuSpring.of(spec, start_time, top_at_rest(scene, contact) if scene.static else None)
-    if not isinstance(spec, Beam):
-        return ELEMENTS[spec.element](**spec.model_dump(exclude={"element"}))
+    if isinstance(spec, Beam):
+        return (_massless_beam if scene.massless else _beam)(scene, spec, start_time, contact)
+    return ELEMENTS[spec.element](**spec.model_dump(exclude={"element"}))
+
+
+def _beam(scene: Scene, spec: Beam, start_time: float, contact: float) -> Body:
     if scene.contact.algorithm:  # (62): the midpoint rule on the whole mesh
         spec = spec.model_copy(update={"integrator": "generalized_alpha", "rho_inf": 1.0, "n_modes": 0})
-    rate = spec.initial_velocity_slope
-    if spec.fidelity == "dynamic" and scene.static:
-        return FmuBeam.of(spec, start_time, 0.0, scene.loads, contact)
-    if spec.fidelity == "dynamic":
-        return FmuBeam.of(spec, start_time, spec.initial_deflection_slope + start_time * rate, scene.loads)
-    if scene.static:
+    slope = spec.initial_deflection_slope + start_time * spec.initial_velocity_slope
+    held = (0.0, scene.loads, contact) if scene.static else (slope, scene.loads)
+    return FmuBeam.of(spec, start_time, *held)
+
+
+def _massless_beam(scene: Scene, spec: Beam, start_time: float, contact: float) -> Body:
+    if (start := scene.at_start("beam")) is None:  # at rest under the loads and the contact force
         tip = tip_load_deflection(spec) + contact * tip_compliance(spec)
         return QuasiStaticBeam(spec, scene.coupling.degree, tip, 0.0)
-    tip_at_start = scene.at_start("beam")
-    assert tip_at_start is not None
-    tip, velocity = tip_at_start.value + start_time * rate * spec.length, rate * spec.length
+    rate = spec.initial_velocity_slope
+    tip, velocity = start.value + start_time * rate * spec.length, rate * spec.length
     beam = QuasiStaticBeam(spec, scene.coupling.degree, tip, velocity)
     if spec.approach == "elastic" or scene.contact.soft:
         beam.release()

@@ -125,7 +125,7 @@ class Scene(Table):
         return None
 
     def at_start(self, table: str) -> Height | None:
-        """Return where the end of the body ``[table]`` is at the start.
+        """Return where the end of the body ``[table]``, or the stop, is at the start.
 
         ``None`` where only an FMU knows, or it is found. For our spring that is Ψ, for our beam s₀ L, or its static
         deflection if it is let go without inertia and damping.
@@ -147,9 +147,7 @@ class Scene(Table):
         """
         if self.upper is None or self.contact.lasting:
             return None
-        if self.lower is not None:
-            return self.at_start("spring")
-        return None if self.stop is None else Height("stop.position", self.stop.position)
+        return self.at_start("stop" if self.lower is None else "spring")
 
     @property
     def initial_clearance(self) -> float | None:
@@ -202,7 +200,5 @@ TABLES: dict[str, type[Table]] = {
 
 def split_key(text: str) -> tuple[str, str] | None:
     """Return table and key of ``"table.key"`` or ``"loads.0.key"``; ``None`` if it is neither."""
-    found = re.fullmatch(r"\s*(loads\s*\.\s*\d+|[^.]*?)\s*\.(.*)", text, re.DOTALL)
-    if found is None or not found[1] or not found[2].strip():
-        return None
-    return re.sub(r"\s", "", found[1]) if found[1].startswith("loads") else found[1], found[2].strip()
+    found = re.fullmatch(r"\s*(loads\.\d+|[^.\s]+)\.(\S.*?)\s*", text, re.DOTALL)
+    return None if found is None else (found[1], found[2])

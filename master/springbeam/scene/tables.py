@@ -73,7 +73,7 @@ class Table(BaseModel):
     WAYS: ClassVar[tuple[Ways, ...]] = ()
     #: Keys that give the table its scales: of a table with none of them, those that are needed are 1 (dimensionless).
     SCALES: ClassVar[tuple[str, ...]] = ()
-    #: Of a body: the key that says where its end is at the start; ``None`` where only an FMU knows.
+    #: Of a body, or the stop: the key that says where its end is at the start; ``None`` where only an FMU knows.
     START: ClassVar[str | None] = None
 
     #: Which keys follow from others: where they do, by the keys given, and their values, by the values of these.
@@ -280,6 +280,8 @@ class Spring(Table):
 
 class Stop(Table):
     """Rigid foundation: 0 ≤ N ⊥ y − φ ≥ 0 (Ahn & Tate, (8))."""
+
+    START = "position"
 
     position: float = key("m", "height φ, below that of the spring's top")
     restitution: float = key("–", "restitution e: speed after an impact over that before", 1.0, ge=0.0, le=1.0)
