@@ -26,6 +26,7 @@ from ..run.checkpoint import Checkpoint
 from ..run.outcome import Progress
 from ..scene import Scene, load_scene
 from ..scene.suspicions import implausible
+from ..studies.tables import table
 from .common import (
     BAD_INPUT,
     STOPPED,
@@ -302,22 +303,18 @@ def picked_in_words(accuracy: Mapping[str, Any]) -> str:
     return f"{accuracy['asked']:g} asked: {found['scheme']} {found['degree']}, H = {found['macro_step']:.3g} s"
 
 
-def _event_table(first: list[Event], more: int, scene: Scene) -> Table:
+def _event_table(events: list[Event], more: int, scene: Scene) -> Table:
     position, speed = ("u_tip", "v_tip") if scene.lower is None else ("y", "z")
-    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
-    table.add_column("event", no_wrap=True)
-    units = {"time": "s", position: "m", speed: "m/s", "on the tip": "N·s", "of the stop": "N·s", "lost": "J"}
-    for name, unit in units.items():
-        table.add_column(Text(f"{name}\n[{unit}]"), justify="right", no_wrap=True)
-    scales = {name: max(abs(getattr(event, name) or 0.0) for event in first) for name in (position, speed)}
-    for event in first:
-        impulses = (event.impulse_contact, event.impulse_foundation)
-        table.add_row(
+    names = ("time\n[s]", f"{position}\n[m]", f"{speed}\n[m/s]", "on the\ntip [N·s]", "of the\nstop [N·s]", "lost\n[J]")
+    scales = {name: max(abs(getattr(event, name) or 0.0) for event in events) for name in (position, speed)}
+    rows = [
+        (
             event.kind,
             f"{event.time:.8f}",
             *("" if getattr(event, name) is None else rounded(getattr(event, name), scales[name]) for name in scales),
-            *(f"{value:.3g}" if value else "" for value in (*impulses, event.energy_loss)),
+            *(f"{x:.3g}" if x else "" for x in (event.impulse_contact, event.impulse_foundation, event.energy_loss)),
         )
-    if more > 0:
-        table.add_row("⋮", Text(f"{more} more"))
-    return table
+        for event in events
+    ]
+    unseen = [("⋮", f"{more} more", *[""] * 5)] * (more > 0)
+    return table(("event", *names), rows + unseen)
