@@ -14,7 +14,7 @@ from runs import a_trajectory
 
 from springbeam.run.runner import simulate
 from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
-from springbeam.studies import picture, sweep
+from springbeam.studies import picture, study, sweep
 from springbeam.studies.converge import Converge
 from springbeam.studies.design import design, parse_axis
 from springbeam.studies.metrics import METRICS as METRICS_THERE_ARE
@@ -169,6 +169,21 @@ def test_a_missing_cluster_is_bad_input(tmp_path, monkeypatch):
     result = command("sweep", "duffing", "--vary", "spring.mass=1,2", *away)
     assert result.exit_code == 2
     assert "--scheduler 127.0.0.1:1: cannot be reached" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_cluster_with_another_springbeam_is_bad_input(tmp_path, monkeypatch):
+    """Its rows would be those of another program."""
+    from distributed import LocalCluster
+
+    own = study.metadata.version
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0") as local:
+        monkeypatch.setattr(study.metadata, "version", lambda name: "9.9" if name == "springbeam" else own(name))
+        cluster = ["--scheduler", local.scheduler_address, "--out", tmp_path / "out"]
+        result = command("sweep", "duffing", "--vary", "spring.mass=1,2", *cluster)
+    assert result.exit_code == 2
+    assert "the workers need springbeam 9.9, as is here; " in result.stderr
+    assert f" has {own('springbeam')}" in result.stderr
     assert not (tmp_path / "out").exists()
 
 
