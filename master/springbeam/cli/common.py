@@ -95,12 +95,10 @@ class Command(_TellingParameters, TyperCommand):
         rest: list[str] = super().parse_args(ctx, args)
         if rest and not ctx.resilient_parsing:
             setting = next((text for text in rest if "=" in text and "." in text.partition("=")[0]), None)
-            hint = f". Did you mean --set {setting}?" if setting and "--set" in self._options(ctx) else ""
+            settable = any("--set" in parameter.opts for parameter in self.get_params(ctx))
+            hint = f". Did you mean --set {setting}?" if setting and settable else ""
             ctx.fail(f"Unexpected argument {' '.join(rest)}{hint}")
         return rest
-
-    def _options(self, ctx: Any) -> set[str]:
-        return {option for parameter in self.get_params(ctx) for option in parameter.opts}
 
     def invoke(self, ctx: Any) -> Any:
         with interruptible():

@@ -152,12 +152,6 @@ class Tradeoff(Study):
         """The solution of the same model."""
         return event_driven.simulate(self.scene, sample_times=self.times)
 
-    def rows(self, records: Mapping[str, Row]) -> list[Row]:
-        """Return a row per configuration."""
-        found = super().rows(records)
-        front = pareto(found)
-        return [row | {"on_front": row in front} for row in found]
-
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Name the cheapest configurations, and those that nothing beats."""
         rows, notes, until = self.rows(records), self.notes(records), self.scene.time.t_end
