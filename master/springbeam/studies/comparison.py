@@ -30,8 +30,7 @@ from ..results.trajectory import TOLD, Trajectory, columns_of
 from ..run.runner import simulate
 from ..scene import Scene, with_changes
 from ..scene.automatic import with_scheme_chosen
-from ..scene.resolution import mesh_frequency
-from ..scene.statics import tip_compliance
+from ..scene.resolution import mesh_frequency, slowest_frequency
 from .study import Row
 
 Verdict = Literal["agrees", "differs", "not comparable"]
@@ -195,8 +194,7 @@ def _rounding(scene: Scene, name: str) -> float:
     beam = scene.beam
     if beam is None:
         return 0.0
-    slowest = 2.0 / np.sqrt(beam.density * beam.area * beam.length * tip_compliance(beam))
-    ratio = max(1.0, mesh_frequency(beam) / slowest)
+    ratio = max(1.0, mesh_frequency(beam) / slowest_frequency(beam))
     return float(np.finfo(float).eps * ratio ** (2 if name in TOLD else 1))
 
 
