@@ -174,6 +174,11 @@ def test_a_tolerance_takes_the_place_of_the_macro_step_and_back():
     assert scene_from_dict({**load_pair(), "coupling": {}}).coupling.H == 0.004  # without either
 
 
+def test_another_body_takes_the_place_of_all_keys_of_the_one_before():
+    scene = with_changes(load_scene("soft"), stop=None, spring={"element": "rigid_wall", "position": -0.1})
+    assert scene.lower.model_dump() == {"element": "rigid_wall", "position": -0.1}
+
+
 def outcome(data):
     try:
         return scene_from_dict(data)
@@ -239,6 +244,7 @@ def test_other_ways_to_give_a_beam_mean_the_same(given, follows):
     kept = scene.model_dump(exclude_none=True)["beam"]
     assert given.items() <= kept.items()
     assert not kept.keys() & without.keys()
+    assert kept["n_elements"] == 50  # defaults are in it
     assert with_changes(scene, title="again").beam == scene.beam
     assert with_changes(scene, beam={"shear_coefficient": 0.7}).beam.shear_coefficient == 0.7
     back = with_changes(scene, beam={**follows, **{k: 1.0 for k in without if k not in follows}})

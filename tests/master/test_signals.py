@@ -134,6 +134,12 @@ def test_an_undamped_oscillator_answers_a_half_sine_as_the_published_curve_says(
     assert product[curve.argmax()] == pytest.approx(0.81, abs=0.011)
 
 
+def test_a_base_that_moves_on_steadily_is_no_shock():
+    """Only its changes of velocity are: before the first sample and after the last it goes on as there."""
+    steady = shock_spectrum(np.full(100, 7.0), 1e-3, np.array([20.0]))
+    assert steady.maximax == pytest.approx(0.0, abs=1e-9)
+
+
 @pytest.mark.parametrize(("frequency", "quality"), [(0.0, 10.0), (6e5, 10.0), (100.0, 0.5), (100.0, np.inf)])
 def test_what_has_no_spectrum_is_refused(frequency, quality):
     with pytest.raises(SceneError):
