@@ -31,7 +31,7 @@ hypothesis.settings.load_profile("springbeam")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="session", autouse=True)
 def fmu_folder():
     """The folder with the built FMUs."""
     folder = ROOT / "fmus"

@@ -14,8 +14,6 @@ from springbeam import RunStopped, SceneError, load_scene, simulate, with_change
 from springbeam.results.totals import LOSS_NAMES
 from springbeam.scene.statics import SHAPE_POINTS
 
-pytestmark = pytest.mark.usefixtures("fmu_folder")
-
 SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2}, coupling={"macro_step": 1e-3, "degree": 2})
 
 

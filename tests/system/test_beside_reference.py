@@ -11,8 +11,6 @@ from springbeam import simulate, with_changes
 from springbeam.monolithic import event_driven
 from springbeam.scene.reading import tomllib
 
-pytestmark = pytest.mark.usefixtures("fmu_folder")
-
 TABLES = tomllib.loads(Path(__file__).with_name("beside_reference.toml").read_text(encoding="utf-8"))
 EXACT, OURS = bodies.simulate, simulate
 

@@ -29,8 +29,6 @@ from springbeam.results.recording import FileRecorder
 from springbeam.run import runner
 from springbeam.run.checkpoint import Checkpoint, CheckpointRefused
 
-pytestmark = pytest.mark.usefixtures("fmu_folder")
-
 SCENE = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 2e-3})
 CHANGES = ["--set", "beam.n_elements=10", "--set", "coupling.macro_step=2e-3"]
 

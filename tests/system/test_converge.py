@@ -11,8 +11,6 @@ from springbeam.scene import load_scene, with_changes
 from springbeam.studies.accuracy import pick_mesh
 from springbeam.studies.converge import Converge, settled
 
-pytestmark = pytest.mark.usefixtures("fmu_folder")
-
 
 @pytest.mark.parametrize("sizes", [(1, 2, 4, 8), (1, 2, 5, 10), (3, 4, 7, 30)])
 @pytest.mark.parametrize("order", [0.7, 2.0, 4.0])

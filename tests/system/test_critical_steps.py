@@ -14,8 +14,6 @@ from springbeam.coupling import coupling_of
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.studies.stability.predict import THRESHOLD, critical_step, linear_pair
 
-pytestmark = pytest.mark.usefixtures("fmu_folder")
-
 
 def linear_scene(law, stiffness, scheme, degree, H=4e-3):
     """`soft` with two elements, linear spring and contact (λ in N/m), at rest and without a stop."""

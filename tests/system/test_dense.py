@@ -9,8 +9,6 @@ from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
 from springbeam.studies.metrics import METRICS
 
-pytestmark = pytest.mark.usefixtures("fmu_folder")
-
 SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2})
 #: Parts of `soft` without an event: tied before and after the foundation is struck, apart after the release.
 TIED, FREE = ((0.005, 0.068), (0.075, 0.14)), ((0.15, 0.17),)

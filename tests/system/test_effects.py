@@ -7,8 +7,6 @@ from springbeam import SceneError, load_scene, simulate, with_changes
 from springbeam.scene import suspicions
 from springbeam.scene.suspicions import EFFECTS
 
-pytestmark = pytest.mark.usefixtures("fmu_folder")
-
 #: The tip meets the spring at once, and the spring strikes the stop after some ms.
 SOFT = with_changes(
     load_scene("soft"),

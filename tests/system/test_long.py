@@ -15,8 +15,6 @@ import pytest
 from springbeam.results.files import load_events
 from springbeam.scene import load_scene, with_changes
 
-pytestmark = pytest.mark.usefixtures("fmu_folder")
-
 STEPS = int(os.environ.get("SPRINGBEAM_STEPS", "20000"))
 H = 2e-3
 

@@ -14,8 +14,6 @@ from springbeam.results.files import load_trajectory
 from springbeam.run.ledger import bounds
 from springbeam.scene import with_changes
 
-pytestmark = pytest.mark.usefixtures("fmu_folder")
-
 #: Meets the spring at once and the foundation at 0.07 s.
 SCENE = {
     "time": {"t_end": 0.08},

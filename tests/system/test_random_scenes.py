@@ -21,8 +21,6 @@ from hypothesis import strategies as st
 from springbeam.results.files import load_trajectory
 from springbeam.studies.stability.cells import PARAMETERS, scene_dict
 
-pytestmark = pytest.mark.usefixtures("fmu_folder")
-
 Tables = dict[str, dict[str, Any]]
 SEED = os.environ.get("SPRINGBEAM_SEED")
 EXAMPLES = int(os.environ.get("SPRINGBEAM_EXAMPLES", "25"))

@@ -14,8 +14,6 @@ from springbeam.scene import load_scene
 from springbeam.studies import sweep
 from springbeam.studies.study import FILE, Records, record_all, study_in
 
-pytestmark = pytest.mark.usefixtures("fmu_folder")
-
 SWEEP = ["sweep", "duffing", "--vary", "spring.mass=1:2:5", "--metric", "y_min", "--set", "time.t_end=0.1"]
 
 

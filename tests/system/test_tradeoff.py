@@ -99,7 +99,7 @@ def test_every_axis_is_swept_that_the_law_has(law, there, absent):
 
 
 def test_command(tmp_path):
-    arguments = ["tradeoff", "duffing", "--until", "0.5", "--repeats", "2", "--json", "--out", str(tmp_path / "out")]
+    arguments = ["tradeoff", "duffing", "--until", "0.2", "--repeats", "2", "--json", "--out", str(tmp_path / "out")]
     table = json.loads(printed(*arguments))
     assert [row["error"] for row in table["cheapest"]] == [1e-2, 1e-4, 1e-6, 1e-8]
     assert table["cheapest"][3]["co_simulation"]["error"] <= 1e-8
@@ -183,5 +183,5 @@ def test_the_implicit_methods_get_the_jacobian(method):
 
 def test_bounces_that_die_out_end_no_comparison():
     """The last of them are microseconds apart: another one comes first if the initial velocity changes a little."""
-    scene = with_changes(load_scene("beam-on-stop"), beam={"n_elements": 20})
+    scene = with_changes(load_scene("beam-on-stop"), beam={"n_elements": 8})
     assert Tradeoff.of(scene).scene.time.t_end == 1.0

@@ -1,0 +1,389 @@
+"""Couplings by themselves, on bodies exact to rounding: energy, orders, cost, stability, failures."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from bodies import DuffingBody, Upper, couple, orders, simulate, solve, stopping, unit_beam
+
+from springbeam import RigidWall, RunStopped, load_scene, with_changes
+from springbeam.bodies import force
+from springbeam.bodies.protocol import NO_FORCE, Body, Motion
+from springbeam.contact.laws import Compliance, Link
+from springbeam.coupling.exchange import Exchange
+from springbeam.coupling.one_way import OneWay
+from springbeam.coupling.protocol import NotConverged, Scales, Step
+from springbeam.coupling.soft import SoftSolver
+from springbeam.coupling.tie import Tie
+from springbeam.results.steps import STEP
+from springbeam.run.neglect import Neglect
+
+# -- the tie by itself, on bodies exact to rounding: conditions, energy, orders, cost, stability, failures ------------
+
+
+SCHEMES = [("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2)]
+
+
+def after_impact(n, stiffness=100.0, **spring):
+    """A beam that has just met a spring top at rest inelastically."""
+    beam, top = unit_beam(n, stiffness), DuffingBody(**spring)
+    j = 1.0 / (1.0 / beam.mass + 1.0 / top.mass)
+    beam.apply_impulse(j)
+    top.apply_impulse(-j)
+    return beam, top
+
+
+# -- the conditions -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("scheme", "degree"), SCHEMES)
+def test_a_wild_guess_does_not_loosen_the_conditions(scheme, degree):
+    """1e15 N throws the ends by 1e4 km in 10 μs before the force is found; 16 ulp of that, 4e-8 m, are more than the
+    whole contact force moves them in such a step."""
+    size = 1e-5
+    beam, spring = after_impact(6)
+    tie = Tie(scheme, degree, 1e-12)
+    for guess in ((1e15, 0.0, 0.0), NO_FORCE, NO_FORCE):
+        solve(tie, size, beam, spring, guess)
+    assert abs(beam.motion().displacement - spring.motion().displacement) <= 1e-12 * size
+
+
+def test_the_responses_of_64_sizes_are_remembered_those_used_last():
+    beam, spring = after_impact(2)
+    tie = Tie("energy", 0, 1e-12)
+    sizes = [1e-3 * (1.0 + k / 100.0) for k in range(66)]
+    for size in (*sizes[:64], sizes[0], *sizes[64:]):
+        solve(tie, size, beam, spring)
+    assert list(tie.state.of_size) == [*sizes[3:64], sizes[0], *sizes[64:]]
+
+
+# -- energy ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize("frequency", [0.5, 5.0, 1000.0])
+@pytest.mark.parametrize(("mass", "k2"), [(0.01, 0.3), (1.0, 0.0), (1.0, 3e3), (100.0, 3e3)])
+def test_energy_schemes_conserve_energy(degree, frequency, mass, k2):
+    """60 steps. A gap of the tolerance costs C·1e-12·(motion), at most 1e-11 of the energy where C is the image of
+    mismatched velocities, and up to 1000 times that is accepted where the bodies' rounding is; hermite changes it by
+    1e-4 and more."""
+    beam, spring = after_impact(6, 1e6, mass=mass, k1=3.0, k2=k2)
+    start, *rows = couple(Tie("energy", degree, 1e-12), frequency / beam.omega.max(), 60, beam, spring)
+    assert max(abs(row.energy - start.energy) for row in rows) < 1e-8 * start.energy
+
+
+# -- orders ---------------------------------------------------------------------------------------------------------
+
+T = 0.064
+
+
+def smooth_phase(scheme, degree, count):
+    """u, u̇ and the mean of both limits of C at the macro points inside (0, T), shape (count − 1,) each."""
+    size = T / count
+    _, *rows = couple(Tie(scheme, degree, 1e-12), size, count, *after_impact(3))
+    u = np.array([(row.upper.displacement, row.upper.velocity) for row in rows[:-1]]).T
+    c = [0.5 * (force.value(a.force, size) + b.force[0]) for a, b in pairwise(rows)]
+    return u[0], u[1], np.array(c)
+
+
+@pytest.fixture(scope="module")
+def reference():
+    """hermite of degree 2 at T/512: displacement and velocity to 1e-15, C to 1e-10 N."""
+    return smooth_phase("hermite", 2, 512)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "degree", "counts", "expected"),
+    [
+        ("energy", 0, (64, 128), (4, 2, 2)),
+        ("energy", 1, (32, 64), (4, 2, 2)),
+        ("energy", 2, (8, 16), (8, 4, 4)),
+        ("hermite", 1, (32, 64), (4, 4, 2)),
+        ("hermite", 2, (16, 32), (6, 6, 4)),
+    ],
+)
+def test_orders_of_displacement_velocity_and_force(scheme, degree, counts, expected, reference):
+    """Smooth tied phase. Steps of each scheme are such that the errors are above rounding and ω_max·H < 1."""
+    errors = []
+    for count in counts:
+        every = 512 // count
+        inside = slice(count // 8, None)  # the force of the first steps carries the impact
+        differences = [
+            np.abs(ours - exact[every - 1 :: every])
+            for ours, exact in zip(smooth_phase(scheme, degree, count), reference, strict=True)
+        ]
+        errors.append([differences[0].max(), differences[1].max(), differences[2][inside].max()])
+    observed = [orders(column, (2.0, 1.0))[0] for column in np.array(errors).T]
+    assert observed == pytest.approx(expected, abs=0.4)
+
+
+# -- cost and failures ----------------------------------------------------------------------------------------------
+
+
+class Deaf(DuffingBody):
+    """Jumps to where the contact force does not push the tip: no force closes the gap."""
+
+    def advance(self, time, size, contact, foundation=NO_FORCE):
+        super().advance(time, size, NO_FORCE, foundation)
+        self.y = -0.5 if contact[0] > 0.0 else 0.5
+        return self.motion()
+
+
+def test_not_converged_carries_the_gap_that_is_left():
+    with pytest.raises(NotConverged) as caught:
+        solve(Tie("energy", 0, 1e-12), 1e-3, unit_beam(4), Deaf())
+    # The tip, falling 1 mm, is on the other side of zero from where the end jumps to: 0.5 m at least.
+    assert 0.499 <= caught.value.residual < float("inf")
+    assert f"{caught.value.residual:.3g} m" in str(caught.value)
+
+
+class Grainy(DuffingBody):
+    """Tells its displacement in multiples of ``grain`` [m]."""
+
+    grain = 1.0
+
+    def motion(self):
+        exact = super().motion()
+        return exact._replace(displacement=self.grain * round(exact.displacement / self.grain))
+
+
+@pytest.mark.parametrize(("grain", "found"), [(1e-13, True), (1e-11, False)])
+def test_a_body_may_be_rounded_by_a_thousand_tolerances_and_no_more(grain, found):
+    """The tolerance is 1e-12 of the distance in a step, 0.5 m/s · 1 ms."""
+    upper, lower = Upper(1.0, 100.0, 0.0, z=0.5), Grainy(1.0, 50.0, 0.0, z=0.5)
+    lower.grain = grain
+    if found:
+        rows = couple(Tie("energy", 0, 1e-12), 1e-3, 20, upper, lower)
+        assert max(abs(row.upper.displacement - row.lower.displacement) for row in rows) <= grain
+    else:
+        with pytest.raises(NotConverged):
+            couple(Tie("energy", 0, 1e-12), 1e-3, 20, upper, lower)
+
+
+# -- soft laws on bodies exact to rounding: energy at any stiffness, orders 2, 4 and 6, cost --------------------------
+
+
+DEGREES = [0, 1, 2]
+
+
+def couple_by(law, degree, size, steps, upper, lower):
+    """The rows; their energies are conserved to 1e-11, through whatever is dissipated."""
+    coupling = SoftSolver(law, degree, 1e-13)
+    rows = couple(coupling, size, steps, upper, lower)
+    assert max(abs(row.energy - rows[0].energy) for row in rows) < 1e-11 * rows[0].energy
+    return rows, coupling
+
+
+@pytest.mark.parametrize("degree", DEGREES)
+@pytest.mark.parametrize("q", [1.0, 1.5, 3.0])
+@pytest.mark.parametrize("stiffness", [1e2, 1e4, 1e6, 1e8, 1e10])
+def test_energy_is_conserved_at_any_stiffness(stiffness, q, degree):
+    """H = 2 ms, up to √(λ/m_tip) H = 10⁴: rounding of 100 steps, C (1e-13 relative) times what p changes."""
+    rows, _ = couple_by(Compliance(stiffness, q), degree, 2e-3, 100, unit_beam(4), DuffingBody(k1=3.0, k2=-0.2))
+    assert max(row.force[0] for row in rows) > 0.0
+
+
+@pytest.mark.parametrize(("degree", "order"), [(0, 2.0), (1, 4.0), (2, 6.0)])
+@pytest.mark.parametrize("q", [1.5, 2.0, 3.0])
+def test_the_order_is_twice_the_number_of_coefficients(degree, order, q):
+    """y and u at t = 0.08 s, contact throughout, against degree 2 at H/8; for degree 2 as long as it is no rounding."""
+    law, t = Compliance({1.5: 3e2, 2.0: 1e4, 3.0: 1e6}[q], q), 0.08
+    counts = (4, 8, 16) if degree == 2 else (16, 32, 64)
+
+    def last(d, n):
+        rows, _ = couple_by(law, d, t / n, n, unit_beam(2, slope=-0.3), DuffingBody(k1=3.0, k2=-0.2))
+        return np.array([rows[-1].upper.displacement, rows[-1].lower.displacement])
+
+    exact = last(2, 8 * counts[-1])
+    errors = [np.abs(last(degree, n) - exact).max() for n in counts]
+    assert errors[-1] > 1e-14
+    assert orders(errors, [1.0 / n for n in counts])[-1] == pytest.approx(order, abs=0.35)
+
+
+@pytest.mark.parametrize("law", [Compliance(1e4, 1.5, 0.5), Compliance(1e6, 1.0, 5.0), Link(1e4, 3.0)], ids=repr)
+@pytest.mark.parametrize("degree", DEGREES)
+@pytest.mark.parametrize("size", [1e-3, 2e-2])
+def test_what_damping_takes_is_booked(law, degree, size):
+    """The bodies' and the law's energies and what the law dissipated: constant to rounding, at any step."""
+    rows, coupling = couple_by(law, degree, size, 100, unit_beam(4), DuffingBody(k1=3.0, k2=-0.2))
+    assert coupling.state.dissipated > 1e-4
+    assert max(abs(row.energy - rows[0].energy) for row in rows) < 1e-12 * rows[0].energy
+
+
+class Affine(Body):
+    """Ends a step at ``free`` + ``response``·C [m]."""
+
+    def __init__(self, free, response, size):
+        self.free, self.response, self.mass, self.state = free, response, 0.5 * size**2 / abs(response), 0.0
+
+    def advance(self, time, size, contact, foundation=NO_FORCE):
+        self.state = self.free + self.response * contact[0]
+        return self.motion()
+
+    def motion(self):
+        return Motion(self.state, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("response", [1e-12, 1.0, 1e4])
+@pytest.mark.parametrize("depth", [1e-9, 10.0])
+def test_forces_are_found_however_far_they_move_the_ends(depth, response):
+    """λ = 1e12 N/m, q = 1, contact from the start of the step: C = λ p⁺/2 with p⁺ = depth − 2·response·C. The force at
+    C = 0 is up to 1e16 times the one that is looked for."""
+    ends = Affine(-depth, response, 1e-3), Affine(0.0, -response, 1e-3)
+    c = solve(SoftSolver(Compliance(1e12, 1.0), 0, 1e-12), 1e-3, *ends)[0]
+    assert c == pytest.approx(1e12 * depth / (2.0 + 2e12 * response), rel=1e-11)
+
+
+@pytest.mark.parametrize("law", [Compliance(1e4, 1.5, 0.5), Link(1e4, 3.0)], ids=repr)
+def test_a_step_made_at_degree_0_books_what_damping_takes_at_degree_0(law, monkeypatch):
+    """The solver fails at degree 2 in every step; energy to rounding all the same, at what degree 0 dissipates."""
+    aim = SoftSolver.aim
+
+    def fails_above_0(self, gap, a, descent, size, start):
+        if self.degree > 0:
+            raise NotConverged(1.0, 1)
+        return aim(self, gap, a, descent, size, start)
+
+    monkeypatch.setattr(SoftSolver, "aim", fails_above_0)
+    rows, coupling = couple_by(law, 2, 2e-2, 100, unit_beam(4), DuffingBody(k1=3.0, k2=-0.2))
+    assert coupling.state.reduced >= 12
+    assert coupling.state.dissipated > 1e-4
+    assert max(abs(row.energy - rows[0].energy) for row in rows) < 1e-12 * rows[0].energy
+
+
+@pytest.mark.parametrize("degree", DEGREES)
+def test_the_error_of_a_step_is_the_same_in_any_unit_of_mass(degree):
+    """Three orders of magnitude more of λ and of both masses move the ends as before."""
+    ends = [
+        (Motion(u, 0.0, u, 0.5 * u), Motion(u + p, 0.0, u + 0.4 * p, 0.1 * p)) for u, p in ((0.0, 1e-3), (0.1, 3e-3))
+    ]
+    step = Step(0.0, 0.01, NO_FORCE, NO_FORCE, *ends)
+    (light,), (heavy,) = (
+        SoftSolver(Compliance(factor, 1.5), degree, 1e-12).local_errors(step, Scales(1.0, 0.5, factor, factor))
+        for factor in (1.0, 1e3)
+    )
+    assert light == pytest.approx(heavy, rel=1e-12)
+    assert light[0] > 0.0
+
+
+@pytest.mark.parametrize(("sequential", "degree", "pressed"), [
+    (False, 0, 2.0), (False, 1, 2.0 + 1.0), (True, 0, 2.0 + 1.0 - 0.002), (True, 1, 2.0 + 1.0 - 0.004 / 3.0),
+])  # fmt: skip
+def test_exchanged_forces_are_of_the_ends_as_they_were_exchanged(sequential, degree, pressed):
+    """p = 2 mm grows by 0.5 m/s over 4 ms, λ = 1 kN/m: the mean force on the lower mass is λ p at the start, 2 N,
+    half-way of its continuation, or with the tip where the force on it, 2 or 2 + 500 t N, has brought it."""
+    upper, lower = Upper(8.0, 0.0, 0.0, y=0.0, z=-0.25), DuffingBody(8.0, 0.0, 0.0, y=2e-3, z=0.25)
+    solve(Exchange(Compliance(1e3, 1.0), sequential, degree), 4e-3, upper, lower)
+    assert 8.0 * (0.25 - lower.z) / 4e-3 == pytest.approx(pressed, abs=1e-9)
+
+
+# -- one-way coupling: what it neglects stays below the bound, one body steps once, the ledger closes -----------------
+
+
+LAW = (100.0, 1.0)
+
+
+def scene(**tables):
+    """`soft` with normal compliance on a beam some 1e4 times stiffer than the contact."""
+    base = {
+        "time": {"t_end": 0.04},
+        "contact": {"law": "compliance", "stiffness": LAW[0], "exponent": LAW[1]},
+        "beam": {"young_modulus": 1e6, "shear_modulus": 1e6, "n_elements": 8},
+        "coupling": {"macro_step": 2e-4, "feedback_tolerance": 0.1},
+    }
+    return with_changes(load_scene("soft"), **{t: {**base.get(t, {}), **tables.get(t, {})} for t in {**base, **tables}})
+
+
+HEAVY = {"mass": 100.0, "linear_stiffness": 1e6, "cubic_stiffness": 0.0, "initial_velocity": 0.5}
+CASES = {
+    "rings": ("beam_drives", {}),
+    "damped": ("beam_drives", {"beam": {"alpha_b": 1e-3, "n_elements": 2}}),
+    "Hertz": ("beam_drives", {"contact": {"exponent": 1.5, "stiffness": 1e3}}),
+    "lossy foundation": (
+        "beam_drives",
+        {"stop": {"position": -0.002, "restitution": 0.3}, "spring": {"external_force": -0.5}},
+    ),
+    "on the foundation": (
+        "beam_drives",
+        {"stop": {"position": -1e-6, "restitution": 0.0}, "spring": {"external_force": -5.0}},
+    ),
+    "heavy spring": ("spring_drives", {"beam": {"young_modulus": 100.0, "shear_modulus": 100.0}, "spring": HEAVY}),
+}
+
+
+@pytest.mark.parametrize("what", CASES)
+def test_what_is_neglected_is_below_the_bound(what):
+    """|Δu| ≤ 2V/k at the driving end, and not far below: the contact rings at the beam's own frequencies."""
+    feedback, changes = CASES[what]
+    two_way = simulate(scene(**changes))
+    one_way = simulate(scene(**{**changes, "coupling": {"feedback": feedback}}))
+    driver, driven = ("u_tip", "y") if feedback == "beam_drives" else ("y", "u_tip")
+    _, mine, theirs = np.intersect1d(one_way.time, two_way.time, return_indices=True)
+    assert len(mine) > 180
+    difference = {name: np.abs(one_way[name][mine] - two_way[name][theirs]).max() for name in (driver, driven)}
+    bound = one_way.summary["neglected_motion"]
+    assert 0.02 * bound < difference[driver] < bound
+    assert difference[driven] < bound
+    assert one_way.summary["max_energy_residual"] < 1e-13
+
+
+def test_a_step_on_the_foundation_is_of_the_degree_asked_for_whatever_was_tried_before(monkeypatch):
+    """A step with the lower end let go was tried, found no force above degree 0, and was not taken."""
+    coupling = OneWay(Compliance(1e3, 1.5), 2, 1e-12, upper_drives=True)
+    beam, top, wall = unit_beam(4), DuffingBody(), RigidWall(0.0)
+    aim = SoftSolver.aim
+
+    def fails_above_0(self, *given):
+        if self.degree > 0:
+            raise NotConverged(1.0, 1)
+        return aim(self, *given)
+
+    with monkeypatch.context() as failing:
+        failing.setattr(SoftSolver, "aim", fails_above_0)
+        assert solve(coupling, 1e-2, beam, top)[1:] == (0.0, 0.0)
+    beam.rewind()
+    start = beam.motion(), wall.motion()
+    contact = solve(coupling, 1e-2, beam, wall)
+    coupling.accept(Step(0.0, 1e-2, contact, NO_FORCE, start, (beam.motion(), wall.motion())))
+    assert contact[2] != 0.0
+    assert coupling.state.reduced == 0
+
+
+def steps_under(forces, depths):
+    """Steps of 1 s under these forces, at whose ends the tip has sunk so deep [m]."""
+    table = np.array(list(forces))
+    steps = np.zeros(len(table), STEP)
+    steps["size"], steps["y"] = 1.0, list(depths)
+    for name, values in zip(("", "_rate", "_rate_2"), table.T, strict=True):
+        steps[f"contact_force{name}"] = values
+    return steps
+
+
+def test_what_is_neglected_is_twice_the_variation_of_the_force_over_the_stiffness():
+    """In one look or in several."""
+    steps = steps_under([(c, 0.0, 0.0) for c in (2.0, 5.0, 1.0, 0.0)], [0.02, 0.05, 0.01, -0.2])
+    motion, share = Neglect(scene().coupling, 50.0).by(steps)
+    assert motion == pytest.approx(2.0 * np.cumsum([2.0, 3.0, 4.0, 1.0]) / 50.0)
+    assert share == pytest.approx(motion / [0.02, 0.05, 0.05, 0.05])
+    in_parts, event = Neglect(scene().coupling, 50.0), np.zeros(1, STEP)  # a row that ends no step changes nothing
+    for part in (steps[:1], event, steps[1:3], steps[3:]):
+        last, beside = in_parts.by(part)
+    assert (last[-1], beside[-1]) == (motion[-1], share[-1])
+
+
+def test_the_bound_counts_the_turns_of_a_polynomial_force():
+    """∫|Ċ| of 1 − 6τ + 6τ² over [0, 1]: from 1 down to −1/2 and up again, 3; the jump to its start, 1."""
+    for polynomial, expected in (((1.0, 0.0, 0.0), 1.0), ((1.0, -6.0, 0.0), 7.0), ((1.0, -6.0, 12.0), 4.0)):
+        motion, _ = Neglect(scene().coupling, 2.0).by(steps_under([polynomial], [0.0]))
+        assert motion[0] == pytest.approx(expected)
+
+
+def test_a_run_stops_when_the_bound_passes_the_tolerance():
+    allowed = 2e-4
+    coupling = {"feedback": "beam_drives", "feedback_tolerance": allowed}
+    run, stopped = stopping(scene(contact={"exponent": 1.5, "stiffness": 1e3}, coupling=coupling))
+    assert isinstance(stopped, RunStopped)
+    for words in ("'beam_drives'", "feedback_tolerance = 0.0002", "'two_way'"):
+        assert words in str(stopped)
+    assert 0.0 < run.time[-1] < 0.04
+    assert allowed < run.summary["neglected_share"] < 1.1 * allowed

@@ -1,0 +1,170 @@
+"""Inside a step: paths of positions, sign changes of polynomials, the contact force."""
+
+import numpy as np
+import pytest
+from numpy.polynomial import Legendre, Polynomial
+
+from springbeam.bodies import force
+from springbeam.bodies.protocol import Motion
+from springbeam.results.paths import Path
+from springbeam.results.polynomials import sign_changes
+
+# -- The path of a position inside a step: quintics exactly, minima, zeros, the order of its error and of the cubic's
+
+
+SIZE = 0.02
+#: Coefficients in s = τ/H, ascending: minima inside, at neither end, two of them, none.
+QUINTICS = [
+    (0.3, 1.0, -4.0, 1.5, 2.0, 1.0),
+    (1.0, -1.0, 1.0),
+    (0.1, -1.0, 9.0, -27.0, 31.0, -12.0),
+    (1.0, 2.0, 0.5, 0.1),
+]
+
+
+def through(p, size=SIZE):
+    """Path through what a step would tell of p(τ/H): values, rates and means."""
+    q, q0 = p.integ(), p.integ(2)
+    samples = [(float(p(s)), float(p.deriv()(s)) / size) for s in (0.0, 1.0)]
+    return Path.through(*samples, size, (float(q(1.0)), float(q0(1.0))))
+
+
+@pytest.mark.parametrize("coefficients", QUINTICS)
+def test_a_quintic_is_met_exactly(coefficients):
+    p = Polynomial(coefficients)
+    path = through(p)
+    for s in np.linspace(0.0, 1.0, 11):
+        assert path.at(s) == pytest.approx(p(s), abs=2e-13)
+        assert path.slope(s) == pytest.approx(p.deriv()(s), abs=2e-12)
+
+
+@pytest.mark.parametrize("coefficients", QUINTICS)
+def test_the_lowest_minimum_is_found(coefficients):
+    p = Polynomial(coefficients)
+    inside = [
+        r.real for r in p.deriv().roots() if abs(r.imag) < 1e-9 and 0.0 < r.real < 1.0 and p.deriv(2)(r.real) > 0.0
+    ]
+    found = through(p).lowest_inside()
+    if inside:
+        assert found == pytest.approx(min(inside, key=p), abs=1e-9)
+    else:
+        assert found is None
+
+
+@pytest.mark.parametrize(("even", "odd"), [(1.0, 0.0), (0.0, -1.0), (0.7, 0.4)])
+def test_path_and_cubic_are_apart_by_no_more_than_they_say(even, odd):
+    """s²(1 − s)² [even + odd (2s − 1)] beside a cubic; one part alone is met."""
+    s, one = Polynomial((0.0, 1.0)), Polynomial((1.0,))
+    beside = s**2 * (one - s) ** 2 * (even * one + odd * (2.0 * s - one))
+    apart = np.abs(beside(np.linspace(0.0, 1.0, 2001))).max()
+    told = through(Polynomial((0.3, -1.0, 2.0, 0.5)) + beside).beside_cubic
+    assert told >= apart * (1.0 - 1e-6)
+    if even * odd == 0.0:
+        assert told == pytest.approx(apart, rel=1e-4)
+
+
+def test_a_quartic_is_beside_the_cubic_through_its_ends_and_a_cubic_is_not():
+    """s⁴ lies s²(1 − s)² above it: 1/30 in the mean, and 1/30 as twice the moment ∫(1 − s) s²(1 − s)² ds = 1/60."""
+    assert through(Polynomial((0.0, 0.0, 0.0, 0.0, 1.0))).moments_beside_cubic == pytest.approx(1.0 / 30.0, rel=1e-12)
+    assert through(Polynomial((0.3, -1.0, 2.0, 7.0))).moments_beside_cubic < 1e-15
+
+
+@pytest.mark.parametrize("x", [1e-6, 0.25, 0.5, 0.999])
+@pytest.mark.parametrize("bend", [0.0, 2.0, -0.5])
+def test_it_falls_through_zero_at_its_root(x, bend):
+    """(x* − s)(1 + bend s²) falls through zero once in (0, 1); 40 bisections find it to 1e-12."""
+    path = through(Polynomial((x, -1.0)) * Polynomial((1.0, 0.0, bend)))
+    assert path.falls_through_zero() == pytest.approx(x, abs=1e-12)
+
+
+def test_a_dip_falls_and_rises_through_zero():
+    """(s − 0.3)(s − 0.8) is lowest at 0.55."""
+    path = through(Polynomial((0.24, -1.1, 1.0)))
+    bottom = path.lowest_inside()
+    assert bottom == pytest.approx(0.55, abs=1e-11)
+    assert path.falls_through_zero(bottom) == pytest.approx(0.3, abs=1e-12)
+    assert path.rises_through_zero(bottom) == pytest.approx(0.8, abs=1e-12)
+
+
+def test_of_two_falls_the_last_one_counts_and_a_dip_before_it_is_asked_for():
+    """(s − 0.2)(s − 0.4)(0.9 − s): a path that rounding makes fall at its start as well is through where it ends so."""
+    path = through(Polynomial.fromroots([0.2, 0.4]) * Polynomial((0.9, -1.0)))
+    assert path.falls_through_zero() == pytest.approx(0.9, abs=1e-12)
+    assert path.falls_through_zero(0.3) == pytest.approx(0.2, abs=1e-12)
+    assert path.rises_through_zero(0.3) == pytest.approx(0.4, abs=1e-12)
+
+
+# -- where polynomials change their sign: their roots, to rounding ----------------------------------------------------
+
+
+INSIDE = [(), (0.2,), (0.2, 0.9), (1e-9, 0.5, 1.0 - 1e-9), (0.1, 0.11, 0.5, 0.7, 0.9)]
+OUTSIDE = [(), (-0.3,), (1.7,), (-0.3, 1.7)]
+
+
+@pytest.mark.parametrize("outside", OUTSIDE)
+@pytest.mark.parametrize("inside", INSIDE)
+@pytest.mark.parametrize("size", [1.0, 0.01])
+def test_sign_changes_are_the_roots_inside(size, inside, outside):
+    """A root is known to the rounding of the terms' sum over the slope there."""
+    p = Polynomial([3.0])
+    for x in (*inside, *outside):
+        p *= Polynomial((-size * x, 1.0))
+    found = sign_changes(p.coef.tolist(), 0.0, size)
+    assert len(found) == len(inside)
+    for x, root in zip(found, inside, strict=True):
+        rounding = 1e-15 * Polynomial(np.abs(p.coef))(size * root)
+        assert x == pytest.approx(size * root, abs=rounding / abs(p.deriv()(size * root)), rel=1e-15)
+
+
+def test_sign_changes_near_the_start_do_not_cancel():
+    """Roots 1e-12 and 1: the naive quadratic formula leaves four digits of the small one."""
+    assert sign_changes((1e-12, -(1.0 + 1e-12), 1.0), 0.0, 2.0) == pytest.approx([1e-12, 1.0], rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    "p", [(1.0,), (1.0, -2.0, 1.0), (1.0, -2.0, 2.0), (0.0, 1.0), (0.0, 0.0, 1.0), (0.0,), (-5.0, 1.0)]
+)
+def test_no_sign_change_where_a_polynomial_only_touches_zero(p):
+    """Constant; double root; complex roots; roots at the ends themselves."""
+    assert sign_changes(p, 0.0, 5.0) == []
+
+
+def test_values_too_small_to_be_multiplied_have_signs():
+    assert sign_changes((1e-300, -4e-300), 0.0, 1.0) == [0.25]
+
+
+# -- the polynomial contact force of one step against numpy's polynomials and closed forms ----------------------------
+
+
+EPS = float(np.finfo(float).eps)
+#: Degrees 0, 1 and 2, with coefficients of both signs.
+COEFFICIENTS = [(0.7,), (0.7, -2.3), (0.7, -2.3, 1.9), (1e-6, 40.0, -3e3)]
+
+
+@pytest.mark.parametrize("size", [1e-5, 1e-3, 2.0])
+@pytest.mark.parametrize("a", COEFFICIENTS)
+def test_legendre_coefficients_and_derivatives_are_one_polynomial(a, size):
+    """To a few ulp of the largest coefficient: the conversions are sums of at most three terms."""
+    bound = 16 * EPS * max(map(abs, a))
+    f = force.derivatives(a, size)
+    exact = Legendre(a, domain=(0.0, size))
+    assert f[0] == pytest.approx(exact(0.0), abs=bound)
+    for k in (1, 2):
+        # In units of the force, like the coefficients.
+        assert f[k] * size**k == pytest.approx(exact.deriv(k)(0.0) * size**k, abs=12 * bound)
+    assert force.legendre(f, size, len(a) - 1) == pytest.approx(a, abs=bound)
+    for tau in (0.0, 0.31 * size, size):
+        assert force.value(f, tau) == pytest.approx(exact(tau), abs=2 * bound)
+    assert force.value(f, size) == pytest.approx(sum(a), abs=2 * bound)  # P_k(1) = 1
+    assert force.mean(f, size) == pytest.approx(a[0], abs=2 * bound)  # P_k ⊥ 1 for k > 0
+
+
+@pytest.mark.parametrize("size", [1e-4, 0.5])
+def test_the_work_on_an_end_is_of_its_motion_from_wherever_it_starts(size):
+    """∫ C ẇ over w = 0.3 + 0.4 s − 0.7 s² + 0.2 s³, s = τ/H."""
+    w, a = np.polynomial.Polynomial([0.3, 0.4, -0.7, 0.2]), COEFFICIENTS[2]
+    once, twice = w.integ(), w.integ(2)
+    start = Motion(w(0.0), w.deriv()(0.0) / size, 0.0, 0.0)
+    end = Motion(w(1.0), w.deriv()(1.0) / size, size * once(1.0), size**2 * twice(1.0))
+    exact = (Legendre(a, domain=(0.0, 1.0)).convert(kind=np.polynomial.Polynomial) * w.deriv()).integ()(1.0)
+    assert force.work_on(force.derivatives(a, size), start, end, size) == pytest.approx(exact, rel=1e-13)
