@@ -393,7 +393,7 @@ NAMES = {
     "no such parameter": ({"parameters": {"kk": 1.0}}, "has no variable 'kk'"),
     "not a parameter": ({"parameters": {"x": 1.0}}, "variable 'x' is output, not a parameter"),
     "text for a number": ({"parameters": {"k": "stiff"}}, "variable 'k' is Real"),
-    "wrong way": ({"force_sign": 1}, "set force_sign = -1"),
+    "wrong way": ({"force_sign": 1}, "a positive 'F' pushes the end up; set force_sign = -1"),
     "wrong mass": ({"mass": 6.0}, "with the mass 6 kg it should"),
 }
 
