@@ -1,71 +1,18 @@
-"""Impacts: momentum, and losses that are what the kinetic energy loses."""
+"""What ends of a contact are left with, and which impacts are the last."""
 
 import pytest
 
 from springbeam import Motion, load_scene, with_changes
 from springbeam.contact.phases import (
-    Impact,
     Joint,
     Phase,
     Transitions,
-    foundation_impact,
-    meeting,
 )
 from springbeam.results.trajectory import EventKind
-
-MASSES = [(0.25, 1.0), (1.0, 0.01), (3.0, 100.0)]
-VELOCITIES = [(-1.0, 0.0), (-0.2, 0.7), (0.1, 0.3)]
-
-
-def kinetic(v, z, tip_mass, mass):
-    return 0.5 * tip_mass * v * v + 0.5 * mass * z * z
 
 
 def after(impact, v, z, tip_mass, mass):
     return v + impact.on_beam / tip_mass, z + impact.on_spring / mass
-
-
-@pytest.mark.parametrize("kind", ["inelastic", "tip", "rest"])
-@pytest.mark.parametrize(("v", "z"), VELOCITIES)
-@pytest.mark.parametrize(("tip_mass", "mass"), MASSES)
-def test_a_meeting_loses_the_difference_of_kinetic_energy(kind, v, z, tip_mass, mass):
-    impact = meeting(kind, v, z, tip_mass, mass)
-    before, left = kinetic(v, z, tip_mass, mass), kinetic(*after(impact, v, z, tip_mass, mass), tip_mass, mass)
-    assert impact.energy_loss == pytest.approx(before - left, abs=1e-13 * (before + left))
-
-
-def test_tip_gives_the_spring_the_tips_velocity_and_books_the_energy_made_and_rest_does_nothing():
-    """z := v = −1 m/s for 2 kg at rest: J = −2 N·s, 1 J from nowhere."""
-    assert meeting("rest", -1.0, 0.5, 0.25, 2.0) == Impact()
-    assert meeting("tip", -1.0, 0.0, 0.25, 2.0) == Impact(on_spring=-2.0, energy_loss=-1.0)
-
-
-@pytest.mark.parametrize("e", [0.0, 0.3, 1.0])
-@pytest.mark.parametrize(("z", "v"), [(-0.7, -0.7), (-0.7, -0.5), (-0.7, 0.1), (-0.7, None), (None, -0.5)])
-def test_foundation_reverses_each_end_by_itself(z, v, e):
-    """Also ends whose velocities differ: each leaves with −e times its own, so nothing is lost at e = 1."""
-    tip_mass, mass = 0.25, 2.0
-    impact = foundation_impact(z, mass, v, tip_mass, e)
-    assert impact.of_foundation == pytest.approx(impact.on_beam + impact.on_spring, rel=1e-15)
-    assert (impact.on_beam == 0.0) == (v is None)
-    assert (impact.on_spring == 0.0) == (z is None)
-    v1, z1 = after(impact, v or 0.0, z or 0.0, tip_mass, mass)
-    assert (v1, z1) == pytest.approx((-e * (v or 0.0), -e * (z or 0.0)), abs=1e-15)
-    before = kinetic(v or 0.0, z or 0.0, tip_mass, mass)
-    assert impact.energy_loss == pytest.approx(before - kinetic(v1, z1, tip_mass, mass), abs=1e-15)
-    if e == 1.0:
-        assert impact.energy_loss == 0.0
-
-
-@pytest.mark.parametrize("y", [-1e-18, 0.0, 1e-18])
-@pytest.mark.parametrize(("speed", "joint"), [(0.3, Joint.TOUCH), (0.0, Joint.TIED), (-0.3, Joint.TIED)])
-def test_a_meeting_at_the_equilibrium_is_told_by_the_velocity(y, speed, joint):
-    """Within rounding of Ψ: tied while rising it would be released at once, and meet again, for ever."""
-    transitions = Transitions(load_scene("soft"), None, tip_mass=0.01, mass=1.0, fastest=lambda: 0.3, equilibrium=0.0)
-    end = Motion(y, speed, 0.0, 0.0)
-    _, phase, impact = transitions.after(EventKind("impact"), Phase(), (end, end), 0.0, (end, end), 0.0, 1e-17)
-    assert phase.joint is joint
-    assert impact.energy_loss == 0.0
 
 
 @pytest.mark.parametrize("kind", [EventKind.RELEASE, EventKind.SEPARATION])
@@ -102,25 +49,6 @@ def test_a_tip_that_the_foundation_lets_go_leaves_at_rest_but_where_it_vibrates(
     assert impact.of_foundation == impact.on_beam
     assert v + impact.on_beam / tip_mass == pytest.approx(left, abs=1e-15)
     assert impact.energy_loss == pytest.approx(0.5 * tip_mass * (v**2 - left**2), rel=1e-12)
-
-
-def struck_at(z, restitution, fastest=1.0):
-    """The kind, the phase and the impact as a top strikes the foundation at ``z``, after an impact at ``fastest``."""
-    scene = with_changes(load_scene("soft"), stop={"restitution": restitution})
-    transitions = Transitions(scene, None, 0.01, 1.0, fastest=lambda: 1.0, equilibrium=0.0)
-    for speed in (-fastest, z):
-        end = Motion(scene.stop.position, speed, 0.0, 0.0)
-        found = transitions.after(EventKind("stop_impact"), Phase(), (end, end), 0.0, (end, end), 0.0, 1e-17)
-    return found
-
-
-@pytest.mark.parametrize(("z", "restitution", "kind"), [
-    (-1e-3, 0.9, "stop_impact"), (-1e-12, 0.9, "seated"), (-1e-12, 1.0, "stop_impact"), (0.0, 1.0, "seated"),
-])  # fmt: skip
-def test_bounces_die_out_unless_nothing_is_lost(z, restitution, kind):
-    found, phase, impact = struck_at(z, restitution)
-    assert (found, phase.seated) == (kind, kind == "seated")
-    assert impact.of_foundation == pytest.approx(-z * (1.0 + (0.0 if kind == "seated" else restitution)), rel=1e-14)
 
 
 @pytest.mark.parametrize(("v", "kind"), [(0.4, "stop_impact"), (0.6, "seated")])

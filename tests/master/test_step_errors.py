@@ -1,0 +1,56 @@
+"""The error that a step tells of itself, which chooses adaptive steps, and events that crowd."""
+
+import numpy as np
+import pytest
+from bodies import DuffingBody, Upper
+
+from springbeam import RunStopped
+from springbeam.bodies import force
+from springbeam.bodies.protocol import NO_FORCE, Motion
+from springbeam.coupling.hermite import gap_inside
+from springbeam.coupling.protocol import Step
+from springbeam.run.adaptive import AdaptiveSteps
+from springbeam.run.stepping import Pair, State
+from springbeam.scene import load_scene, with_changes
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_the_moment_inside_and_the_work_on_it_are_those_of_the_gap(degree):
+    """g = τ²(H − τ) (1 + τ): ∫g/H, and ∫(2τ/H − 1) g/H, and ∫C ġ, by Gauss points."""
+    H, c = 0.2, (5.0, -7.0, 11.0)
+    g = np.polynomial.Polynomial((0.0, 0.0, H, -1.0)) * np.polynomial.Polynomial((1.0, 1.0))
+    x, weights = np.polynomial.legendre.leggauss(8)
+    tau = 0.5 * H * (x + 1.0)
+    expected = 0.5 * float(weights @ (g(tau) * x ** (degree - 1)))
+    work = 0.5 * H * float(weights @ (force.value(c, tau) * g.deriv()(tau)))
+    once, twice = g.integ(), g.integ().integ()
+    end = Motion(g(H), g.deriv()(H), once(H), twice(H))
+    assert gap_inside(end, H, degree) == pytest.approx(abs(expected), rel=1e-12)
+    assert force.work(c, end, H) == pytest.approx(work, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("apart", "most", "words"),
+    [(0.0, 500, "500 events at once"), (1.9e-9, 500, "500 events at once"), (2.1e-9, 20_000, "20000 .*within a macro")],
+)
+def test_events_that_crowd_stop_the_run(apart, most, words):
+    """500 at once, which is within 1e-6 H, or 20,000 within a macro step, are none too many."""
+    H = 1e-3
+    state = State(0.0, (Motion(0.0, 0.0, 0.0, 0.0),) * 2)
+    for k in range(most):
+        state.count_cut(apart * k * H, apart * H, H)
+    with pytest.raises(RunStopped, match=words):
+        state.count_cut(apart * most * H, apart * H, H)
+
+
+@pytest.mark.parametrize(("share", "holds"), [(0.99, True), (1.01, False)])
+def test_no_more_than_rounding_is_forgiven(share, holds):
+    """The tip at 1 m moves by 1 nm, and may be 1e-3 of that and 16 ulp of 1 m, 3.6e-15 m, beside the cubic."""
+    scene = with_changes(load_scene("soft"), coupling={"relative_tolerance": 1e-3, "absolute_tolerance": 1e-30})
+    way, rest, start = 1e-9, Motion(0.0, 0.0, 0.0, 0.0), Motion(1.0, 0.0, 0.0, 0.0)
+    beside = share * (1e-3 * way + 16.0 * 2.0**-52)
+    pair = Pair(scene, Upper(1.0, y=1.0), DuffingBody(1.0))
+    # In a step of 1 s from rest to rest: ∫ of the cubic is the mean of its ends, ∫∫ (7 f0 + 3 f1)/20.
+    end = Motion(1.0 + way, 0.0, 1.0 + way / 2.0 + beside, 0.5 + 0.15 * way + beside / 2.0)
+    step = Step(0.0, 1.0, NO_FORCE, NO_FORCE, (start, rest), (end, rest))
+    assert AdaptiveSteps(scene, pair, 0.0, 9.0).holds(pair.initial_state(0.0), step, "") is holds
