@@ -1,8 +1,8 @@
 """Independent references: the pair solved as one system. Imports `scene` and
 `results.trajectory` only, so that agreement with the coupling is evidence.
 
-Start with ``laws`` (what joins the ends, a class each), ``hybrid_system`` (the equations of each phase) and
-``event_driven`` (the run, and where a phase ends); ``exponential`` integrates a phase, ``transitions`` applies
-what happens there. ``algorithm1`` is Ahn & Tate's own scheme,
-``semi_discrete`` their beam.
+Start with ``laws`` (what joins the ends, a class each) and ``hybrid_system`` (coordinates of mass 1, and what holds and
+moves them in each phase; ``quasi_static`` for a beam without inertia). ``event_driven`` is the run: ``exponential``
+integrates up to an event, ``transitions`` applies what happens there, ``rows`` makes the result. ``algorithm1`` is
+Ahn & Tate's own scheme, ``semi_discrete`` their beam.
 """

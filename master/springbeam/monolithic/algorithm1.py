@@ -94,7 +94,13 @@ def simulate(scene: Scene, *, y_temp: YTemp = "equation") -> Trajectory:
         raise ValueError("Algorithm 1 needs [beam] and [spring]")
     if scene.loads or scene.massless:
         raise ValueError("Algorithm 1 knows no [[loads]] and needs a dynamic [beam]")
-    return _Algorithm(scene, y_temp).run()
+    algorithm, began = _Algorithm(scene, y_temp), clock.perf_counter()
+    try:
+        algorithm.run()
+    except AlgorithmFailure as failure:
+        failure.trajectory = algorithm.trajectory(clock.perf_counter() - began)
+        raise
+    return algorithm.trajectory(clock.perf_counter() - began)
 
 
 class _Algorithm:
@@ -109,6 +115,7 @@ class _Algorithm:
         self.phi = -np.inf if scene.stop is None else scene.stop.position
         self.stiffness = 0.0  #: λ_nc as the last step has left it
         self.iterations: dict[str, list[int]] = {"beam": [], "predicted": [], "joined": []}
+        self.time = 0.0  #: [s]
         self.events: list[Event] = []
         self.rows: list[_Row] = []
 
@@ -159,9 +166,9 @@ class _Algorithm:
 
     # Algorithm ------------------------------------------------------------------------------------------------------
 
-    def run(self) -> Trajectory:
-        self.time, began, psi = 0.0, clock.perf_counter(), self.spring.equilibrium
-        row = self._start()
+    def run(self) -> None:
+        """Make all steps; `trajectory` has them, also where one fails."""
+        row, psi = self._start(), self.spring.equilibrium
         touched = self.beam.approach == "undeformed" or row.q[-1] <= psi  # else lines 1–4 come first
         self.rows.append(self._first_contact(row) if touched else row)
         (whole, rest), start = self.scene.equal_steps, self.time
@@ -169,18 +176,10 @@ class _Algorithm:
             if step > whole:
                 self._set_step(rest)
             self.time = start + step * self.h if step <= whole else self.scene.time.t_end
-            if touched:
-                try:
-                    row = self._contact_step(self.rows[-1])
-                except AlgorithmFailure as failure:
-                    failure.trajectory = self._trajectory(began)
-                    raise
-            else:
-                row = self._free_step(self.rows[-1])
-                touched = bool(row.q[-1] <= psi)
-                row = self._first_contact(row) if touched else row
+            row = self._contact_step(self.rows[-1]) if touched else self._free_step(self.rows[-1])
+            if not touched and row.q[-1] <= psi:
+                touched, row = True, self._first_contact(row)
             self.rows.append(row)
-        return self._trajectory(began)
 
     def _start(self) -> _Row:
         slope, rate, psi = self.beam.initial_deflection_slope, self.beam.initial_velocity_slope, self.spring.equilibrium
@@ -258,8 +257,8 @@ class _Algorithm:
 
     # Result ---------------------------------------------------------------------------------------------------------
 
-    def _trajectory(self, began: float) -> Trajectory:
-        """Return the rows as a result, with energies, and the work that no force of the model does.
+    def trajectory(self, seconds: float) -> Trajectory:
+        """Return the rows, made in so many seconds, as a result with energies, and the work that no force does.
 
         That is the work of the overwritten tip on the beam, and of yˡ's exchange on the spring.
         """
@@ -302,7 +301,7 @@ class _Algorithm:
         predicted, joined = self.iterations["predicted"], self.iterations["joined"]
         solves = {"spring_predicted": predicted, "spring_joined": joined, "spring": predicted + joined}
         newton = {name: float(np.mean(counts)) if counts else 0.0 for name, counts in solves.items()}
-        newton |= {"solves": len(solves["spring"]), "time_per_step": (clock.perf_counter() - began) / steps}
+        newton |= {"solves": len(solves["spring"]), "time_per_step": seconds / steps}
         summary: dict[str, Any] = {"reference": "algorithm1", "newton": newton, "steps_apart": int(np.sum(cases == 11))}
         extra = ("case", "e_injected_beam", "e_injected_spring")
         shapes = np.hstack([q @ d.deflection_sampler().T, (q + alpha * v) @ inner_forces(self.beam, d).T])

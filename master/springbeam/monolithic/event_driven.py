@@ -14,7 +14,6 @@ import time as clock
 from collections import deque
 from collections.abc import Iterable, Sequence
 from operator import itemgetter
-from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -82,7 +81,8 @@ def simulate(
         If no row lies in the run.
     """
     refuse(scene)
-    return _Run(scene, velocity_perturbation, t_end).execute(sample_times, time_limit)
+    end = scene.time.t_end if t_end is None else min(t_end, scene.time.t_end)
+    return _Run(scene, velocity_perturbation, end, sample_times, time_limit).execute()
 
 
 def refuse(scene: Scene) -> None:
@@ -105,103 +105,90 @@ def refuse(scene: Scene) -> None:
 
 
 class _Run:
-    def __init__(self, scene: Scene, velocity_perturbation: float, t_end: float | None) -> None:
-        self.scene, self.system = scene, (QuasiStaticSystem if scene.massless else HybridSystem)(scene)
-        self.t_end = scene.time.t_end if t_end is None else min(t_end, scene.time.t_end)
-        self._forms: dict[Phase, LinearForm] = {}
-        self.counts = {"steps": 0, "phases": 0}
-        time, X = initial(self.system, velocity_perturbation)
-        self.state = HybridState(self.system, time, X)
-        self.rows = Rows(self.state)
-        self._happened: list[float] = []  #: times of what has ended a phase [s]
+    """A run to ``t_end`` [s]; see `simulate`."""
 
-    def execute(self, sample_times: Sequence[float] | np.ndarray | None, time_limit: float | None) -> Trajectory:
-        began, worked = clock.perf_counter(), clock.process_time()
-        every_event, state = sample_times is None, self.state
-        self._due = self._samples(sample_times)
-        if every_event:
-            self._record()
+    def __init__(
+        self,
+        scene: Scene,
+        velocity_perturbation: float,
+        t_end: float,
+        sample_times: Sequence[float] | np.ndarray | None,
+        time_limit: float | None,
+    ) -> None:
+        self.system, self.t_end = (QuasiStaticSystem if scene.massless else HybridSystem)(scene), t_end
+        self.state = HybridState(self.system, *initial(self.system, velocity_perturbation))
+        self.rows = Rows(self.state)
+        self._every_event, self._due = sample_times is None, self._samples(sample_times)
+        self._limit, self._began = time_limit, clock.process_time()
+        self._forms: dict[Phase, LinearForm] = {}
+        self._counts = {"steps": 0, "phases": 0}
+
+    def execute(self) -> Trajectory:
+        began, state, happened = clock.perf_counter(), self.state, [-np.inf] * _AT_ONCE
+        self._record_event()
         state.start()
         self._record_due()
-        self._begin_phase()
-        while self.t_end - state.time > 1e-14 * self.t_end:
-            if time_limit is not None and clock.process_time() - worked > time_limit:
-                raise ReferenceFailure(f"takes more than {time_limit:g} s; it is at t = {state.time:.6g} s")
-            target = min(self._due[0] if self._due else self.t_end, self._kink)
-            segment = self._propagator.advance(max(target - state.time, 1e-16 * self.t_end), 4.0 * np.spacing(target))
-            self.counts["steps"] += 1
-            found = first_event(self.system, state.phase, self._watched, segment)
-            if found is None:
-                reach, end = segment.size, self._phase_start + self._propagator.elapsed
-                for exact in (self._kink, target):
-                    if abs(end - exact) <= 1e-14 * self.t_end:
-                        end = exact  # the sum is off by rounding
-            else:
-                reach, end = found[1], state.time + found[1]
-            while self._due and self._due[0] < end:
-                at = self._due.popleft()
-                self.rows.record(at, segment.state(at - state.time))
-            state.time, state.X = end, segment.state(reach)
-            state.X[self.system.T] = end
-            self._record_due()
-            if found is not None:
-                if every_event:
-                    self._record()
-                state.happen(found[0])
-                self._happened.append(end)
-                if every_event:
-                    self._record()
-                if len(state.events) > _MOST_EVENTS or self._chatters():
-                    raise ReferenceFailure(f"{len(state.events)} events by t = {end:.9g} s: they do not end")
-                self._begin_phase()
-            elif end == self._kink:
-                self._begin_piece()
+        while state.time < self.t_end:
+            event = self._until_event()
+            if event is not None:
+                self._record_event()
+                state.happen(event)
+                self._record_event()
+                happened.append(state.time)
+                if len(happened) > _MOST_EVENTS or happened[-1 - _AT_ONCE] == state.time:
+                    raise ReferenceFailure(f"{len(state.events)} events by t = {state.time:.9g} s: they do not end")
         self.system.loads.whole()
-        return self.rows.trajectory(self._summary(clock.perf_counter() - began))
+        counts = {**self._counts, "events": len(state.events)}
+        wall_time = clock.perf_counter() - began
+        return self.rows.trajectory({"reference": "event_driven", "wall_time": wall_time, "counts": counts})
+
+    def _until_event(self) -> Watch | None:
+        """Integrate until something happens, or until a load has a kink or the run ends; return what has happened."""
+        s, state, begin, watched = self.system, self.state, self.state.time, self.state.watched()
+        self._counts["phases"] += 1
+        end = min(s.loads.smooth_from(begin), self.t_end)
+        if state.phase not in self._forms:
+            self._forms[state.phase] = LinearForm(s, state.phase)
+        propagator = ExponentialPropagator(s, state.phase, self._forms[state.phase], state.X)
+        while state.time < end:
+            if self._limit is not None and clock.process_time() - self._began > self._limit:
+                raise ReferenceFailure(f"takes more than {self._limit:g} s; it is at t = {state.time:.6g} s")
+            target = min(self._due[0], end) if self._due else end
+            segment = propagator.advance(max(target - state.time, 1e-16 * self.t_end), 4.0 * np.spacing(target))
+            self._counts["steps"] += 1
+            event, reach = first_event(s, state.phase, watched, segment) or (None, segment.size)
+            state.time = begin + propagator.elapsed if event is None else state.time + reach
+            if event is None and abs(state.time - target) <= 1e-14 * self.t_end:
+                state.time = target  # the sum is off by rounding
+            state.X = segment.state(reach)
+            state.X[s.T] = state.time
+            self._record_due()
+            if event is not None:
+                return event
+        return None
 
     def _samples(self, sample_times: Sequence[float] | np.ndarray | None) -> deque[float]:
         """Return the times of the rows [s] but for those of events."""
-        start = self.state.time
-        if sample_times is None:
-            H = self.scene.coupling.macro_step or (self.t_end - start) / _SAMPLES
-            count = int(np.floor((self.t_end - start) / H * (1.0 + 1e-12)))
-            grid = start + H * np.arange(max(count, 0) + 1)
-            samples = np.append(grid, self.t_end) if self.t_end - grid[-1] > 1e-9 * H else grid
-        else:
-            samples = np.asarray(sample_times, dtype=float)
-        within = np.sort(samples[(samples >= start) & (samples <= self.t_end * (1.0 + 1e-15))])
+        start, samples = self.state.time, sample_times
+        if samples is None:
+            H = self.system.scene.coupling.macro_step or (self.t_end - start) / _SAMPLES
+            count = max(int(np.floor((self.t_end - start) / H * (1.0 + 1e-12))), 0)
+            samples = start + H * np.arange(count + 1)
+            samples = np.append(samples, self.t_end) if self.t_end - samples[-1] > 1e-9 * H else samples
+        times = np.sort(np.asarray(samples, dtype=float))
+        within = times[(times >= start) & (times <= self.t_end * (1.0 + 1e-15))]
         if not len(within):
             raise ValueError(f"no row lies between the start of the run, {start:g} s, and its end, {self.t_end:g} s")
         return deque(within.tolist())
 
-    def _record(self) -> None:
-        self.rows.record(self.state.time, self.state.X)
+    def _record_event(self) -> None:
+        if self._every_event:
+            self.rows.record()
 
     def _record_due(self) -> None:
         while self._due and self._due[0] <= self.state.time:
             self._due.popleft()
-            self._record()
-
-    def _chatters(self) -> bool:
-        at_once = _AT_ONCE + 1
-        return len(self._happened) >= at_once and self._happened[-at_once] == self.state.time
-
-    def _begin_phase(self) -> None:
-        self._watched = self.state.watched()
-        self._begin_piece()
-
-    def _begin_piece(self) -> None:
-        """Integrate from here on anew: in another phase, or after a kink of a load."""
-        self.counts["phases"] += 1
-        state, self._phase_start = self.state, self.state.time
-        self._kink = self.system.loads.smooth_from(state.time)
-        if state.phase not in self._forms:
-            self._forms[state.phase] = LinearForm(self.system, state.phase)
-        self._propagator = ExponentialPropagator(self.system, state.phase, self._forms[state.phase], state.X)
-
-    def _summary(self, wall_time: float) -> dict[str, Any]:
-        counts = {**self.counts, "events": len(self.state.events)}
-        return {"reference": "event_driven", "wall_time": wall_time, "counts": counts}
+            self.rows.record()
 
 
 def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:

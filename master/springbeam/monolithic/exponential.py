@@ -1,10 +1,10 @@
 """Exact modal integration of one phase of a `HybridSystem`.
 
-The phase's linear part is diagonalised and solved exactly; what is nonlinear or not proportionally damped enters as
-forces r(t) at the interface, collocated at s Gauss points of each step::
+The phase's linear part is diagonalised and solved exactly; what is nonlinear, or damped otherwise than the modes,
+enters as forces r(t) at the interface, collocated at s Gauss points of each step::
 
-    ξ̈ + α_b ω² ξ̇ + ω² ξ = c + Pᵀ r(t),     r = R(w, ẇ),  w = Jξ the interface displacements
-    ξ(τ) = C(τ) ξ₀ + S(τ) ξ̇₀ + ∫₀^τ S(τ − σ) (c + Pᵀ r(σ)) dσ,    S the response to a unit impulse, C = Ṡ + α_b ω² S
+    ξ̈ + c ξ̇ + ω² ξ = f + Pᵀ r(t),     r = R(ξ, ξ̇) by way of u, v, y and z
+    ξ(τ) = C(τ) ξ₀ + S(τ) ξ̇₀ + ∫₀^τ S(τ − σ) (f + Pᵀ r(σ)) dσ,    S the response to a unit impulse, C = Ṡ + c S
 
 Steps resolve the motion that can be seen at the interface: not for accuracy, which a linear phase has at any step, but
 so that no event slips through between two nodes. Beams whose fast modes stay silent, or are damped out, cost little.
@@ -41,7 +41,7 @@ class Segment:
     """One accepted step: its states at ``nodes`` [s], from 0 to its size, and what finds those between them."""
 
     nodes: np.ndarray  #: (k,)
-    states: np.ndarray  #: (k, 2r + 5)
+    states: np.ndarray  #: (k, 2n + 3)
     inside: Callable[[float], np.ndarray]  #: τ [s] → X
 
     @property
@@ -84,7 +84,14 @@ class LinearForm:
         moving, omega2, c, constant = s.oscillating(phase)
         loads, tip, top, between = (rows[..., moving] for rows in (s.patterns, s.tip, s.top, s.between))
         row = s.row(phase)
-        self.moving, self.linked, self.rest = moving, *self._split()
+        self.moving = moving
+        self.linked, self.damper = 0.0, 0.0  #: [N/m], and what is left of the law's damper beside it [N·s/m]
+        if s.law.linear:
+            k, damper = s.law.stiffness, s.law.damping
+            left = damper - s.alpha_b * k
+            # The modes' damping α_b k may be far from c; what is left must not be faster than the law itself.
+            if abs(left) * s.mobility <= max(damper * s.mobility, float(np.sqrt(k * s.mobility))):
+                self.linked, self.damper = k, left
         self.offset, self.pressing = np.zeros(len(omega2)), np.zeros(len(omega2))
         self.at = np.array([[0.0], [s.stop.position * s.fixed(phase)]])
         #: Damping of the spring that ``c`` does not hold yet [N·s/m].
@@ -107,25 +114,13 @@ class LinearForm:
             c, self.damping = s.alpha_b * omega2, s.spring.damping - s.alpha_b * s.spring.linear_stiffness
         self.omega2, self.c, self.constant, self.loads = omega2, c, constant, loads
         self.of_spring = bool(np.any(top)) and s.has_spring and bool(self.damping or s.spring.cubic_stiffness)
-        self.of_law = s.law.acts(phase.contact) and self.rest != (0.0, 0.0)
+        self.of_law = s.law.acts(phase.contact) and not (self.linked > 0.0 and self.damper == 0.0)
         inputs = [top] * self.of_spring + [between] * self.of_law
         self.inputs = np.reshape(inputs, (len(inputs), len(omega2)))
         self.ends = np.array([tip, top])
         self.oscillators = Oscillators(omega2, c)
         self.mobility = np.sum(self.inputs**2, axis=1)  #: acceleration per unit force r [1/kg]
         self._weights: dict[str, StepWeights] = {}  #: by the first digits of sizes, which recur but for rounding
-
-    def _split(self) -> tuple[float, tuple[float, float] | None]:
-        """Return `linked`, and the (k, c) that it leaves of a linear law, ``None`` where the law is not linear."""
-        s = self.system
-        if s.law.linear is None:
-            return 0.0, None
-        k, c = s.law.linear
-        # The modes' damping α_b k may be far from c; what is left must not be faster than the law itself.
-        left = c - s.alpha_b * k
-        if abs(left) * s.mobility <= max(c * s.mobility, float(np.sqrt(k * s.mobility))):
-            return k, (0.0, left)
-        return 0.0, (k, c)
 
     def pack(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (ξ, ξ̇) of a state."""
@@ -152,10 +147,8 @@ class LinearForm:
         found, spring = [], self.system.spring
         if self.of_spring:
             found.append(-self.damping * z - spring.cubic_stiffness * y**3)
-        if self.of_law and self.rest is None:
-            found.append(self.system.law.force(y - u, z - v))
-        elif self.of_law and self.rest is not None:
-            found.append(self.rest[0] * (y - u) + self.rest[1] * (z - v))
+        if self.of_law:
+            found.append(self.damper * (z - v) if self.linked > 0.0 else self.system.law.force(y - u, z - v))
         return np.array(found).reshape(len(found), len(xi))
 
     def weights(self, size: float) -> StepWeights:

@@ -148,7 +148,7 @@ class HybridSystem:
     def dissipation_rate(self, phase: Phase, X: np.ndarray) -> np.ndarray:
         """Return ẋᵀ c ẋ, and what the law takes [W]."""
         rate = np.asarray(X[..., self.V] ** 2 @ self.c)
-        if not (self.law.dissipative and self.law.counts(phase.contact)):
+        if not (self.law.damping and self.law.counts(phase.contact)):
             return rate
         u, v, y, z = self.ends(phase, X)
         return np.asarray(rate + self.law.dissipation(phase.contact, y - u, z - v))

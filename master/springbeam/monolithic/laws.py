@@ -54,6 +54,16 @@ class Watch(NamedTuple):
     level: float | None = None  #: where the spring's top is when it happens [m]
 
 
+#: What follows most events: the contact, and the event's name in results if it is one there.
+_AFTER: dict[str, tuple[Contact, str | None]] = {
+    "meet": ("touch", "impact"),
+    "separate": ("free", "separation"),
+    "retie": ("tied", "retie"),
+    "slacken": ("slack", None),
+    "press": ("touch", None),
+}
+
+
 class Law:
     """A law with one force, `force`, in phase `touch`, which begins and ends at p = 0."""
 
@@ -61,10 +71,8 @@ class Law:
     rigid = False
     #: Where a run starts; a law that starts elsewhere than in `free` joins the ends for good.
     start: Contact = "free"
-    #: Whether `dissipation` is ever greater than 0.
-    dissipative = False
-    #: k [N/m] and c [N·s/m] of a `force` that is k p + c ṗ; ``None`` if it is not linear.
-    linear: tuple[float, float] | None = None
+    #: Whether `force` is k p + c ṗ with the scene's stiffness and damping.
+    linear = False
 
     def __init__(self, scene: Scene) -> None:
         contact = scene.contact
@@ -112,7 +120,7 @@ class Law:
 
         ``together`` is the motion if the ends stay together, ``noise`` what rounding leaves of a height that is 0 [m].
         """
-        return ("touch", "impact") if happened == "meet" else ("free", "separation")
+        return _AFTER[happened]
 
 
 class Transmission(Law):
@@ -129,23 +137,16 @@ class Transmission(Law):
         if phase.contact == "free":
             return super().watched(phase)
         if phase.contact == "touch":
-            return [
-                Watch("retie", lambda m: m.y - psi, "m", level=psi),
-                Watch("separate", lambda m: m.C, "N"),
-            ]
+            return [Watch("retie", lambda m: m.y - psi, "m", level=psi), Watch("separate", lambda m: m.C, "N")]
         return [] if phase.seated else [Watch("release", lambda m: psi - m.y, "m", level=psi)]
 
     def after(self, happened: str, together: Motion, noise: float) -> tuple[Contact, str | None]:
-        if happened == "meet":
-            height = float(together.y) - self.equilibrium
-            if abs(height) <= noise:  # where they go tells
-                height = float(together.z) if together.z != 0.0 else float(together.z_dot)
-            return "tied" if height < 0.0 else "touch", "impact"
         if happened == "release":
             return "touch" if together.C > 0.0 else "free", "release"
-        if happened == "retie":
-            return "tied", "retie"
-        return "free", "separation"
+        height = float(together.y) - self.equilibrium
+        if abs(height) <= noise:  # where they go tells
+            height = float(together.z) if together.z != 0.0 else float(together.z_dot)
+        return ("tied", "impact") if happened == "meet" and height < 0.0 else _AFTER[happened]
 
 
 class Tie(Law):
@@ -166,11 +167,7 @@ class Link(Law):
     """An elastic link with a damper, C = λ_nc p + c ṗ for either sign of p."""
 
     start = "tied"
-
-    def __init__(self, scene: Scene) -> None:
-        super().__init__(scene)
-        self.linear = (self.stiffness, self.damping)
-        self.dissipative = self.damping > 0.0
+    linear = True
 
     def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
         return np.asarray(self.stiffness * p + self.damping * rate)
@@ -188,10 +185,6 @@ class Compliance(Law):
     C is never negative: where the ends part faster than 1/χ the contact is `slack` until they slow down or p = 0.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        super().__init__(scene)
-        self.dissipative = self.damping > 0.0
-
     def _elastic(self, p: np.ndarray) -> np.ndarray:
         """Return F [N]."""
         return np.asarray(self.stiffness * np.maximum(p, 0.0) ** self.exponent)
@@ -200,13 +193,10 @@ class Compliance(Law):
         return self._elastic(p) * (1.0 + self.damping * rate)
 
     def potential(self, p: np.ndarray) -> np.ndarray:
-        depth, q = np.maximum(p, 0.0), self.exponent
-        return np.asarray(self.stiffness * depth ** (q + 1.0) / (q + 1.0))
+        return np.asarray(self._elastic(p) * np.maximum(p, 0.0) / (self.exponent + 1.0))
 
     def dissipation(self, contact: Contact, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        if contact == "slack":
-            return np.asarray(-self._elastic(p) * rate)
-        return np.asarray(self._elastic(p) * self.damping * rate**2)
+        return np.asarray(self._elastic(p) * rate * (-1.0 if contact == "slack" else self.damping * rate))
 
     def watched(self, phase: Phase) -> list[Watch]:
         watched = super().watched(phase)
@@ -216,11 +206,6 @@ class Compliance(Law):
         if phase.contact == "slack":
             return [*watched, Watch("press", lambda m: m.v - m.z - fastest, "m/s")]
         return [*watched, Watch("slacken", lambda m: m.z - m.v + fastest, "m/s")]
-
-    def after(self, happened: str, together: Motion, noise: float) -> tuple[Contact, str | None]:
-        if happened == "slacken":
-            return "slack", None
-        return ("touch", None) if happened == "press" else super().after(happened, together, noise)
 
 
 #: By their names in a scene.

@@ -20,54 +20,37 @@ class Rows:
     """States recorded so far in a run, each with its time, its phase, and what impacts had lost by then."""
 
     def __init__(self, state: HybridState) -> None:
-        self._state, self._system = state, state.system
+        self._state = state
         self._rows: list[tuple[float, np.ndarray, Phase, float]] = []
 
-    def record(self, time: float, X: np.ndarray) -> None:
-        """Keep ``X`` at ``time`` [s], in the phase in which the run is."""
-        self._rows.append((time, X.copy(), self._state.phase, self._state.loss))
+    def record(self) -> None:
+        """Keep the state in which the run is."""
+        self._rows.append((self._state.time, self._state.X.copy(), self._state.phase, self._state.loss))
 
     def trajectory(self, summary: dict[str, Any]) -> Trajectory:
         """Return the result of the run, with its ledger added to ``summary``."""
-        s = self._system
-        states = np.array([X for _, X, _, _ in self._rows]).reshape(len(self._rows), s.size)
-        columns = self._columns(states)
-        if s.scene.coupled:
-            columns["compliance_force"] = s.law.inside(columns["contact_force"], columns["u_tip"])
-        loads = s.loads.values(columns["time"])
-        columns |= {f"load_{i}": values for i, values in enumerate(loads.T)}
-        return finished(s.scene, columns, s.shapes(states), self._state.events, summary)
-
-    def _columns(self, states: np.ndarray) -> dict[str, np.ndarray]:
-        """Return what the equations of each row's phase give."""
-        s, phases = self._system, [phase for _, _, phase, _ in self._rows]
-        clamp = None if s.beam is None or s.scene.massless else Clamp(s.scene, s.beam)
+        s = self._state.system
+        times, states, phases, losses = zip(*self._rows, strict=True)
+        X = np.array(states)
         columns: dict[str, np.ndarray] = {
-            "time": np.array([time for time, _, _, _ in self._rows]),
+            "time": np.array(times),
             "phase": np.array([phase.name for phase in phases], dtype="<U8"),
-            "e_impact_loss": np.array([loss for _, _, _, loss in self._rows]),
+            "e_impact_loss": np.array(losses),
         }
+        columns |= {f"load_{i}": values for i, values in enumerate(s.loads.values(columns["time"]).T)}
+        clamp = None if s.beam is None or s.scene.massless else Clamp(s.scene, s.beam)
         for phase in set(phases):
             index = np.array([k for k, p in enumerate(phases) if p == phase])
-            m = s.motion(phase, states[index])
-            values = {
-                "u_tip": m.u,
-                "v_tip": m.v,
-                "y": m.y,
-                "z": m.z,
-                "contact_force": m.C,
-                "foundation_force": m.N,
-                **s.energies(states[index], phase),
-            }
-            if s.has_spring:
-                values["a_y"] = m.z_dot
+            m = s.motion(phase, X[index])
+            values = {"u_tip": m.u, "v_tip": m.v, "y": m.y, "z": m.z, "contact_force": m.C, "foundation_force": m.N}
+            values |= {"a_tip": m.a @ s.tip, "a_y": m.z_dot, "compliance_force": s.law.inside(m.C, m.u)}
+            values |= s.energies(X[index], phase)
             if clamp is not None:
-                values["a_tip"] = m.a @ s.tip
-                reaction = clamp.reaction(m.a[:, : s.r], m.C, s.loads.values(states[index, s.T]))
+                reaction = clamp.reaction(m.a[:, : s.r], m.C, s.loads.values(columns["time"][index]))
                 values["clamp_force"], values["clamp_moment"] = reaction
             for name, value in values.items():
-                columns.setdefault(name, np.zeros(len(phases)))[index] = value
-        return columns
+                columns.setdefault(name, np.zeros(len(X)))[index] = value
+        return finished(s.scene, columns, s.shapes(X), self._state.events, summary)
 
 
 def finished(

@@ -259,29 +259,19 @@ def singular_modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return sigma[::-1], vt[::-1].T
 
 
-def _rotations_as_displacements(discrete: SemiDiscreteBeam) -> sp.csc_matrix:
-    """Return the diagonal matrix that turns unknowns (L θ, u) into (θ, u)."""
-    lengths = np.ones(discrete.size)
-    lengths[0::2] /= discrete.length
-    return sp.diags(lengths).tocsc()
-
-
-def _lowest_modes(discrete: SemiDiscreteBeam, count: int) -> np.ndarray:
-    if discrete.size <= _DENSE_SIZE or 2 * count > discrete.size:
-        return _rayleigh_ritz(discrete)[1][:, :count]
-    # Without units of length and time: no wanted eigenvalue of K⁻¹M far below 1.
-    D = _rotations_as_displacements(discrete)
-    K, M = D @ discrete.K @ D, D @ discrete.M @ D
-    fastest = K.diagonal().max() / M.diagonal().min()  # rad²/s²
-    modes = spla.eigsh(K / fastest, k=count, M=M, sigma=0.0, v0=np.ones(discrete.size))[1]
-    return np.asarray(D @ modes)
-
-
 def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
-    D = _rotations_as_displacements(discrete)
+    """Return the lowest modes, the static shapes and the start, (2N, n_modes + 3)."""
+    # Without units of length and time, in unknowns (L θ, u): no wanted eigenvalue of K⁻¹M far below 1.
+    D = sp.diags(np.where(np.arange(discrete.size) % 2, 1.0, 1.0 / discrete.length)).tocsc()
+    K, M = D @ discrete.K @ D, D @ discrete.M @ D
     loads = np.column_stack([discrete.tip_vector, discrete.nodal(*points(beam))])
-    static = D @ spla.splu(D @ discrete.K @ D).solve(D @ loads)
-    return np.column_stack([_lowest_modes(discrete, beam.n_modes), static, discrete.slope_shape])
+    static = D @ spla.splu(K).solve(D @ loads)
+    if discrete.size <= _DENSE_SIZE or 2 * beam.n_modes > discrete.size:
+        modes = _rayleigh_ritz(discrete)[1][:, : beam.n_modes]
+    else:
+        fastest = K.diagonal().max() / M.diagonal().min()  # rad²/s²
+        modes = D @ spla.eigsh(K / fastest, k=beam.n_modes, M=M, sigma=0.0, v0=np.ones(discrete.size))[1]
+    return np.column_stack([modes, static, discrete.slope_shape])
 
 
 def _rayleigh_ritz(discrete: SemiDiscreteBeam, space: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:

@@ -67,13 +67,10 @@ class Frames:
 
     def heights(self, part: Part, frame: int) -> np.ndarray:
         """Return the heights [m] of the corners of a part."""
-        if part == "beam":
-            assert self.deflection is not None
+        if part == "beam" and self.deflection is not None:
             return np.asarray(self.deflection[frame])
         assert self.y is not None
-        if part == "top":
-            return np.full(2, self.y[frame])
-        return self.foot + float(self.y[frame] - self.foot) * COIL_HEIGHTS
+        return np.full(2, self.y[frame]) if part == "top" else self.foot + (self.y[frame] - self.foot) * COIL_HEIGHTS
 
 
 class Stroke(NamedTuple):
@@ -160,18 +157,16 @@ def _sketch(
 def frames_of(trajectory: Trajectory) -> Frames | None:
     """Return the frames of a run; ``None`` if it has fewer than two."""
     rows = trajectory["time"]
-    deflection: np.ndarray | None
+    time, deflection = rows, None
     if trajectory.shapes is not None:
         time, deflection = trajectory.shapes
-        # A killed run may have a shape more than it has rows.
-        known = time <= rows[-1] if len(rows) else np.zeros(len(time), dtype=bool)
-        time, deflection = time[known], deflection[known]
-    elif trajectory.scene.beam is None:
-        # A body that is not our beam is a level bar at the height of its end.
-        ends = trajectory["u_tip"] if "u_tip" in trajectory.columns else None
-        time, deflection = rows, None if ends is None else np.repeat(ends[:, None], len(SHAPE_POINTS), axis=1)
-    else:
+    elif trajectory.scene.beam is not None:
         return None
+    elif "u_tip" in trajectory.columns:
+        # A body that is not our beam is a level bar at the height of its end.
+        deflection = np.repeat(trajectory["u_tip"][:, None], len(SHAPE_POINTS), axis=1)
+    known = np.searchsorted(time, rows[-1:].max(initial=-np.inf), side="right")  # a killed run may have a shape more
+    time, deflection = time[:known], None if deflection is None else deflection[:known]
     if len(time) < 2 or time[-1] <= time[0]:
         return None
     if len(time) > MOST_FRAMES:

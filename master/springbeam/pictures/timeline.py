@@ -27,7 +27,7 @@ from .drawing import (
     shaded_phases,
     time_unit,
 )
-from .panels import Curve, Panel, compared
+from .panels import Panel, compared
 
 _DASHES = (0, (4, 2))
 
@@ -58,13 +58,10 @@ def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Fig
     Phases are shaded and events marked.
     """
     panels = [panel for panel in panels if panel.curves]
-    heights = [panel.height for panel in panels]
-    figure = figure_for(trajectory, title, 1.0 + sum(heights))
-    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0].tolist()
-    for ax, panel in zip(axes, panels, strict=True):
+    figure = figure_for(trajectory, title, 1.0 + sum(panel.height for panel in panels))
+    axes = _painted(figure, panels, time_unit(trajectory))
+    for ax in axes:
         shade(ax, trajectory)
-        paint(ax, panel, time_unit(trajectory))
-        ax.label_outer()
     phases = [look for look, _ in shaded_phases(trajectory)]
     shades = [Patch(facecolor=look.colour, edgecolor=GREY, linewidth=0.5, label=look.words) for look in phases]
     keys = [*shades, *_mark_events(axes, trajectory)]
@@ -73,6 +70,16 @@ def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Fig
     if keys:
         figure.legend(handles=keys, loc="outside lower left", ncols=_KEY_COLUMNS, frameon=False, columnspacing=1.4)
     return figure
+
+
+def _painted(figure: Figure, panels: Sequence[Panel], clock: Unit) -> list[Axes]:
+    """Return the axes of ``panels``, one below the other over a common time axis in the unit ``clock``."""
+    heights = [panel.height for panel in panels]
+    axes: list[Axes] = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0].tolist()
+    for ax, panel in zip(axes, panels, strict=True):
+        paint(ax, panel, clock)
+        ax.label_outer()
+    return axes
 
 
 def _mark_events(axes: list[Axes], trajectory: Trajectory) -> list[Line2D]:
@@ -107,43 +114,32 @@ def shade(ax: Axes, trajectory: Trajectory) -> None:
 
 def paint(ax: Axes, panel: Panel, clock: Unit) -> None:
     """Draw ``panel`` over time in the unit ``clock``."""
-    factor = panel.unit.factor
-    ax.set_xlabel(f"time t [{clock.name}]")
-    stack = [curve for curve in panel.curves if curve.stacked]
-    if stack:
-        ax.stackplot(
-            clock.factor * stack[0].time,
-            *(factor * curve.values for curve in stack),
-            colors=[curve.look.colour for curve in stack],
-            labels=[curve.look.words for curve in stack],
-            linewidth=0.0,
-        )
+    ax.set(xlabel=f"time t [{clock.name}]", ylabel=panel.axis)
+    below = np.zeros(1)
     for curve in panel.curves:
-        if not curve.stacked:
-            _paint_curve(ax, curve, clock.factor * curve.time, factor * curve.values, panel)
+        time, values, (colour, words, _, marker) = (
+            clock.factor * curve.time,
+            panel.unit.factor * curve.values,
+            curve.look,
+        )
+        if curve.stacked:
+            ax.fill_between(time, below, below + values, color=colour, label=words, linewidth=0.0)
+            below = below + values
+        elif marker is not None:
+            ax.vlines(time, 0.0 if panel.logarithmic is None else panel.logarithmic[0], values, color=colour, lw=1.0)
+            face = "none" if marker.sign == "○" else colour
+            ax.plot(time, values, marker.matplotlib, color=colour, label=words, ms=marker.size, mfc=face)
+        else:
+            ax.plot(time, values, label=words, **line_style(curve.look))
     if panel.logarithmic is not None:
-        ax.set_yscale("log")
-        ax.set_ylim(panel.logarithmic)
+        ax.set(yscale="log", ylim=panel.logarithmic)
         ax.yaxis.set_major_locator(LogLocator(numticks=6))
-    elif stack:
+    elif np.any(below):
         ax.set_ylim(bottom=0.0)
     elif ax.get_ylim()[0] < 0.0 < ax.get_ylim()[1]:
         ax.axhline(0.0, color=GREY, lw=0.5, zorder=1)
-    ax.set_ylabel(panel.axis)
     # The key stands beside the panel.
     ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), frameon=False, borderaxespad=0.0, handlelength=1.6)
-
-
-def _paint_curve(ax: Axes, curve: Curve, time: np.ndarray, values: np.ndarray, panel: Panel) -> None:
-    colour, words, _, marker = curve.look
-    if marker is not None:
-        foot = 0.0 if panel.logarithmic is None else panel.logarithmic[0]
-        ax.vlines(time, foot, values, color=colour, lw=1.0)
-        face = "none" if marker.sign == "○" else colour
-        ax.plot(time, values, color=colour, linestyle="none", label=words, marker=marker.matplotlib,
-                markersize=marker.size, markerfacecolor=face)  # fmt: skip
-        return
-    ax.plot(time, values, label=words, **line_style(curve.look))
 
 
 def line_style(look: Look) -> dict[str, Any]:
@@ -170,11 +166,7 @@ def figure_for(trajectory: Trajectory, title: str, height: float) -> Figure:
 def draw_compared(runs: Mapping[str, Trajectory]) -> Figure:
     """Return the figure of runs by their names, in the panels that any of them has something to show for."""
     panels = compared(runs)
-    heights = [panel.height for panel in panels]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 0.6 + sum(heights)), layout="constrained")
-        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
-        for ax, panel in zip(axes, panels, strict=True):
-            paint(ax, panel, Unit(1.0, "s"))
-            ax.label_outer()
+        figure = Figure(figsize=(WIDTH, 0.6 + sum(panel.height for panel in panels)), layout="constrained")
+        _painted(figure, panels, Unit(1.0, "s"))
     return figure

@@ -115,7 +115,7 @@ class _Phase:
         self._soft = s.scene.coupled and not s.joined(phase) and s.law.acts(phase.contact)
         self._damped, self._hardening = bool(np.any(s.c)), s.spring.cubic_stiffness / s.spring.mass**2
         self.jacobian: Callable[[float, np.ndarray], np.ndarray] | None = None
-        if not self._soft or s.law.linear is not None:  # linear but for the cubic spring
+        if not self._soft or s.law.linear:  # linear but for the cubic spring
             units, self.jacobian, top = np.eye(2 * s.n + 2 * s.alone), self._jacobian, s.n - 1
             self._linear = np.transpose([0.5 * (self.rhs(0.0, unit) - self.rhs(0.0, -unit)) for unit in units])
             two = 2.0 * units[top]
