@@ -173,3 +173,12 @@ def test_what_cannot_be_predicted_or_only_in_part_is_said(changes, note):
     p = predict(with_changes(load_scene("soft"), **changes))
     assert p["schemes"] == []
     assert any(note in text for text in p["notes"])
+
+
+def test_a_motion_that_is_not_resolved_is_told_with_what_would_resolve_it():
+    """The lowest mode turns 12.7 rad/s, a load of 50 Hz 314 rad/s."""
+    load = {"on": "tip", "signal": "harmonic", "frequency": 50.0, "amplitude": 1e-3}
+    notes = predict(with_changes(load_scene("soft"), loads=[load], coupling={"macro_step": 0.1}))["notes"]
+    told = [note for note in notes if note.startswith("the motion is not resolved: ")]
+    assert [" turns 31.4 rad " in told[0], "; H <= 0.00318 s " in told[0]] == [True, True]
+    assert [" lowest mode turns 1.27 rad " in told[1], "; H <= 0.0785 s " in told[1]] == [True, True]
