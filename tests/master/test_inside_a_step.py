@@ -6,8 +6,7 @@ from numpy.polynomial import Legendre, Polynomial
 
 from springbeam.bodies import force
 from springbeam.bodies.protocol import Motion
-from springbeam.results.paths import Path
-from springbeam.results.polynomials import sign_changes
+from springbeam.results.paths import Path, sign_changes
 
 # -- The path of a position inside a step: quintics exactly, minima, zeros, the order of its error and of the cubic's
 

@@ -92,7 +92,6 @@ def test_a_run_goes_on_from_any_step_to_the_same_bits(name):
             steps, shapes = records[: k + 2], shapes_of(run)  # the row at the start, and one per step
             events = run.events[: int(steps["events"][-1])]
             rest.recorder.keep(steps, events, shapes[shapes[:, 0] <= steps["time"][-1]] if len(shapes) else shapes)
-            rest._master.catch_up()
             rest.finish()
         assert rest._master.run_state() == saved[-1]
         assert rest.recorder.steps().tobytes() == records.tobytes()

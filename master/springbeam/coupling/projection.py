@@ -23,7 +23,7 @@ import numpy as np
 
 from ..bodies.protocol import Ends
 from ..contact.laws import SoftLaw
-from ..results.polynomials import sign_changes
+from ..results.paths import sign_changes
 from . import energy
 from .protocol import Booking, Counts, Coupling, Step
 from .small import Matrix, Vector, transposed

@@ -76,14 +76,12 @@ def impulse_difference(run: Trajectory, reference: Trajectory) -> float:
 
     The sums are of what the tip gets and of what the foundation gives.
     """
-
-    def total(trajectory: Trajectory) -> np.ndarray:
-        events = [(e.impulse_contact, e.impulse_foundation) for e in trajectory.events]
-        return np.asarray(np.sum(np.reshape(events, (-1, 2)), axis=0))
-
-    exact = total(reference)
+    found, exact = (
+        np.sum([(0.0, 0.0), *((event.impulse_contact, event.impulse_foundation) for event in of.events)], axis=0)
+        for of in (run, reference)
+    )
     scale = float(np.abs(exact).sum())
-    return float(np.abs(total(run) - exact).sum()) / scale if scale > 0.0 else nan
+    return float(np.abs(found - exact).sum()) / scale if scale > 0.0 else nan
 
 
 def _contacts(run: Trajectory, end: float) -> list[Interval]:

@@ -2,14 +2,16 @@
 
 The cubic through values and rates alone hides what is shallower than its own error, of order 4 in the step. The bodies
 report ∫ w and ∫∫ w as well: with these the polynomial is of order 6, and its distance from the cubic tells how well
-the step is resolved.
+the step is resolved. Its zeros are those of a polynomial: the zeros of its derivative say between which places each
+lies. Coefficients of polynomials ascend; they are plain floats, since numpy's overhead would be most of the time.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+from math import inf
 from typing import NamedTuple
-
-from .polynomials import derivative, sign_changes, value
 
 #: f and ḟ at one time.
 Sample = tuple[float, float]
@@ -18,6 +20,7 @@ Means = tuple[float, float]
 
 #: Largest values in (0, 1) of s²(1 − s)² and of s²(1 − s)²(2s − 1).
 _EVEN, _ODD = 1.0 / 16.0, 0.0178885438
+_EPS, _MAX_ITERATIONS = 2.0**-52, 100
 
 
 class Path(NamedTuple):
@@ -75,3 +78,42 @@ class Path(NamedTuple):
         slopes = derivative(self.powers)
         bends = derivative(slopes)
         return min((s for s in sign_changes(slopes, 0.0, 1.0) if value(bends, s) > 0.0), key=self.at, default=None)
+
+
+def value(coefficients: Sequence[float], x: float) -> float:
+    total = 0.0
+    for coefficient in reversed(coefficients):
+        total = total * x + coefficient
+    return total
+
+
+def derivative(coefficients: Sequence[float]) -> list[float]:
+    """Return the coefficients of the derivative."""
+    return [k * coefficient for k, coefficient in enumerate(coefficients)][1:]
+
+
+def sign_changes(coefficients: Sequence[float], low: float, high: float) -> list[float]:
+    """Return the places between ``low`` and ``high``, ascending, where the sign changes, to rounding."""
+    slopes = derivative(coefficients)
+    if not any(slopes):
+        return []
+    places = [(x, value(coefficients, x)) for x in (low, *sign_changes(slopes, low, high), high)]
+    return [
+        _zero(coefficients, slopes, *((a, b) if at_b > 0.0 else (b, a)))
+        for (a, at_a), (b, at_b) in pairwise(places)
+        if min(at_a, at_b) < 0.0 < max(at_a, at_b)
+    ]
+
+
+def _zero(coefficients: Sequence[float], slopes: Sequence[float], below: float, above: float) -> float:
+    """Return the zero between places where a polynomial is below 0 and above it, by Newton's method and bisection."""
+    x = 0.5 * (below + above)
+    for _ in range(_MAX_ITERATIONS):
+        found, slope, before = value(coefficients, x), value(slopes, x), x
+        below, above = (below, x) if found > 0.0 else (x, above)
+        x = x - found / slope if slope else inf
+        if not min(below, above) < x < max(below, above):
+            x = before if found == 0.0 else 0.5 * (below + above)
+        if abs(x - before) <= _EPS * abs(x):
+            break
+    return x

@@ -37,6 +37,8 @@ STEP_COLUMNS = (
     # bodies tell, `BEAM_TELLS` and `SPRING_TELLS` added up, the same in all records of a run.
     *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress", "told"),
 )
+#: The contact force of a step: C and its two derivatives at the step's start.
+FORCE_COLUMNS = ("contact_force", "contact_force_rate", "contact_force_rate_2")
 #: In ``told``: the record holds what the beam tells; the lower body is the spring of the scene.
 BEAM_TELLS, SPRING_TELLS = 1, 2
 #: Little-endian doubles, on every machine.

@@ -15,7 +15,7 @@ import numpy as np
 from ..scene import Scene
 from .contact_times import foundation_contacts, kicks, tip_contacts, touches
 from .dense import extremes
-from .steps import impulse
+from .steps import FORCE_COLUMNS, impulse
 from .trajectory import Event
 
 
@@ -166,55 +166,38 @@ def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tu
     ``at_events`` are the impulses [N·s] that act at each row, as of `kicks`. One at the edge of a window belongs to it
     if that makes the mean larger.
     """
-    time = steps["time"]
-    # Inside steps the mean is largest where C is the same at both edges of the window.
-    edges = np.union1d(time, time - window)
-    inside = edges[:-1] + _equal_at_both_edges(steps, edges, window)
-    begins, ends = np.array([[time - window, time], [time, time + window]]).reshape(2, -1)
-    begins, ends = np.append(begins, inside), np.append(ends, inside + window)
-    impulses = _impulse_until(steps, at_events, ends).max(axis=0) - _impulse_until(steps, at_events, begins).min(axis=0)
-    at = int(np.argmax(impulses))
-    return max(0.0, float(impulses[at])) / window, max(float(begins[at]), float(time[0]))
+    # By columns. The first row ends no step: in its place is one without force before the run, and one follows it.
+    time, size, c, dc, ddc = (np.pad(steps[name], 1) for name in ("time", "size", *FORCE_COLUMNS))
+    time[0], time[-1], size[[1, -1]] = time[1] - 2.0 * window, time[-2] + 2.0 * window, 2.0 * window
+    c[1] = dc[1] = ddc[1] = 0.0
+    kick = np.pad(at_events, 1)
+    passed = np.cumsum(size * (c + size * (dc / 2.0 + size * ddc / 6.0)) + kick)
 
+    def force(times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return C, Ċ and C̈/2."""
+        into = np.searchsorted(time, times)
+        tau = times - (time[into] - size[into])
+        return c[into] + tau * (dc[into] + 0.5 * tau * ddc[into]), dc[into] + tau * ddc[into], 0.5 * ddc[into]
 
-def _equal_at_both_edges(steps: np.ndarray, edges: np.ndarray, window: float) -> np.ndarray:
-    """Return how long after each of ``edges`` C becomes smaller ``window`` later than now; all [s].
+    def impulses(times: np.ndarray) -> np.ndarray:
+        """Return ∫ C dt with the impulses up to ``times`` [s], without and with those at that time, shape (2, n)."""
+        into, row = np.searchsorted(time, times), np.searchsorted(time, times, side="right") - 1
+        tau = times - (time[into] - size[into])
+        before = passed[into - 1] + tau * (c[into] + tau * (dc[into] / 2.0 + tau * ddc[into] / 6.0))
+        return np.array([before, before + np.where(time[row] == times, kick[row], 0.0)])
 
-    It is 0, as well, where that does not happen up to the next edge: shapes (n,), and (n - 1,) of what is returned.
-    Between edges no window begins or ends at a row, so that both forces are of degree 2.
-    """
-    length = np.diff(edges)
-    middle = edges[:-1] + 0.5 * length
-    c, b, a = (late - early for late, early in zip(_force(steps, middle + window), _force(steps, middle), strict=True))
-    # The root of a τ² + b τ + c at which it falls is 2 c / (√(b² - 4 a c) - b), also where a is 0.
+    # Inside steps the mean is largest where C is the same at both edges of the window: between `edges` both forces are
+    # of degree 2. The root of a τ² + b τ + c at which it falls is 2 c / (√(b² − 4 a c) − b), also where a is 0.
+    rows = steps["time"]
+    edges = np.union1d(rows, rows - window)
+    half = 0.5 * np.diff(edges)
+    middle = edges[:-1] + half
+    c0, b, a = (late - early for late, early in zip(force(middle + window), force(middle), strict=True))
     with np.errstate(divide="ignore", invalid="ignore"):
-        root = 2.0 * c / (np.sqrt(b**2 - 4.0 * a * c) - b)
-    return np.where(np.abs(root) < 0.5 * length, root + 0.5 * length, 0.0)
-
-
-def _force(steps: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return C, Ċ and C̈/2 at ``times`` [s], none of them a row's: 0 before the first row and after the last."""
-    time = steps["time"]
-    end = np.searchsorted(time, times)
-    known = (end > 0) & (end < len(time))
-    end = np.where(known, end, 0)
-    tau = times - (time[end] - steps["size"][end])
-    rate, curvature = steps["contact_force_rate"][end], steps["contact_force_rate_2"][end]
-    value = steps["contact_force"][end] + tau * (rate + 0.5 * tau * curvature)
-    return known * value, known * (rate + tau * curvature), known * 0.5 * curvature
-
-
-def _impulse_until(steps: np.ndarray, at_events: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return ∫ C dt with the impulses [N·s] up to ``times`` [s], with and without those at that time, shape (2, n).
-
-    It is 0 before the first row, and all of it after the last one.
-    """
-    time = steps["time"]
-    row = np.searchsorted(time, times, side="right") - 1
-    into = np.minimum(row + 1, len(steps) - 1)
-    tau = np.clip(times - time[row], 0.0, steps["size"][into])
-    found = np.cumsum(impulse(steps, steps["size"]) + at_events)[row] + np.where(
-        into > row, impulse(steps, tau, into), 0.0
-    )
-    found = np.where(row < 0, 0.0, found)
-    return np.array([found, found - np.where(time[row] == times, at_events[row], 0.0)])
+        root = 2.0 * c0 / (np.sqrt(b**2 - 4.0 * a * c0) - b)
+    inside = middle + np.where(np.abs(root) < half, root, 0.0)
+    begins = np.concatenate([rows - window, rows, inside])
+    ends = np.concatenate([rows, rows + window, inside + window])
+    found = impulses(ends).max(axis=0) - impulses(begins).min(axis=0)
+    at = int(np.argmax(found))
+    return max(0.0, float(found[at])) / window, max(float(begins[at]), float(rows[0]))

@@ -38,7 +38,6 @@ class Adapted(Memory):
     energy: float = 0.0  #: the largest [J]
     number: int = _FIRST * _PER_OCTAVE  #: k of the size
     just_rejected: bool = False
-    rejections: int = 0
 
 
 class AdaptiveSteps(Stateful):
@@ -116,7 +115,6 @@ class AdaptiveSteps(Stateful):
                 state.number = self._rung_below(wanted)
             state.just_rejected = False
             return True
-        state.rejections += 1
         state.just_rejected = True
         state.number = max(state.number + 1, self._rung_below(size * max(factor, _SHRINK)))
         return False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -33,18 +33,13 @@ def bounds(scene: Scene) -> tuple[float, float]:
     return min(max(EXACT, _TOLERANCES * tolerance), APPROXIMATE), APPROXIMATE
 
 
-class Errors(NamedTuple):
-    """By how much the energy is off at each of some records."""
+def errors(
+    scene: Scene, steps: np.ndarray, first: np.ndarray, scale: float, *, of_interface: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return by how much the energy is off at each of ``steps``, over the largest until then, and that [J].
 
-    residual: np.ndarray  #: [J]
-    share: np.ndarray  #: the same over the largest energy until then
-    scale: np.ndarray  #: the largest energy until then [J]
-
-
-def errors(scene: Scene, steps: np.ndarray, first: np.ndarray, scale: float, *, of_interface: bool) -> Errors:
-    """Return the errors at ``steps``, before which the largest energy was ``scale`` [J]; others as of `ledger`.
-
-    ``first`` is the first record of the run, shape (1,): it has the energy that should be kept.
+    ``first`` is the first record of the run, shape (1,): it has the energy that should be kept. ``scale`` is the
+    largest energy before ``steps`` [J]; others are as of `ledger`.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused by the record
         found, initial = ledger(scene, steps, of_interface=of_interface), float(first["energy_at_start"][0])
@@ -53,8 +48,7 @@ def errors(scene: Scene, steps: np.ndarray, first: np.ndarray, scale: float, *, 
         size = np.abs(found["e_beam"]) + np.abs(found["e_spring"]) + found["e_contact"]
         largest = np.maximum.accumulate(np.maximum(size, max(scale, abs(initial))))
         residual = found["e_total"] - initial
-        share = np.divide(residual, largest, out=np.zeros_like(residual), where=largest > 0.0)
-    return Errors(residual, share, largest)
+        return np.divide(residual, largest, out=np.zeros_like(residual), where=largest > 0.0), largest
 
 
 class Balance:
@@ -72,15 +66,15 @@ class Balance:
 
     def check(self, steps: np.ndarray, first: np.ndarray) -> tuple[int, str] | None:
         """Return at which of the next records too much of the energy has changed, and why; see `Log`."""
-        found = errors(self._scene, steps, first, self._scale, of_interface=True)
-        self._scale = float(found.scale[-1])
-        wrong = self._wrong(found) > self._stops
+        share, largest = errors(self._scene, steps, first, self._scale, of_interface=True)
+        self._scale = float(largest[-1])
+        wrong = self._wrong(share) > self._stops
         row = int(np.argmax(wrong))
-        return (row, self._cause(float(abs(found.share[row])), steps)) if wrong[row] else None
+        return (row, self._cause(float(abs(share[row])), steps)) if wrong[row] else None
 
-    def _wrong(self, found: Errors) -> np.ndarray:
+    def _wrong(self, share: np.ndarray) -> np.ndarray:
         """Return the share of the energy that has changed; what numerical damping takes is not an error."""
-        return found.share if self._numerically_damped else np.abs(found.share)
+        return share if self._numerically_damped else np.abs(share)
 
     def report(self, steps: np.ndarray) -> tuple[dict[str, Any], list[str], bool]:
         """Return what all records of the run, shape (n,), say of its energy.
@@ -89,13 +83,12 @@ class Balance:
         that the motion is in doubt.
         """
         if not len(steps):
-            return {"max_energy_residual": 0.0, "max_energy_residual_joule": 0.0}, [], False
-        own, judged = (errors(self._scene, steps, steps[:1], 0.0, of_interface=judged) for judged in (False, True))
-        of_own, of_judged = (float(np.abs(found.share).max()) for found in (own, judged))
+            return {"max_energy_residual": 0.0}, [], False
+        own, judged = (errors(self._scene, steps, steps[:1], 0.0, of_interface=judged)[0] for judged in (False, True))
+        of_own, of_judged = float(np.abs(own).max()), float(np.abs(judged).max())
         last = steps[-1]
         summary = {
             "max_energy_residual": of_own,
-            "max_energy_residual_joule": float(np.abs(own.residual).max()),
             **({"max_interface_residual": of_judged} if self._scene.foreign else {}),
             **({"loss_beam": float(last["beam_dissipated"])} if self._pair.beam is not None else {}),
             **({"loss_spring": float(last["spring_dissipated"])} if self._pair.spring is not None else {}),

@@ -26,27 +26,12 @@ class Log:
 
     def __init__(self, scene: Scene, recorder: Recorder, *checks: Check) -> None:
         self._scene, self._recorder, self._checks = scene, recorder, checks
-        self.events = 0  #: number of events so far
-        #: What the recorder does not have yet; records are as of `springbeam.results.steps.packed`.
-        self.records, self._events, self._shapes = list[bytes](), list[Event](), list[tuple[float, np.ndarray]]()
+        #: What the recorder does not have yet: records as of `springbeam.results.steps.packed`, events of these and the
+        #: next one, and the beam's shapes, (63,), at times of records [s].
+        self.records, self.events, self.shapes = list[bytes](), list[Event](), list[tuple[float, np.ndarray]]()
+        self._events = 0  #: number of those that the recorder has
         self._first = np.empty(0, STEP)  #: record of the run
         self.due = monotonic() + _WAITS  #: when the next records are handed on, however few [s]
-
-    def happened(self, event: Event) -> None:
-        """Take an event of the step whose record comes next."""
-        self.events += 1
-        self._events.append(event)
-
-    def show(self, time: float, shape: np.ndarray) -> None:
-        """Take the beam's shape, (63,), at the ``time`` [s] of the last record."""
-        self._shapes.append((time, shape))
-
-    def catch_up(self) -> None:
-        """Take note of the records that the recorder has of a run that goes on."""
-        steps = self._recorder.steps()
-        if len(steps):
-            self.events = int(steps["events"][-1])
-            self._sound(steps)
 
     def hand_over(self) -> None:
         """Check the records and hand them to the recorder.
@@ -56,9 +41,12 @@ class Log:
         self.due = monotonic() + _WAITS
         if not self.records:
             return
+        if not self._first.size and len(earlier := self._recorder.steps()):  # this run goes on
+            self._events = int(earlier["events"][-1])
+            self._sound(earlier)
         steps, stopped = self._sound(np.frombuffer(b"".join(self.records), STEP))
-        shapes = np.empty((len(self._shapes), len(SHAPE_COLUMNS)))
-        for row, (row_time, shape) in zip(shapes, self._shapes, strict=True):
+        shapes = np.empty((len(self.shapes), len(SHAPE_COLUMNS)))
+        for row, (row_time, shape) in zip(shapes, self.shapes, strict=True):
             row[0], row[1:] = row_time, shape
         finite = np.isfinite(shapes).all(axis=1)
         wrong = shapes[~finite, 0]
@@ -66,8 +54,9 @@ class Log:
             steps = steps[steps["time"] <= wrong[0]]
             stopped = RunStopped("the beam's shape is not finite", float(wrong[0]))
         last, known = (steps["time"][-1], int(steps["events"][-1])) if len(steps) else (-np.inf, 0)
-        events = self._events[: max(known - self.events + len(self._events), 0)]
-        self.records, self._events, self._shapes = [], [], []
+        events = self.events[: max(known - self._events, 0)]
+        self._events += len(events)
+        self.records, self.events, self.shapes = [], [], []
         self._recorder.keep(steps, events, shapes[finite & (shapes[:, 0] <= last)])
         if stopped is not None:
             raise stopped

@@ -36,7 +36,7 @@ from .log import TOGETHER, Log
 from .macro_steps import MacroGrid
 from .neglect import Neglect
 from .observed import NOT_SHOWN, observed, why_not_resolved
-from .outcome import OVERFLOW, RunStopped, raised_here
+from .outcome import RunStopped, cause_of
 from .stepping import SIMULTANEOUS, Pair, State
 
 #: A load that jumps or bends within this fraction of H has done so.
@@ -129,12 +129,10 @@ class Master(Stateful):
             if len(self._log.records) >= TOGETHER or monotonic() >= self._log.due or self.done:
                 self.hand_over()
         except (BodyFailed, OverflowError, RunStopped) as failed:
-            if isinstance(failed, OverflowError) and not raised_here(failed):
-                raise
+            cause = cause_of(failed)
             self.hand_over()  # where an earlier step was wrong, that is why it stops
             if isinstance(failed, RunStopped):
                 raise
-            cause = OVERFLOW if isinstance(failed, OverflowError) else str(failed)
             raise RunStopped(cause, self.state.time) from failed
 
     def hand_over(self) -> None:
@@ -152,10 +150,6 @@ class Master(Stateful):
             raise ValueError(f"a state of {', '.join(saved)}, not of {', '.join(parts)}")
         for name, part in parts.items():
             part.restore(saved[name])
-
-    def catch_up(self) -> None:
-        """Take note of the records that the recorder has of a run that goes on."""
-        self._log.catch_up()
 
     def _parts(self) -> dict[str, Stateful]:
         pair = self._pair
@@ -213,11 +207,9 @@ class Master(Stateful):
                 pair.rewind()
                 size = self._steps.size
             except (StepRefused, OverflowError) as refused:
-                if isinstance(refused, OverflowError) and not raised_here(refused):
-                    raise  # a body of the caller's has failed: it would do so at any size
+                cause = cause_of(refused)
                 if pair.repeatable:
                     pair.rewind()
-                cause = OVERFLOW if isinstance(refused, OverflowError) else str(refused)
                 nothing = state.time + 0.5 * size == state.time  # a step that rounding of the time swallows
                 if halvings == _MAX_HALVINGS or nothing or not pair.divides:
                     residual = refused.residual if isinstance(refused, NotConverged) else None
@@ -289,7 +281,8 @@ class Master(Stateful):
         pair, (tip, low) = self._pair, self._pair.ends()
         y, z = (None, None) if pair.spring is None else low[:2]
         u, v = (None, None) if pair.beam is None else tip[:2]
-        self._log.happened(Event(self.state.time, kind, y, z, u, v, impact.on_beam, impact.of_foundation, lost))
+        self.state.events += 1
+        self._log.events.append(Event(self.state.time, kind, y, z, u, v, impact.on_beam, impact.of_foundation, lost))
 
     def _settled(self) -> Step:
         """Let the coupling decide what touches now; return a step of no size, for nothing is known inside the last."""
@@ -305,7 +298,8 @@ class Master(Stateful):
         state = self.state
         for joint, change in self._detector.soft_changes(state, step):
             state.phase = Phase(joint, state.phase.seated)
-            self._log.happened(change)
+            state.events += 1
+            self._log.events.append(change)
 
     # -- what is left of a step ---------------------------------------------------------------------------------------
 
@@ -334,7 +328,7 @@ class Master(Stateful):
             self._adaptive.note(energies + booked.stored)
         return packed(
             *(state.time, size, *before[0], *before[1], *contact, *foundation),
-            *(u, v, y, z, state.phase.number, self._log.events, state.smoothed, booked.law_force),
+            *(u, v, y, z, state.phase.number, state.events, state.smoothed, booked.law_force),
             *(
                 *of_upper,
                 *of_lower,
@@ -354,7 +348,7 @@ class Master(Stateful):
         state.shapes_left -= early
         if time >= state.next_shape:
             state.next_shape += every * ((time - state.next_shape) // every + 1.0)
-        self._log.show(time, beam.shape())
+        self._log.shapes.append((time, beam.shape()))
 
     # -- what it amounts to -------------------------------------------------------------------------------------------
 
@@ -383,7 +377,6 @@ class Master(Stateful):
             "macro_steps": made,
             "events": len(events),
             "halved_steps": self.state.halvings,
-            **({} if self._adaptive is None else {"rejected_steps": self._adaptive.state.rejections}),
             **of_coupling,
             **energies,
             "resolved": unresolved is None and not changed,

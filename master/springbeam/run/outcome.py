@@ -11,15 +11,17 @@ from ..results.trajectory import Trajectory
 #: ``progress(time, phase, macro_steps)``, called once per accepted step.
 Progress = Callable[[float, str, int], None]
 #: Cause of a run that ends because a number has become too large.
-OVERFLOW = "a force, an energy or a position is larger than a double holds"
+_OVERFLOW = "a force, an energy or a position is larger than a double holds"
 
 
-def raised_here(error: BaseException) -> bool:
-    """Return whether code of this package has raised ``error``, and not a body of the caller's that it has called."""
-    module = ""
-    for frame, _ in walk_tb(error.__traceback__):
-        module = frame.f_globals.get("__name__", "")
-    return module.partition(".")[0] == __name__.partition(".")[0]
+def cause_of(error: Exception) -> str:
+    """Return why a step has failed. Raises an OverflowError again that a body of the caller's has raised."""
+    if not isinstance(error, OverflowError):
+        return str(error)
+    *_, (frame, _) = walk_tb(error.__traceback__)
+    if frame.f_globals.get("__name__", "").partition(".")[0] != __name__.partition(".")[0]:
+        raise error
+    return _OVERFLOW
 
 
 class RunStopped(RuntimeError):

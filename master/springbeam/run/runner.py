@@ -87,7 +87,6 @@ class Simulation:
             path = recorder.directory.checkpoint
             raise CheckpointRefused(f"{path}: written by another version: {error}") from error
         recorder.restore(start.results)
-        self._master.catch_up()
 
     def _in_directory(self) -> FileRecorder:
         if not isinstance(self.recorder, FileRecorder):
@@ -193,12 +192,14 @@ class Simulation:
 
     def _summed_up(self, status: dict[str, Any]) -> dict[str, Any]:
         wall_time, summary = self._wall_time(), self._master.summary()
-        beam, spring = self._bodies
+        told = zip(("beam", "spring"), self._bodies, strict=True)
+        counting = {name: body for name, body in told if isinstance(body, FmuBody | IsolatedBody)}
         return {
             **status,
             "version": __version__,
             **summary,
-            **_calls(beam=beam, spring=spring),
+            **{f"{name}_steps": body.steps for name, body in counting.items()},
+            **{f"{name}_rollbacks": body.rewinds for name, body in counting.items()},
             "setup_time": self._setup_time,
             "wall_time": wall_time,
             "warnings": [*suspicions(self.scene), *summary["warnings"]],
@@ -341,12 +342,3 @@ def _without_own(scene: Scene, **own: Body | None) -> Scene:
     for what in (what for what, is_so in asked.items() if is_so):
         raise SceneError(f"{what}: takes the bodies from the scene, and cannot be used with a body of your own")
     return scene.model_copy(update=dict.fromkeys(given))
-
-
-def _calls(**bodies: Body | None) -> dict[str, int]:
-    counts = {}
-    for name, body in bodies.items():
-        if isinstance(body, (FmuBody, IsolatedBody)):
-            counts[f"{name}_steps"] = body.steps
-            counts[f"{name}_rollbacks"] = body.rewinds
-    return counts

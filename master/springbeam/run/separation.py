@@ -15,8 +15,7 @@ from ..bodies.protocol import Force
 from ..contact.events import EventFunction, Height, gap, locate
 from ..contact.phases import Joint, Phase
 from ..coupling.protocol import Step
-from ..results.paths import Sample
-from ..results.polynomials import sign_changes
+from ..results.paths import Sample, sign_changes
 from ..results.trajectory import EventKind
 from .stepping import Pair, State
 

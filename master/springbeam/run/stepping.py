@@ -49,6 +49,7 @@ class State(Memory):
     at_once: tuple[int, float] = (0, -inf)
     in_step: tuple[int, float] = (0, -inf)
     macro_steps: int = 0
+    events: int = 0
     halvings: int = 0  #: of steps that were refused
     shapes_left: int = 0  #: of the beam, to be kept after first contact
     next_shape: float = 0.0  #: when the next of those over the run is due [s]
@@ -206,10 +207,9 @@ class Pair:
 
     def apply_impulses(self, on_beam: float, on_spring: float) -> None:
         """Upward impulses [N·s]."""
-        if self.beam is not None and on_beam != 0.0:
-            self.beam.apply_impulse(on_beam)
-        if self.spring is not None and on_spring != 0.0:
-            self.spring.apply_impulse(on_spring)
+        for body, impulse in ((self.beam, on_beam), (self.spring, on_spring)):
+            if body is not None and impulse != 0.0:
+                body.apply_impulse(impulse)
 
     def follow_phase(self, phase: Phase) -> float:
         """Let a massless tip take the velocity of what ``phase`` joins it to, or spring back; return its loss [J]."""
