@@ -138,8 +138,10 @@ def test_a_motion_that_jumps_with_the_size_of_the_step_has_no_event(jump, refuse
         return Step(0.0, size, NO_FORCE, NO_FORCE, start, ends)
 
     monkeypatch.setattr(pair, "attempt", attempt)
-    detector = Detector(load_scene("soft"), pair, MacroGrid(0.0, 1.0, 1e-3), lambda: 1.0)
+    detector = Detector(load_scene("soft"), pair, MacroGrid(0.0, 1.0, 1e-3))
+    state = pair.initial_state(0.0)
+    state.fastest = 1.0
     step = attempt(None, 1e-3, start)
     with pytest.raises(StepRefused, match="the motion jumps by") if refused else nullcontext():
-        found, kind = detector.first_event(pair.initial_state(0.0), step)
+        found, kind = detector.first_event(state, step)
         assert (kind, found.size) == ("impact", pytest.approx(0.3e-3, rel=1e-12))

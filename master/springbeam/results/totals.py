@@ -181,10 +181,10 @@ def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tu
 
     def impulses(times: np.ndarray) -> np.ndarray:
         """Return ∫ C dt with the impulses up to ``times`` [s], without and with those at that time, shape (2, n)."""
-        into, row = np.searchsorted(time, times), np.searchsorted(time, times, side="right") - 1
-        tau = times - (time[into] - size[into])
-        before = passed[into - 1] + tau * (c[into] + tau * (dc[into] / 2.0 + tau * ddc[into] / 6.0))
-        return np.array([before, before + np.where(time[row] == times, kick[row], 0.0)])
+        row = np.searchsorted(time, times, side="right") - 1
+        into, tau = row + 1, times - time[row]
+        found = passed[row] + tau * (c[into] + tau * (dc[into] / 2.0 + tau * ddc[into] / 6.0))
+        return np.array([found - np.where(time[row] == times, kick[row], 0.0), found])
 
     # Inside steps the mean is largest where C is the same at both edges of the window: between `edges` both forces are
     # of degree 2. The root of a τ² + b τ + c at which it falls is 2 c / (√(b² − 4 a c) − b), also where a is 0.
@@ -195,7 +195,7 @@ def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tu
     c0, b, a = (late - early for late, early in zip(force(middle + window), force(middle), strict=True))
     with np.errstate(divide="ignore", invalid="ignore"):
         root = 2.0 * c0 / (np.sqrt(b**2 - 4.0 * a * c0) - b)
-    inside = middle + np.where(np.abs(root) < half, root, 0.0)
+    inside = np.where(np.abs(root) < half, middle + root, edges[:-1])
     begins = np.concatenate([rows - window, rows, inside])
     ends = np.concatenate([rows, rows + window, inside + window])
     found = impulses(ends).max(axis=0) - impulses(begins).min(axis=0)

@@ -5,7 +5,6 @@ Positions tell of meeting, release and the foundation (`springbeam.contact.event
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import isfinite
 
 from ..bodies.protocol import Ends, Motion, StepRefused
@@ -39,15 +38,10 @@ _VELOCITY_ROUNDING = 16.0 * 2.0**-52
 
 
 class Detector:
-    """Finds the event that ends a step; the bodies are left where the returned step ends.
+    """Finds the event that ends a step; the bodies are left where the returned step ends."""
 
-    ``fastest`` tells the largest speed of an end so far [m/s].
-    """
-
-    def __init__(
-        self, scene: Scene, pair: Pair, steps: MacroGrid | AdaptiveSteps, fastest: Callable[[], float]
-    ) -> None:
-        self._pair, self._steps, self._fastest = pair, steps, fastest
+    def __init__(self, scene: Scene, pair: Pair, steps: MacroGrid | AdaptiveSteps) -> None:
+        self._pair, self._steps = pair, steps
         tip_share = 0.0
         if pair.beam is not None and pair.spring is not None:
             tip_share = common_velocity(1.0, 0.0, pair.beam.mass, pair.spring.mass)
@@ -70,14 +64,14 @@ class Detector:
         speed = max(abs(end.velocity) for end in ends)
         return self.tolerance(ends) + _NO_TIME * self._steps.size * speed
 
-    def _rest(self, ends: Ends) -> float:
+    def _rest(self, state: State, ends: Ends) -> float:
         """Speed below which ends do not move against each other [m/s].
 
         Velocities are sums of modes that have been as fast as the ends: one that is left of 0, as of a tip that is let
         go, is rounding.
         """
         tip, low = ends
-        return max(1e-12 * max(abs(tip.velocity), abs(low.velocity)), _VELOCITY_ROUNDING * self._fastest())
+        return max(1e-12 * max(abs(tip.velocity), abs(low.velocity)), _VELOCITY_ROUNDING * state.fastest)
 
     def at_start(self, state: State, start: Ends) -> EventKind | None:
         """The event that is due before any step: its function is 0 and falling, or a force that can only push pulls."""
@@ -85,7 +79,7 @@ class Detector:
         for (kind, _), (value, rate) in zip(
             self._functions.of(phase), self._functions.samples(phase, start), strict=True
         ):
-            if rate < 0.0 and value <= self.tolerance(start) and rate < -self._rest(start):
+            if rate < 0.0 and value <= self.tolerance(start) and rate < -self._rest(state, start):
                 return kind
             if kind is EventKind.SEPARATION and value < -self.simultaneity_tolerance(start):
                 return kind
@@ -150,7 +144,7 @@ class Detector:
     ) -> Step | None:
         """Return ``step`` if ``function`` ends below ``floor``, a shorter one if it dips below it before, or None."""
         whole_step = step if end[0] < floor else None
-        if abs(start[1]) <= self._rest(step.start):
+        if abs(start[1]) <= self._rest(state, step.start):
             # Ends that have just parted may close a little first, by the error of the time at which they were let go.
             return whole_step
         path = Path.through(start, end, step.size, function.means(step.end, step.size))
@@ -187,7 +181,7 @@ class Detector:
         locate(evaluate, guess, bracket.size, tolerance, state.time)
         missed = abs(function(last.end)[0])
         # A tip at rest at 0 is there to the rounding of the modes that it is the sum of.
-        rounding = max(self.tolerance(last.end), _VELOCITY_ROUNDING * self._fastest() * self._steps.size)
+        rounding = max(self.tolerance(last.end), _VELOCITY_ROUNDING * state.fastest * self._steps.size)
         if missed > _JUMP * rounding:
             raise StepRefused(f"an event is not found: the motion jumps by {missed:.3g} m with the size of the step")
         return last

@@ -87,13 +87,13 @@ class Master(Stateful):
         if scene.coupling.adaptive:
             self._adaptive = AdaptiveSteps(scene, self._pair, start_time, end)
         self._steps = self._adaptive or MacroGrid(start_time, end, scene.coupling.H)
-        self._detector = Detector(scene, self._pair, self._steps, self._fastest)
+        self._detector = Detector(scene, self._pair, self._steps)
         self._transitions = Transitions(
             scene,
             self._pair.law,
             None if beam is None else beam.mass,
             None if spring is None else spring.mass,
-            self._fastest,
+            lambda: self.state.fastest,
             self._pair.equilibrium,
         )
         self._balance = Balance(scene, self._pair)
@@ -111,10 +111,6 @@ class Master(Stateful):
     def done(self) -> bool:
         """Whether the run has reached t_end."""
         return self.state.begun and self.state.time >= self._scene.time.t_end
-
-    def _fastest(self) -> float:
-        """The largest speed of an end so far [m/s]."""
-        return self.state.fastest
 
     def step(self) -> None:
         """Make the next step, up to an event if there is one. The first call begins the run.
