@@ -172,11 +172,15 @@ def test_keys_that_the_data_does_not_determine_are_named(tmp_path, vary, why):
     assert any(why in words for words in fitted(path, vary, shift=0.0)["undetermined"])
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")  # of means of nothing, where the clock has left the run
 def test_the_command_ends_with_1_where_the_data_does_not_tell(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     written(tmp_path / "m.csv", "time,y", TIMES, exact())
     line = ["fit", "duffing", "m.csv", "--set", "time.t_end=0.6", "--vary"]
-    assert command(*line, "spring.cubic_stiffness=-1e-12", "--out", "f").exit_code == 1
+    told = command(*line, "spring.cubic_stiffness=-1e-12", "--out", "f")
+    assert told.exit_code == 1
+    assert isinstance(told.exception, SystemExit)
+    assert "not determined: spring.cubic_stiffness does not change the curves" in " ".join(told.stdout.split())
     for vary, why in {
         "spring.mass": "TABLE.KEY=VALUES",
         "mass=1": "TABLE.KEY=VALUES",
@@ -190,6 +194,9 @@ def test_the_command_ends_with_1_where_the_data_does_not_tell(tmp_path, monkeypa
     few = command("fit", "duffing", "few.csv", "--vary", "spring.mass=1", "--out", "few")
     assert few.exit_code == 2
     assert "fewer of its points lie in the run" in few.stderr
+    away = command(*line, "spring.mass=1", "--shift", "9", "--out", "few")
+    assert away.exit_code == 2
+    assert "fewer of its points lie in the run than are needed to find spring.mass; make" in away.stderr
 
 
 def test_a_fit_that_is_done_is_shown_at_once(tmp_path, monkeypatch):

@@ -26,7 +26,7 @@ from ..signals.measured import Measured, read_measured, time_shifts
 from .accuracy import simulate
 from .design import design, parse_axis
 from .study import Findings, Row, Study
-from .tables import table
+from .tables import number, table
 
 _CASE = "fit"
 #: The unknown that moves the clock of the measurement [s], beside keys.
@@ -93,22 +93,21 @@ class Fit(Study):
 
     def record(self, case: Row) -> Row:
         """Return the values found, their intervals, and every run on the way."""
-        data, guesses = self.data(), self.guesses()
-        if self.shift is not None:
-            return _Search(self, data, guesses, self.shift).found()
+        data, guesses, free = self.data(), self.guesses(), self.shift is None
         try:
             run = simulate(self.at(guesses))
         except (RunStopped, SceneError) as refused:
             raise SceneError(f"the guess cannot be run: {refused}") from refused
         # While keys are wrong the curves may fit best a period too late: a few places are tried.
-        starts = time_shifts(run, data)[0][:_TRIED] + [0.0] * int(data.covered(run).mean() > 0.5)
-        starts = [shift for shift in starts if data.covered(run, shift, _MARGIN).sum() > len(guesses) + 1]
+        starts = [self.shift] if self.shift is not None else time_shifts(run, data)[0][:_TRIED]
+        starts += [0.0] * int(free and data.covered(run).mean() > 0.5)
+        starts = [shift for shift in starts if data.covered(run, shift, _MARGIN * free).sum() > len(guesses) + free]
         if not starts:
             raise SceneError(
-                f"{self.file}: fewer of its points lie in the run than are needed to find {', '.join(guesses)} and the "
-                "shift of its clock; make time.t_end longer, give more points, or fix the shift with --shift"
+                f"{self.file}: fewer of its points lie in the run than are needed to find {', '.join(guesses)}"
+                f"{' and the shift of its clock' * free}; make time.t_end longer, give more points, or another --shift"
             )
-        searches = [_Search(self, data, {**guesses, SHIFT: shift}, shift) for shift in starts]
+        searches = [_Search(self, data, guesses | {SHIFT: shift} if free else guesses, shift) for shift in starts]
         record = min(searches, key=lambda search: search.least(_FIRST_LOOK).cost).found()
         if record["undetermined"] and 0.0 in starts:  # the keys alone may be
             searches.append(_Search(self, data, guesses, 0.0))
@@ -123,7 +122,8 @@ class Fit(Study):
         """Show the values with their intervals, or which of them the data does not determine."""
         record = records[_CASE]
         keys = [
-            (row["key"], f"{row['value']:.8g}", f"{row['low']:.6g}", f"{row['high']:.6g}") for row in record["keys"]
+            (row["key"], f"{row['value']:.8g}", number(row["low"], ".6g"), number(row["high"], ".6g"))
+            for row in record["keys"]
         ]
         left = [(name, f"{rms:.4g}", f"{share:.2%}") for name, (rms, share) in record["left"].items()]
         shown: list[Any] = [
@@ -156,6 +156,7 @@ class _Search:
         self._weights = {name: 1.0 / spread for name, spread in self._spread.items()}
         self._best = np.zeros(len(guesses))  #: unknowns at which the search goes on
         self._part: np.ndarray | None = None  #: which points take part, wherever the clock moves
+        self._elsewhere = False  #: whether the clock may have moved since these were chosen
         self.runs: list[Row] = []
 
     def values(self, unknowns: np.ndarray) -> dict[str, float]:
@@ -177,8 +178,10 @@ class _Search:
                 raise SceneError(f"the guess cannot be run: {refused}") from refused
             self.runs.append({**values, "error": str(refused)})
             return np.full(len(self._data.values) * int(self._part.sum()), _REFUSED)
-        if self._part is None:
-            self._part = self._data.covered(run, shift, _MARGIN * (SHIFT in values))
+        covered = self._data.covered(run, shift, _MARGIN * (SHIFT in values))
+        if self._part is None or (self._elsewhere and covered.sum() > len(self._guesses)):
+            self._part = covered
+        self._elsewhere = False
         curves = run.at(np.clip(self._data.time[self._part] + shift, run.time[0], run.time[-1]))
         off = {name: signal(curves, name) - measured[self._part] for name, measured in self._data.values.items()}
         rms = {f"left_{name}": float(np.sqrt(np.mean(part**2))) for name, part in off.items()}
@@ -200,7 +203,7 @@ class _Search:
         self._weights = {
             name: 1.0 / max(self.runs[-1][f"left_{name}"], 1e-9 * spread) for name, spread in self._spread.items()
         }
-        self._part = None  # the clock may be elsewhere
+        self._elsewhere = True
         result = self.least()
         self.left(result.x)
         keys, undetermined = self._judged(result)
@@ -220,8 +223,6 @@ class _Search:
         undetermined = [f"{name} does not change the curves" for name, size in zip(names, lengths, strict=True)
                         if size <= _UNDETERMINED * float(lengths.max(initial=0.0)) or size == 0.0]  # fmt: skip
         freedom = len(result.fun) - len(names)
-        if freedom <= 0:
-            undetermined.append(f"{len(result.fun)} points for {len(names)} keys")
         if undetermined:
             return [{"key": name, "value": values[name], "low": None, "high": None} for name in names], undetermined
         _, sizes, directions = np.linalg.svd(result.jac / lengths, full_matrices=False)
