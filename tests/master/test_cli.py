@@ -18,14 +18,13 @@ from rich.console import Console
 from runs import block
 
 import springbeam.run.runner
-from springbeam import Event, RunStopped, cli
+from springbeam import Event, RunStopped, cli, load_scene, with_changes
 from springbeam.cli import common
 from springbeam.cli.look import results_of
 from springbeam.results.directory import PICTURES
 from springbeam.results.files import load_trajectory
 from springbeam.results.steps import STEP
 from springbeam.results.totals import totals
-from springbeam.scene import load_scene, with_changes
 
 SUMMARY = {"status": "done", "macro_steps": 31, "wall_time": 0.25, "max_energy_residual": 3e-14, "warnings": []}
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from bodies import DuffingBody, Upper
 
-from springbeam import load_scene, simulate, with_changes
-from springbeam.bodies.elements import PointMass
+from springbeam import PointMass, load_scene, simulate, with_changes
 from springbeam.contact.laws import law_of
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.run.misplaced import misplaced, tip_modes

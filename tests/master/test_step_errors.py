@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from bodies import DuffingBody, Upper
 
-from springbeam import RunStopped
+from springbeam import RunStopped, load_scene, with_changes
 from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Motion
 from springbeam.coupling.hermite import gap_inside
 from springbeam.coupling.protocol import Step
 from springbeam.run.adaptive import AdaptiveSteps
 from springbeam.run.stepping import Pair, State
-from springbeam.scene import load_scene, with_changes
 
 
 @pytest.mark.parametrize("degree", [1, 2])

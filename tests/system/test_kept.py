@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
+from springbeam import PointMass, RunStopped, SceneError, load_scene, simulate, with_changes
 from springbeam.bodies import fmu, fmu_bodies
 from springbeam.bodies.archive import own_fmu
-from springbeam.bodies.elements import PointMass
 from springbeam.bodies.fmu_bodies import release
 
 SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 1e-3}, time={"t_end": 0.25})
