@@ -8,6 +8,7 @@ import pytest
 from bodies import DuffingBody, Upper
 from numpy.polynomial import Polynomial
 
+from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Motion, StepRefused
 from springbeam.contact.events import EventFunctions, Height, Holding, clearance, gap, locate
 from springbeam.contact.phases import Joint, Phase, common_velocity
@@ -15,8 +16,9 @@ from springbeam.coupling.protocol import Step
 from springbeam.results.paths import Path
 from springbeam.run.detection import Detector
 from springbeam.run.macro_steps import MacroGrid
+from springbeam.run.separation import Separation
 from springbeam.run.stepping import Pair
-from springbeam.scene import Beam, Spring, load_scene
+from springbeam.scene import Beam, Spring, load_scene, with_changes
 
 SIZE = 0.02
 #: Coefficients in x = τ/H, ascending.
@@ -145,3 +147,26 @@ def test_a_motion_that_jumps_with_the_size_of_the_step_has_no_event(jump, refuse
     with pytest.raises(StepRefused, match="the motion jumps by") if refused else nullcontext():
         found, kind = detector.first_event(state, step)
         assert (kind, found.size) == ("impact", pytest.approx(0.3e-3, rel=1e-12))
+
+
+@pytest.mark.parametrize("seated", [False, True])
+def test_the_zero_of_a_force_is_where_the_step_that_tells_it_best_has_it(monkeypatch, seated):
+    """0.5 N + 100 N/s · H − 1 kN/s · τ in a step of H: with H = τ/s its zero is at 0.5/(1000 − 100/s) s.
+
+    A force that turns a mismatch round, 3 N of the contact's, is no part of it.
+    """
+    scene = with_changes(load_scene("soft"), coupling={"degree": 1})
+    pair = Pair(scene, Upper(2.0), DuffingBody(1.0))
+
+    def attempt(state, size, start, phase=None):
+        push, other = (0.5 + 100.0 * size, -1000.0, 0.0), (3.0, 0.0, 0.0)
+        contact, foundation = (other, force.combined((1.0, 1.0), (push, other))) if seated else (push, NO_FORCE)
+        return Step(0.0, size, contact, foundation, start, start)
+
+    monkeypatch.setattr(pair, "attempt", attempt)
+    monkeypatch.setattr(pair, "force_without_mismatch", lambda phase, step: NO_FORCE if seated else step.contact)
+    state = pair.initial_state(0.0)
+    state.enter(Phase(Joint.TIED if seated else Joint.TOUCH, seated))
+    step, event = Separation(pair, 1e-9).first_event(state, attempt(state, 1e-3, pair.ends()), 1e-3)
+    assert event == ("unseated" if seated else "separation")
+    assert step.size == pytest.approx(0.5 / (1000.0 - 100.0 / pair.joined.sharpest), abs=1e-11)
