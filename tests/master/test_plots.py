@@ -15,6 +15,7 @@ from runs import EVERY_EVENT, ODD_COLUMNS, PAIR, SCENES, a_trajectory
 from springbeam import Event, with_changes
 from springbeam.pictures import plots, timeline
 from springbeam.pictures.drawing import (
+    ENERGIES,
     EVENT_LOOKS,
     NOT_RESOLVED,
     decimated,
@@ -95,8 +96,10 @@ def test_panels_are_painted_with_all_that_they_say():
     assert "part λ(Ψ − u)₊ᵖ" not in labels
     assert {"rest of the spring Ψ", "foundation φ"} <= set(texts(figure_of(run, "positions")))
     energies = figure_of(run, "gap_and_energy").axes[1]
-    assert len(energies.collections) > 3
-    assert [line.get_label() for line in energies.lines if line.get_label()[0] != "_"] == ["total"]
+    (total,) = [line for line in energies.lines if line.get_label()[0] != "_"]
+    areas = [area for area in energies.collections if area.get_label() in {look.words for look in ENERGIES.values()}]
+    assert (total.get_label(), len(areas)) == ("total", 5)
+    assert areas[-1].get_paths()[0].vertices[:, 1].max() == pytest.approx(total.get_ydata().max(), rel=1e-12)
 
 
 def test_what_is_compared_is_drawn_in_the_unit_of_its_axis_and_with_what_strikes_it(monkeypatch):

@@ -161,6 +161,15 @@ def test_what_a_law_stores_and_takes_is_the_power_of_its_force(name, contact):
     np.testing.assert_allclose(force * rate, stored + law.dissipation(contact, p, rate), rtol=1e-9, atol=1e-9)
 
 
+def test_a_damped_contact_lets_go_where_its_ends_part_fast_and_never_pulls():
+    contact = {"law": "compliance", "stiffness": 1e3, "exponent": 1.5, "damping": 5.0}
+    run = event_driven.simulate(linear(contact=contact, stop=None), t_end=0.4)
+    slack = (run.phase == "touch") & (run.contact_force == 0.0) & (run.y > run.u_tip)
+    assert 30 < np.sum(slack) < 50
+    assert np.min(run.contact_force) > -1e-14
+    assert run.summary["largest_relative_energy_residual"] < 1e-11
+
+
 # -- beside scipy ---------------------------------------------------------------------------------------------------
 
 LIFTED = {
@@ -196,6 +205,10 @@ CASES = {
     ),
     "link, damped as its modes": linear(
         contact={"law": "link", "stiffness": 1e3, "damping": 1.0}, beam={"alpha_b": 1e-3}, stop={"restitution": 0.8}
+    ),
+    "link, damped as its modes, seated": linear(
+        contact={"law": "link", "stiffness": 1e3, "damping": 1.0}, beam={"alpha_b": 1e-3}, stop={"restitution": 0.0},
+        spring={"external_force": -5.0},
     ),
     "link, unstable spring": soft(contact={"law": "link"}, spring=UNSTABLE),
     "stiff link": linear(contact={"law": "link", "stiffness": 1e8}, stop=None),  # which is part of the modes

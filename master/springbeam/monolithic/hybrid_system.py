@@ -58,29 +58,24 @@ class HybridSystem:
 
     def __init__(self, scene: Scene, beam: ModalBeam | None = None) -> None:
         self.scene, self.law = scene, law_of(scene)
-        self.beam = modal_beam(scene.beam) if beam is None and scene.beam is not None else beam
+        self.beam = beam = modal_beam(scene.beam) if beam is None and scene.beam is not None else beam
         self.has_spring = scene.spring is not None
         self.alone = not (self.has_spring or scene.elastic_stop)
         #: Without a spring its terms vanish, and without a stop nothing is ever seated on this one.
-        self.spring, self.stop = (
-            scene.spring or Spring(mass=1.0, linear_stiffness=0.0),
-            scene.stop or Stop(position=0.0),
-        )
-        self.mass, self.root_mass = self.spring.mass * self.has_spring, float(np.sqrt(self.spring.mass))
-        empty, p, one = np.zeros(0), self.spring, np.ones(int(self.has_spring))
-        omega2, load, b = (empty, empty, empty) if self.beam is None else (
-            self.beam.omega**2, self.beam.load, self.beam.tip
-        )  # fmt: skip
-        self.alpha_b = 0.0 if self.beam is None else self.beam.alpha
-        self.loads = Loads(scene, self.beam)
+        self.spring = p = scene.spring or Spring(mass=1.0, linear_stiffness=0.0)
+        self.stop = scene.stop or Stop(position=0.0)
+        self.mass, self.root_mass = p.mass * self.has_spring, float(np.sqrt(p.mass))
+        one = np.ones(int(self.has_spring))
+        omega2, load, b = (np.zeros(0),) * 3 if beam is None else (beam.omega**2, beam.load, beam.tip)
+        self.alpha_b = 0.0 if beam is None else beam.alpha
+        self.loads = Loads(scene, beam)
         self.r, self.n = len(b), len(b) + len(one)
         self.omega2 = np.append(omega2, one * p.linear_stiffness / p.mass)
         self.c = np.append(self.alpha_b * omega2, one * p.damping / p.mass)
         self.load = np.append(load, one * p.external_force / self.root_mass)
         self.patterns = np.column_stack([self.loads.patterns, np.outer(self.loads.on_spring, one) / self.root_mass])
-        self.tip, self.top = np.append(b, 0.0 * one), np.append(0.0 * b, one / self.root_mass)
-        if self.alone:
-            self.top = self.tip
+        self.tip = np.append(b, 0.0 * one)
+        self.top = self.tip if self.alone else np.append(0.0 * b, one / self.root_mass)
         self.between = self.tip if self.alone else self.tip - self.top
         #: What an impulse of 1 N·s adds to the velocity of the tip, and to that between the ends [1/kg].
         self.tip_mobility, self.mobility = float(self.tip @ self.tip), float(self.between @ self.between)
