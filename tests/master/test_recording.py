@@ -5,7 +5,7 @@ import math
 import os
 import shutil
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from fractions import Fraction
 from pathlib import Path
 
@@ -30,6 +30,8 @@ from springbeam.results.files import export, load_summary, load_trajectory, read
 from springbeam.results.recording import FileRecorder, MemoryRecorder
 from springbeam.results.steps import PHASE_NAMES, STEP_COLUMNS
 from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, TOLD, Event, columns_of
+from springbeam.run.log import Log
+from springbeam.run.outcome import RunStopped
 from springbeam.scene import SceneError, with_changes
 
 
@@ -524,3 +526,30 @@ def test_a_disk_without_room_for_a_new_run_keeps_the_old_one(tmp_path, size):
         recorder.keep(*block(3))
     assert not recorder.begun
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
+# -- on the way there ---------------------------------------------------------------------------------------------
+
+
+def test_a_run_is_handed_over_up_to_where_it_goes_wrong():
+    """Of its second block the records before one that is not finite, with their events; then nothing of it is lost."""
+    recorder, judged = MemoryRecorder(PAIR), []
+    log = Log(PAIR, recorder, lambda steps, first: judged.append((len(steps), first["time"].tolist())))
+    for begin in (0, 30):
+        steps, events, shapes = block(30, begin=begin)
+        steps["z"][17] = math.nan if begin else 0.0
+        log.records += [step.tobytes() for step in steps]
+        log.events += events
+        log.shapes += [(row[0], row[1:]) for row in shapes]
+        with pytest.raises(RunStopped, match="z = nan at t = ") if begin else nullcontext():
+            log.hand_over()
+    kept = recorder.trajectory()
+    assert (len(kept), len(kept.events), len(kept.shape_table)) == (47, kept.steps["events"][-1], 47)
+    assert judged == [(30, [0.0]), (17, [0.0])]
+    # A run that goes on: what it has is judged before what comes.
+    judged.clear()
+    log = Log(PAIR, recorder, lambda steps, first: judged.append((len(steps), first["time"].tolist())))
+    log.records.append(block(30)[0][-1].tobytes())
+    log.hand_over()
+    assert judged == [(47, [0.0]), (1, [0.0])]
+    assert len(recorder.events()) == len(kept.events)

@@ -53,3 +53,19 @@ def test_no_more_than_rounding_is_forgiven(share, holds):
     end = Motion(1.0 + way, 0.0, 1.0 + way / 2.0 + beside, 0.5 + 0.15 * way + beside / 2.0)
     step = Step(0.0, 1.0, NO_FORCE, NO_FORCE, (start, rest), (end, rest))
     assert AdaptiveSteps(scene, pair, 0.0, 9.0).holds(pair.initial_state(0.0), step, "") is holds
+
+
+def test_what_moves_little_is_judged_beside_how_far_it_has_come():
+    """After a way of 1 m 1e-3 of that is allowed beside the cubic, for a step of 1 nm as well."""
+    scene = with_changes(load_scene("soft"), coupling={"relative_tolerance": 1e-3, "absolute_tolerance": 1e-30})
+    pair, rest = Pair(scene, Upper(1.0, y=1.0), DuffingBody(1.0)), Motion(0.0, 0.0, 0.0, 0.0)
+    steps, state = AdaptiveSteps(scene, pair, 0.0, 9.0), pair.initial_state(0.0)
+
+    def to(start, way, beside):
+        end = Motion(way, 0.0, 0.5 * (start + way) + beside, 0.05 * (7.0 * start + 3.0 * way) + 0.5 * beside)
+        return Step(0.0, 1.0, NO_FORCE, NO_FORCE, (Motion(start, 0.0, 0.0, 0.0), rest), (end, rest))
+
+    assert not steps.holds(state, to(1.0, 1.0 + 1e-9, 0.9e-3), "")
+    steps.accept(to(1.0, 0.0, 0.0))
+    assert steps.holds(state, to(1.0, 1.0 + 1e-9, 0.9e-3), "")
+    assert not steps.holds(state, to(1.0, 1.0 + 1e-9, 1.1e-3), "")
