@@ -100,7 +100,6 @@ def test_a_tighter_tolerance_of_the_importer_is_followed(spring):
 # -- saved states: the same step repeated is the same to the last bit, here and in another instance -------------------
 
 
-OK, ERROR = 0, 3
 PHASES = ["instantiated", "initialization", "stepping"]
 
 
