@@ -141,20 +141,24 @@ def test_impulses_are_part_of_the_promise(seed, number):
     assert verdict.factor <= 1.0
 
 
+MISSED = "miss of the contact law moves an end by about"
+
+
 @pytest.mark.parametrize(
     ("seed", "number", "way", "words"),
     [
-        (4, 13, "energy 2", "differ where they part or strike the foundation"),
-        (5, 8, "energy 0", "moves an end by about"),
-        (51, 15, "energy 2", "moves an end by about"),
-        (71, 3, "energy 1", "differ where they part or strike the foundation, in all by 2.7 %"),
-        (72, 10, "energy 2", "a contact lasts 0.7 macro steps only"),
+        (4, 13, "energy 2", MISSED),
+        (5, 8, "energy 0", MISSED),
+        (51, 15, "energy 2", MISSED),
+        (71, 3, "energy 1", MISSED),
+        (72, 10, "energy 2", MISSED),
         (74, 10, "energy 2, H/4", "a contact lasts 0.96 macro steps only"),
-        (86, 10, "energy 0", "goes up and down from step to step before they part"),
+        (86, 10, "energy 0", MISSED),
+        (112, 7, "energy 0", MISSED),
     ],
 )
 def test_what_a_campaign_found_wrong_is_told(seed, number, way, words):
-    """At fixed steps an end is off by 3.7, 1.5, 1.8, 6.3, 2.4, 2.7 and 12.6 %.
+    """At fixed steps an end is off by 3.7, 1.5, 1.8, 6.3, 2.4, 2.7, 12.6 and 1.1 %.
 
     Velocities that differ by 5 %, 0.2 rad a step, waves in a contact that turns 0.8 rad, a mismatch of 1.3 % at any of
     20 strokes, and one that is small by chance where a released tip parts or a short contact ends, do not show it.

@@ -1,14 +1,15 @@
-"""How far the ends of a soft contact are from where its law would have them.
+"""How far the ends are from where the law of their contact would have them.
 
-The law asks for a force along the path of the ends, the step applies a polynomial of degree d. Their difference, and
-what it changes of the law's force, move the ends: both bodies and the law, linearised about the run, tell by how much
-(``docs/coupling.md``, "How far ends are misplaced"). The beam is the sum of the lowest modes of its mesh.
+A soft law asks for a force along the path of the ends, the step applies a polynomial of degree d. A tie asks for no gap
+along the path, the step leaves none at its end. Both bodies and the law, linearised about the run, tell how far the
+difference moves the ends (``docs/coupling.md``, "How far ends are misplaced"). The beam is the sum of the lowest modes
+of its mesh.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import cache, lru_cache
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache, lru_cache, partial
 from itertools import product
 from math import inf
 from typing import Any
@@ -18,12 +19,13 @@ import numpy as np
 from ..contact.laws import SoftLaw
 from ..results.paths import Path
 from ..results.steps import force as applied
+from ..results.steps import joined
 from ..results.trajectory import Event, EventKind
 from ..scene import Beam, Scene
 from ..scene.statics import bending_stiffness, shear_stiffness
 from .stepping import Pair
 
-#: Places where the law is asked, and their shares: Gauss points.
+#: Places where a soft law is asked, and their shares: Gauss points.
 _POINTS, _SHARES = np.polynomial.legendre.leggauss(4)
 _INSIDE = 0.5 * (_POINTS + 1.0), 0.5 * _SHARES
 #: Modes of the beam, and elements of a mesh that has the lowest ones of any finer one.
@@ -36,50 +38,107 @@ _LOST = 1e3
 Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-def misplaced(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray, events: Sequence[Event]) -> float:
-    """Return how far an end is from where ``law`` would have it, over its largest distance from its start.
+def misplaced(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float:
+    """Return how far an end is from where the law of ``pair`` would have it, over its largest distance from its start.
 
-    It is that of the worse end at its worst.
+    It is that of the worse end at its worst; 0 where a tie holds an end that nothing moves, or one without mass.
     """
-    made = np.flatnonzero(steps["size"] > 0.0)
-    before, step = steps[made - 1], steps[made]
-    parts = 1 if scene.coupling.degree == 0 else 2  # a force of a higher degree has the law's mean over a step
-    defect = _defect(law, before, step, parts)
-    per_mass = 1.0 / pair.lower.mass if pair.lower.mass > 0.0 else 0.0
-    resists, stiffness = 0.0, np.zeros(len(step))
-    if scene.spring is not None:
-        resists, y = scene.spring.damping * per_mass, 0.5 * (before["y_after"] + step["y"])
-        stiffness = per_mass * (scene.spring.linear_stiffness + 3.0 * scene.spring.cubic_stiffness * y**2)
-    after = np.ones((3, len(step), parts)) * [[[1.0]], [[0.0]], [[0.0]]]
-    after[..., -1] = _after_events(scene, steps, events, made)
-    of_steps = [*np.repeat([step["size"] / parts, stiffness], parts, axis=1), *after.reshape(3, -1), *defect]
-    first = int(np.argmax(defect[0] != 0.0))  # up to there nothing is off
+    if len(steps) < 2 or (pair.law is None and not 0.0 < pair.upper.mass < inf):
+        return 0.0
     ways = [float(np.abs(steps[name] - steps[name][0]).max()) or inf for name in ("u_tip_after", "y_after")]
-    *_, tip = modes = _modes(scene, pair)
-    moves = cache(lambda H: _moves(modes, H))
-    # Errors of displacements and velocities of the modes, and of both ends.
-    x, u, y, z, found = np.zeros(2 * len(tip)), 0.0, 0.0, 0.0, 0.0
-    for H, k, stays, turns, most, missed, early, stiffer, rate in zip(
-        *(v[first:].tolist() for v in of_steps), strict=True
-    ):
-        # The midpoint rule; a force acts by its mean, and moves a free mass by ``shift``/m besides.
-        half, shift, gap, (free, pushed, shifted, flexible) = 0.5 * H, 0.5 * H * H * (early - missed), y - u, moves(H)
-        slow = 1.0 / (1.0 + half * (resists + half * k))
-        x = free @ x + shift * shifted
-        u = float(tip @ x[: len(tip)])
-        y -= shift * per_mass
-        mean = slow * (z - half * k * y)
-        follows = 0.5 * stiffer + rate / H
-        force = missed + (0.5 * stiffer - rate / H) * gap + follows * (y + H * mean - u)
-        force /= 1.0 + follows * (flexible + H * half * slow * per_mass)
-        mean -= half * slow * per_mass * force
-        x, u = x + force * pushed, u + force * flexible
-        y, z = y + H * mean, 2.0 * mean - z
-        y, z = stays * y, stays * z + max(-most, min(turns * y, most))
+    ends, stiffness = _Errors(scene, pair), np.zeros(len(steps))
+    if scene.spring is not None:
+        y = 0.5 * (steps["y"] + np.append(0.0, steps["y_after"][:-1]))
+        stiffness = ends.per_mass * (scene.spring.linear_stiffness + 3.0 * scene.spring.cubic_stiffness * y**2)
+    follow = _along_tie if pair.law is None else partial(_along_soft_law, pair.law)
+    found = 0.0
+    for u, y in follow(scene.coupling.degree, ends, steps, stiffness, _after_events(scene, steps, events)):
         found = max(found, abs(u) / ways[0], abs(y) / ways[1])
         if found > _LOST:
             break
     return found
+
+
+class _Errors:
+    """Errors of the modes' displacements and velocities ``x``, (2n,), of the lower end's ``y`` [m] and ``z`` [m/s]."""
+
+    def __init__(self, scene: Scene, pair: Pair) -> None:
+        modes = _modes(scene, pair)
+        self.tip, self.n, self._moves = modes[2], len(modes[2]), cache(partial(_moves, modes))
+        self.x, self.y, self.z = np.zeros(2 * self.n), 0.0, 0.0
+        self.per_mass = 1.0 / pair.lower.mass if pair.lower.mass > 0.0 else 0.0
+        self._resists = self.per_mass * scene.spring.damping if scene.spring is not None else 0.0
+
+    @property
+    def u(self) -> float:
+        return float(self.tip @ self.x[: self.n])
+
+    def advance(
+        self, H: float, stiffness: float, per_mass: float, force: Callable[[float, float], float], shift: float = 0.0
+    ) -> None:
+        """Advance by ``H`` [s] under a force that acts by its mean, the lower end by the midpoint rule.
+
+        ``force`` [N] follows from how far the ends are apart without it, y − u [m], and from how far 1 N brings them
+        together; ``shift`` [N·s²] moves free masses besides. ``stiffness`` is the spring's over its mass [1/s²],
+        ``per_mass`` that of the lower end [1/kg], 0 while the foundation holds it.
+        """
+        free, pushed, flexible, _, shifted = self._moves(H)
+        half = 0.5 * H
+        slow = 1.0 / (1.0 + half * (self._resists + half * stiffness))
+        self.x = free @ self.x + shift * shifted
+        self.y -= shift * per_mass
+        mean = slow * (self.z - half * stiffness * self.y)
+        C = force(self.y + H * mean - self.u, flexible + H * half * slow * per_mass)
+        mean -= half * slow * per_mass * C
+        self.x += C * pushed
+        self.y, self.z = self.y + H * mean, 2.0 * mean - self.z
+
+    def strike(self, stays: float, turns: float, most: float) -> None:
+        """Do to the lower end what `_after_events` says."""
+        self.y, self.z = stays * self.y, stays * self.z + max(-most, min(turns * self.y, most))
+
+    def join(self, H: float, per_mass: float) -> None:
+        """Bring the ends together, as if contact began earlier or later; the next step of ``H`` [s] follows that.
+
+        ``per_mass`` as of `advance`.
+        """
+        moved = self._moves(H)[3]
+        shift = (self.y - self.u) / (float(self.tip @ moved) + per_mass)
+        self.x[: self.n] += shift * moved
+        self.y -= shift * per_mass
+
+    def meet(self, apart: float, per_mass: float) -> None:
+        """Let v − z be ``apart`` [m/s] by an impulse; ``per_mass`` as of `advance`."""
+        v = float(self.tip @ self.x[self.n :])
+        impulse = (apart - v + self.z) / (float(self.tip @ self.tip) + per_mass)
+        self.x[self.n :] += impulse * self.tip
+        self.z -= impulse * per_mass
+
+
+def _along_soft_law(
+    law: SoftLaw, degree: int, ends: _Errors, steps: np.ndarray, stiffness: np.ndarray, after: np.ndarray
+) -> Iterator[tuple[float, float]]:
+    """Yield the errors of both ends [m] along the run: its steps have not the force that ``law`` asks for."""
+    made = np.flatnonzero(steps["size"] > 0.0)
+    before, step = steps[made - 1], steps[made]
+    parts = 1 if degree == 0 else 2  # a force of a higher degree has the law's mean over a step
+    defect = _defect(law, before, step, parts)
+    at_end = np.ones((3, len(step), parts)) * [[[1.0]], [[0.0]], [[0.0]]]
+    if len(made):
+        at_end[..., -1] = np.multiply.reduceat(after[0], made), *np.add.reduceat(after[1:], made, axis=1)
+    of_steps = [*np.repeat([step["size"] / parts, stiffness[made]], parts, axis=1), *at_end.reshape(3, -1), *defect]
+    first = int(np.argmax(defect[0] != 0.0))  # up to there nothing is off
+    for H, k, stays, turns, most, missed, early, stiffer, rate in zip(
+        *(v[first:].tolist() for v in of_steps), strict=True
+    ):
+        follows, at_start = 0.5 * stiffer + rate / H, (0.5 * stiffer - rate / H) * (ends.y - ends.u)
+
+        def force(apart: float, gives: float, asked: float = missed + at_start, follows: float = follows) -> float:
+            return (asked + follows * apart) / (1.0 + follows * gives)
+
+        ends.advance(H, k, ends.per_mass, force, 0.5 * H * H * (early - missed))
+        ends.strike(stays, turns, most)
+        yield ends.u, ends.y
 
 
 def _defect(law: SoftLaw, before: np.ndarray, step: np.ndarray, parts: int) -> np.ndarray:
@@ -89,11 +148,7 @@ def _defect(law: SoftLaw, before: np.ndarray, step: np.ndarray, parts: int) -> n
     of the part [N], and how the law's force grows with the penetration [N/m] and with its rate [N·s/m].
     """
     size = step["size"]
-    start = before["y_after"] - before["u_tip_after"], before["z_after"] - before["v_tip_after"]
-    end = step["y"] - step["u_tip"], step["z"] - step["v_tip"]
-    moments = (step[f"y_{name}"] - step[f"u_tip_{name}"] for name in ("integral", "integral_2"))
-    mean, twice = (moment / size**n for n, moment in enumerate(moments, 1))
-    path: Any = Path.through(start, end, size, (mean, twice))  # type: ignore[arg-type]
+    path = _penetration(before, step, size)
     found = np.zeros((4, len(step), parts))
     for part, (at, share) in product(range(parts), zip(*_INSIDE, strict=True)):
         s = (part + at) / parts
@@ -108,23 +163,68 @@ def _defect(law: SoftLaw, before: np.ndarray, step: np.ndarray, parts: int) -> n
     return found.reshape(4, -1)
 
 
-def _after_events(scene: Scene, steps: np.ndarray, events: Sequence[Event], made: np.ndarray) -> np.ndarray:
-    """Return what the events at the end of each of the steps ``made`` leave of the lower end's error, (3, len(made)).
+def _along_tie(
+    degree: int, ends: _Errors, steps: np.ndarray, stiffness: np.ndarray, after: np.ndarray
+) -> Iterator[tuple[float, float]]:
+    """Yield the errors of both ends [m] along the run: its steps leave a gap inside and different velocities."""
+    parts = degree + 2  # one more than the step has forces
+    size = np.where(steps["size"] > 0.0, steps["size"], 1.0)
+    path = _penetration(np.roll(steps, 1), steps, size)
+    shares = (np.arange(parts) + 1.0) / parts
+    inside = np.array([[path.at(s), path.slope(s) / size] for s in shares]).transpose(2, 0, 1)
+    tied, seated = joined(steps), steps["phase"] >= 3.0
+    following = np.append(steps["size"][1:], 0.0)
+    following[following == 0.0] = steps["size"].max()
+    for i in range(1, len(steps)):
+        H, k, stays, turns, most = map(float, (steps["size"][i], stiffness[i], *after[:, i]))
+        per_mass = 0.0 if seated[i - 1] else ends.per_mass
+        if H > 0.0 and not tied[i - 1]:
+            ends.advance(H, k, per_mass, lambda apart, gives: 0.0)
+        for deep, rate in inside[i].tolist() if H > 0.0 and tied[i - 1] else ():
+            ends.advance(H / parts, k, per_mass, lambda apart, gives, deep=deep: (apart + deep) / gives)  # type: ignore[misc]
+            ends.meet(rate, per_mass)
+        ends.strike(stays, turns, most)
+        if tied[i - 1 : i + 1].any() and (most > 0.0 or tied[i] != tied[i - 1]):
+            per_mass = 0.0 if seated[i] or most > 0.0 else ends.per_mass  # the foundation strikes each end by itself
+            if tied[i]:
+                ends.join(float(following[i]), per_mass)
+            # Ends that part and keep their own velocities vibrate: so would those of a tie.
+            ends.meet(float(steps["z_after"][i] - steps["v_tip_after"][i]) if tied[i] else 0.0, per_mass)
+        yield ends.u, ends.y
+
+
+def _penetration(before: np.ndarray, step: np.ndarray, size: np.ndarray) -> Any:
+    """Return the path of y − u inside each step of ``size`` [s], a `Path` of arrays."""
+    start = before["y_after"] - before["u_tip_after"], before["z_after"] - before["v_tip_after"]
+    end = step["y"] - step["u_tip"], step["z"] - step["v_tip"]
+    moments = (step[f"y_{name}"] - step[f"u_tip_{name}"] for name in ("integral", "integral_2"))
+    mean, twice = (moment / size**n for n, moment in enumerate(moments, 1))
+    return Path.through(start, end, size, (mean, twice))  # type: ignore[arg-type]
+
+
+def _after_events(scene: Scene, steps: np.ndarray, events: Sequence[Event]) -> np.ndarray:
+    (
+        ""
+        """''Return what the events at each of ``steps`` leave of the lower end's error, (3, len(steps)).
 
     It is the share of displacement and velocity, none while the end is seated, and by how much each unit of
     displacement changes the velocity [1/s], at most by the jump of the stroke [m/s]: the end is struck earlier or
     later, under the acceleration before and after that.
-    """
-    shares, (turns, most) = np.where(steps["phase"] >= 3.0, 0.0, 1.0), np.zeros((2, len(made)))
+    ''"""
+        ""
+    )
+    shares, (turns, most) = np.where(steps["phase"] >= 3.0, 0.0, 1.0), np.zeros((2, len(steps)))
     struck = [n for n, event in enumerate(events, 1) if event.kind is EventKind.STOP_IMPACT]
+    made = np.flatnonzero(steps["size"] > 0.0)
     if struck and scene.stop is not None:
         rows, e = np.searchsorted(steps["events"], struck), scene.stop.restitution
         np.multiply.at(shares, rows, -e)
         at = np.searchsorted(made, rows, side="right") - 1
         gained = (steps["z"][made] - steps["z_after"][made - 1]) / steps["size"][made]
-        turns[at] = (e * gained[at] + np.append(gained, 0.0)[at + 1]) / steps["z"][made[at]]
-        most[at] = (1.0 + e) * np.abs(steps["z"][made[at]])
-    return np.array([np.multiply.reduceat(shares, made) if len(made) else turns, turns, most])
+        speed = steps["z"][made[at]]
+        turns[rows] = (e * gained[at] + np.append(gained, 0.0)[at + 1]) / np.where(speed, speed, inf)
+        most[rows] = (1.0 + e) * np.abs(speed)
+    return np.array([shares, turns, most])
 
 
 def _modes(scene: Scene, pair: Pair) -> Modes:
@@ -135,11 +235,11 @@ def _modes(scene: Scene, pair: Pair) -> Modes:
     return omega**2, scene.beam.alpha_b * omega**2, tip
 
 
-def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, float, np.ndarray, np.ndarray]:
     """Return what a step of ``H`` [s] makes of displacements and velocities of modes, (2n, 2n).
 
-    Further what a constant force of 1 N adds to them, and 1 N·s² that moves a free mass before the step, (2n,) each,
-    and how far 1 N moves the tip [m/N].
+    Further what a constant force of 1 N adds to them, (2n,), and how far that moves the tip [m/N]; how far 1 N·s² that
+    moves a free mass moves the modes that the step follows, (n,), and what the step makes of that, (2n,).
     """
     # A free mass is a mode so soft that it does not turn; 1 − cos would leave nothing of a softer one.
     stiffness, decay, tip = np.maximum(modes[0], 1e-8 / H**2), 0.5 * modes[1], modes[2]
@@ -150,7 +250,7 @@ def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, 
     free = np.block([[np.diag(kept), np.diag(sine)], [np.diag(-stiffness * sine), np.diag(cosine - decay * sine)]])
     pushed = np.concatenate([(1.0 - kept) / stiffness * tip, sine * tip])
     moved = tip / (1.0 + H * (decay + 0.25 * H * stiffness))
-    return free, pushed, free[:, : len(tip)] @ moved, float(tip @ pushed[: len(tip)])
+    return free, pushed, float(tip @ pushed[: len(tip)]), moved, free[:, : len(tip)] @ moved
 
 
 @lru_cache(maxsize=16)

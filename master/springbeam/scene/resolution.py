@@ -23,9 +23,10 @@ TURN = 1.0
 COLLOCATION = (12.0, 720.0, 100800.0)
 #: What all of them together may turn too little [rad].
 LAG = 0.12
-#: Share of its way that an end may be from where a soft law would have it, by degree of the force. At degree 0 that is
-#: known to some tenths of itself; at the others less well, since they leave out what the law feels of fast waves.
-MISPLACED = (0.006, 0.002, 0.001)
+#: Share of its way that an end may be from where the law of the contact would have it, by degree of the force: a soft
+#: law, a tie. At degree 0 of a soft law that is known to some tenths of itself. Else it leaves out what the force feels
+#: of fast waves; and of ends that part, what these decide from one step to the next.
+MISPLACED, MISPLACED_TIED = (0.006, 0.002, 0.001), (0.0025, 0.002, 0.001)
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
 #: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
 STABLE = 3.0
@@ -33,13 +34,8 @@ STABLE = 3.0
 WAVE_LAG = 1.0
 #: ω α_b above which waves die out within two periods and need no resolution.
 DIES_OUT = 0.15
-#: Impulse by which joined ends disagree as they part or strike the foundation, over the momentum of a body, above which
-#: the motion is called unresolved, by degree (docs/accuracy.md has what it misses).
-MISMATCH = {0: 0.03, 1: 0.02, 2: 0.025}
-#: Impulse by which the force of a step goes up and down before ends part, over the momentum of a body.
-ALTERNATION = 0.0115
 #: Macro steps that a contact must last for its end not to be decided by the force of one or two of them.
-SHORT = 1.35
+SHORT = 1.0
 #: Share of the smaller momentum of both bodies that the force of a short contact may pass on: it is none to speak of.
 SHORT_IMPULSE = 0.1
 #: Velocity mismatch above which it is a vibration and no error.
@@ -54,42 +50,26 @@ _HIGHER = ", a higher coupling.degree allows longer ones"
 class _Seen(NamedTuple):
     """What a run shows of its resolution, as parameters of `not_resolved`."""
 
-    mismatch: float
-    alternation: float
-    shortest_contact: float
     misplaced: float
+    shortest_contact: float
 
 
-def not_resolved(
-    scene: Scene,
-    mismatch: float,
-    *,
-    alternation: float = 0.0,
-    shortest_contact: float = inf,
-    misplaced: float = 0.0,
-) -> str | None:
+def not_resolved(scene: Scene, misplaced: float = 0.0, *, shortest_contact: float = inf) -> str | None:
     """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
 
     Parameters
     ----------
     scene
         The scene as run.
-    mismatch
-        Difference w of the joined ends' velocities where they part or strike the foundation, as impulse μ w of their
-        reduced mass over the momentum of the body that it would change the most; of all events, the root of the sum of
-        squares.
-    alternation
-        By how much the force goes up and down from step to step before ends part, as impulse over that momentum.
+    misplaced
+        How far an end is from where the law of the contact would have it, over its way.
     shortest_contact
         How long the shortest contact, touch or rest on the foundation has lasted [s]; of a soft law it counts where the
         force is exchanged once per macro step.
-    misplaced
-        How far an end is from where a soft law would have it, over its way.
     """
-    seen = _Seen(mismatch, alternation, shortest_contact, misplaced)
     # Steps that follow from tolerances are judged by their error.
     of_steps = () if scene.coupling.adaptive else _OF_STEPS
-    return next(told(scene, (*of_steps, *_OF_ENDS), seen), None)
+    return next(told(scene, (*of_steps, *_OF_CONTACT), _Seen(misplaced, shortest_contact)), None)
 
 
 def lateness(scene: Scene, turn: float) -> float:
@@ -115,22 +95,25 @@ def _too_fast(scene: Scene, seen: _Seen) -> dict[str, Any]:
 
 
 def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
-    """Return how far the forces of the steps miss a soft law, nothing if they keep close to it.
+    """Return how far the forces of the steps miss the law of the contact, nothing if they keep close to it.
 
     Waves that the steps do not follow let ``misplaced`` fall with the square of H only.
     """
-    excess = seen.misplaced / MISPLACED[_force_degree(scene)]
-    raises = scene.coupling.scheme == "energy" and scene.coupling.degree < 2
+    limits, coupling = MISPLACED_TIED if scene.contact.rigid else MISPLACED, scene.coupling
+    excess = seen.misplaced / limits[_force_degree(scene)]
+    if excess <= 1.0 or (coupling.adaptive and not scene.contact.rigid):
+        return {}
+    raises = coupling.scheme == "energy" and coupling.degree < 2
     raises &= scene.beam is None or scene.beam.integrator == "modal"
-    return (
-        {}
-        if excess <= 1.0
-        else {
-            "far": f"about {100.0 * seen.misplaced:.2g} %" if seen.misplaced <= 1.0 else "more than all",
-            "size": _rounded_down(scene.coupling.H / sqrt(excess)),
-            "higher": _HIGHER if raises else "",
-        }
-    )
+    if scene.contact.rigid and scene.contact.impact != "inelastic":
+        remedy = f'impact = "{scene.contact.impact}" leaves their velocities apart, "inelastic" does not'
+    elif coupling.adaptive:
+        remedy = "smaller tolerances resolve it"
+    else:
+        size = _rounded_down(coupling.H / sqrt(excess))
+        remedy = f"coupling.macro_step <= {size} resolves it{_HIGHER if raises else ''}"
+    far = f"about {100.0 * seen.misplaced:.2g} %" if seen.misplaced <= 1.0 else "more than all"
+    return {"far": far, "remedy": remedy}
 
 
 def _lags(scene: Scene, seen: _Seen) -> dict[str, Any]:
@@ -229,23 +212,6 @@ def slow_oscillations(scene: Scene) -> list[tuple[str, float, str]]:
     return found
 
 
-def _remedy(scene: Scene) -> str:
-    return next(told(scene, _REMEDIES))
-
-
-def _fewer(scene: Scene) -> dict[str, str]:
-    """Return the step that resolves the modes kept, and what else would help."""
-    beam, H = scene.beam, scene.coupling.H
-    assert beam is not None
-    fewer = modes_below(beam, 0.25 * TURN / H)  # the loads' static shapes, kept as well, are up to twice as fast
-    raises = beam.integrator == "modal" and scene.coupling.degree < 2
-    return {
-        "size": _rounded_down(TURN / fastest_frequency(beam)),
-        "modes": f", beam.n_modes = {fewer} keeps what this step resolves" if fewer > 0 else "",
-        "higher": ", so may a higher coupling.degree" if raises else "",
-    }
-
-
 def _rounded_down(size: float) -> str:
     """Return ``size`` [s] in two digits, rounded down."""
     return f"{0.95 * size:.1e} s"
@@ -259,12 +225,6 @@ _OF_STEPS = (
         _too_fast,
         "not resolved: the slowest oscillation of the {name} turns {turn:.3g} rad in a macro step. Velocities, forces "
         "and times of events are samples of a faster motion; coupling.macro_step <= {size} resolves it{otherwise}",
-    ),
-    Rule(
-        _law_missed,
-        "not resolved: what the forces of the steps miss of the contact law moves an end by {far} of its way. "
-        "Velocities, forces and times of contact are samples of a faster motion; coupling.macro_step <= {size} "
-        "resolves it{higher}",
     ),
     Rule(
         _lags,
@@ -284,24 +244,17 @@ _OF_STEPS = (
         'beam.integrator = "modal" is exact',
     ),
 )
-#: How any steps may fail where ends part or strike the foundation.
-_OF_ENDS = (
+#: How steps may miss what joins the ends.
+_OF_CONTACT = (
     Rule(
-        lambda s, seen: seen.mismatch > MISMATCH[s.coupling.degree],
-        "not resolved: the joined ends' velocities differ where they part or strike the foundation, in all by "
-        "{percent:.2g} % of the momentum of a body; what they do then depends on it. {remedy}",
-        lambda s, seen: {"percent": 100.0 * seen.mismatch, "remedy": _remedy(s)},
-    ),
-    Rule(
-        lambda s, seen: seen.alternation > ALTERNATION,
-        "not resolved: the force on joined ends goes up and down from step to step before they part, by {percent:.2g} "
-        "% of the momentum of a body; it decides when they do. {remedy}",
-        lambda s, seen: {"percent": 100.0 * seen.alternation, "remedy": _remedy(s)},
+        _law_missed,
+        "not resolved: what the forces of the steps miss of the contact law moves an end by {far} of its way. "
+        "Velocities, forces and times of contact are samples of a faster motion; {remedy}",
     ),
     Rule(  # a force that does not see the contact end
         lambda s, seen: (
             not s.coupling.adaptive
-            and (s.contact.rigid or s.coupling.scheme in ORDINARY_SCHEMES)
+            and (s.coupling.degree > 0 if s.contact.rigid else s.coupling.scheme in ORDINARY_SCHEMES)
             and seen.shortest_contact < SHORT * s.coupling.H
         ),
         "not resolved: a contact lasts {steps:.2g} macro steps only, so that the force of one or two steps decides "
@@ -311,20 +264,6 @@ _OF_ENDS = (
             "size": _rounded_down(seen.shortest_contact / SHORT),
         },
     ),
-)
-#: What would resolve how ends part; the first that holds is told.
-_REMEDIES = (
-    Rule(
-        lambda s: s.contact.impact != "inelastic",
-        '{contact.impact} leaves the difference in; "inelastic" does not',
-    ),
-    Rule(lambda s: s.coupling.adaptive, "Smaller tolerances resolve the motion"),
-    Rule(
-        lambda s: s.beam is None or s.massless,
-        "A coupling.macro_step below {H:g} s resolves the motion",
-        lambda s: {"H": s.coupling.H},
-    ),
-    Rule(lambda s: True, "coupling.macro_step <= {size} resolves the modes kept{higher}{modes}", _fewer),
 )
 _MESH_DECIDES = Rule(
     _settling,
