@@ -149,9 +149,8 @@ def test_a_motion_that_jumps_with_the_size_of_the_step_has_no_event(jump, refuse
         assert (kind, found.size) == ("impact", pytest.approx(0.3e-3, rel=1e-12))
 
 
-@pytest.mark.parametrize("seated", [False, True])
-def test_the_zero_of_a_force_is_where_the_step_that_tells_it_best_has_it(monkeypatch, seated):
-    """0.5 N + 100 N/s · H − 1 kN/s · τ in a step of H: with H = τ/s its zero is at 0.5/(1000 − 100/s) s.
+def pushing(monkeypatch, push, seated=False):
+    """A `Separation` of ends that touch, and its state and attempts: in a step of H, ``push(H)`` [N] is what may end.
 
     A force that turns a mismatch round, 3 N of the contact's, is no part of it.
     """
@@ -159,14 +158,28 @@ def test_the_zero_of_a_force_is_where_the_step_that_tells_it_best_has_it(monkeyp
     pair = Pair(scene, Upper(2.0), DuffingBody(1.0))
 
     def attempt(state, size, start, phase=None):
-        push, other = (0.5 + 100.0 * size, -1000.0, 0.0), (3.0, 0.0, 0.0)
-        contact, foundation = (other, force.combined((1.0, 1.0), (push, other))) if seated else (push, NO_FORCE)
+        own, other = push(size), (3.0, 0.0, 0.0)
+        contact, foundation = (other, force.combined((1.0, 1.0), (own, other))) if seated else (own, NO_FORCE)
         return Step(0.0, size, contact, foundation, start, start)
 
     monkeypatch.setattr(pair, "attempt", attempt)
     monkeypatch.setattr(pair, "force_without_mismatch", lambda phase, step: NO_FORCE if seated else step.contact)
     state = pair.initial_state(0.0)
     state.enter(Phase(Joint.TIED if seated else Joint.TOUCH, seated))
-    step, event = Separation(pair, 1e-9).first_event(state, attempt(state, 1e-3, pair.ends()), 1e-3)
+    return pair, state
+
+
+@pytest.mark.parametrize("seated", [False, True])
+def test_the_zero_of_a_force_is_where_the_step_that_tells_it_best_has_it(monkeypatch, seated):
+    """0.5 N + 100 N/s · H − 1 kN/s · τ in a step of H: with H = τ/s its zero is at 0.5/(1000 − 100/s) s."""
+    pair, state = pushing(monkeypatch, lambda size: (0.5 + 100.0 * size, -1000.0, 0.0), seated)
+    step, event = Separation(pair, 1e-9).first_event(state, pair.attempt(state, 1e-3, pair.ends()), 1e-3)
     assert event == ("unseated" if seated else "separation")
     assert step.size == pytest.approx(0.5 / (1000.0 - 100.0 / pair.joined.sharpest), abs=1e-11)
+
+
+def test_a_force_that_longer_trial_steps_know_nothing_of_vanishes_where_its_own_step_has_it(monkeypatch):
+    """A step of 0.1 H, in which it falls to 0 in the middle; steps of 0.25 H begin below 0. It did so at the start."""
+    pair, state = pushing(monkeypatch, lambda size: (0.05 if size <= 1e-4 else -0.01, -1000.0, 0.0))
+    step, event = Separation(pair, 1e-9).first_event(state, pair.attempt(state, 1e-4, pair.ends()), 1e-3)
+    assert (event, step.size) == ("separation", pytest.approx(5e-5, abs=1e-15))

@@ -7,6 +7,8 @@ to turn a mismatch of the ends' velocities round is left out in both.
 
 from __future__ import annotations
 
+from math import inf
+
 from ..bodies import force
 from ..bodies.protocol import Force
 from ..contact.events import EventFunction, Height, gap, locate
@@ -82,12 +84,18 @@ class Separation:
         best = self._pair.coupling(state.phase).sharpest
         room = self._pair.loads.next_kink(state.time + self._no_time * macro_step, macro_step) - state.time
 
+        tolerance, left = _SHARP * macro_step * slope, inf
+
         def evaluate(zero: float) -> Sample:
+            nonlocal left
             size = min(max(zero / best, _SHORTEST_LOOK * macro_step), room)
             f = self._push(state.phase, self._pair.attempt(state, size, step.start))
-            return force.value(f, zero), f[1] + zero * f[2]
+            left = force.value(f, zero)
+            return left, f[1] + zero * f[2]
 
-        return locate(evaluate, zero, step.size, _SHARP * macro_step * slope, state.time)
+        found = locate(evaluate, zero, step.size, tolerance, state.time)
+        # The force of a longer trial step may vanish nowhere in this one, which then tells best.
+        return found if abs(left) <= tolerance else zero
 
     def _opens(self, state: State, step: Step, event: EventKind) -> bool:
         """Do the ends part if they are let go for the step, or early in it, to meet again before its end?
