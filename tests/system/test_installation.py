@@ -17,9 +17,7 @@ from springbeam.scene.reading import tomllib
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize(
-    ("version", "found"), [("2.0", "{}.fmu +FMI 2.0, .*linux64"), ("3.0", "{}3.fmu +FMI 3.0, .*x86_64-linux")]
-)
+@pytest.mark.parametrize(("version", "found"), [("2.0", "{}.fmu +FMI 2.0, loads"), ("3.0", "{}3.fmu +FMI 3.0, loads")])
 def test_doctor_finds_and_loads_both_fmus(monkeypatch, version, found):
     monkeypatch.setenv("SPRINGBEAM_FMI", version)
     shown = printed("doctor")
