@@ -203,16 +203,12 @@ def _penetration(before: np.ndarray, step: np.ndarray, size: np.ndarray) -> Any:
 
 
 def _after_events(scene: Scene, steps: np.ndarray, events: Sequence[Event]) -> np.ndarray:
-    (
-        ""
-        """''Return what the events at each of ``steps`` leave of the lower end's error, (3, len(steps)).
+    """Return what the events at each of ``steps`` leave of the lower end's error, (3, len(steps)).
 
     It is the share of displacement and velocity, none while the end is seated, and by how much each unit of
     displacement changes the velocity [1/s], at most by the jump of the stroke [m/s]: the end is struck earlier or
     later, under the acceleration before and after that.
-    ''"""
-        ""
-    )
+    """
     shares, (turns, most) = np.where(steps["phase"] >= 3.0, 0.0, 1.0), np.zeros((2, len(steps)))
     struck = [n for n, event in enumerate(events, 1) if event.kind is EventKind.STOP_IMPACT]
     made = np.flatnonzero(steps["size"] > 0.0)
