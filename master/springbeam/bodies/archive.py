@@ -13,6 +13,8 @@ from .protocol import FmuError
 MOST_BYTES, MOST_MEMBERS = 1 << 28, 10_000
 #: Parts that mean no other folder on any system, between slashes.
 _PLAIN = re.compile(r"(?:(?!\.{1,2}(?:/|$))[^/\\:\x00-\x1f]+(?:/|$))+")
+#: What a running FMU may use. The sources of the beam, with Eigen's, are 300 files: they would take most of the time.
+_USED = ("modelDescription.xml", "binaries/", "resources/")
 #: What the names of our FMUs end with, by version of FMI.
 _ENDINGS = {"2.0": "", "3.0": "3"}
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -43,7 +45,7 @@ class UnsafeArchive(ValueError):
 
 
 def unpack(path: Path, folder: Path) -> None:
-    """Unpack the ZIP archive ``path`` into ``folder``; links and devices become plain files.
+    """Unpack what a run needs of the FMU ``path`` into ``folder``; links and devices become plain files.
 
     Raises
     ------
@@ -65,4 +67,4 @@ def unpack(path: Path, folder: Path) -> None:
         for name in (member.orig_filename for member in members):  # `filename` has been made harmless for this system
             if not _PLAIN.fullmatch(name):
                 raise UnsafeArchive(f"member {name[:100]!r} is no plain name inside the archive; {remedy}")
-        archive.extractall(folder)
+        archive.extractall(folder, [member for member in members if member.filename.startswith(_USED)])
