@@ -332,8 +332,8 @@ def test_the_process_of_an_fmu_that_hangs_ends_with_the_master(fmu, hanging):
     body.close()
 
 
-def test_a_process_waits_for_the_next_body_of_its_file(fmu):
-    """One that has crashed does not."""
+def test_a_process_waits_for_the_next_body_of_its_file(fmu, monkeypatch):
+    """One that has crashed does not, and the one that has waited longest makes room for another."""
 
     def used(path, lie="none"):
         spec = pair(path, spring={"parameters": {"lie": oscillator.LIES[lie]}}).lower
@@ -348,6 +348,12 @@ def test_a_process_waits_for_the_next_body_of_its_file(fmu):
     assert used(fmu("another")) is not first
     assert used(fmu(), "late crash") is first
     assert used(fmu()) is not first
+    monkeypatch.setattr(isolated, "_MOST_IDLE", 1)
+    monkeypatch.setattr(isolated.FmuProcess, "_idle", [])
+    waiting = used(fmu())
+    last = used(fmu("another"))
+    assert used(fmu("another")) is last
+    assert waiting._process.poll() is not None
 
 
 def test_ctrl_c_names_an_fmu_that_does_not_return(fmu, monkeypatch, hanging):

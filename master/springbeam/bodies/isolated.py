@@ -101,10 +101,17 @@ class FmuProcess:
         return ": ".join([cause, *(line.strip() for line in lines[-1:])])
 
     def give_back(self) -> None:
-        """Keep the process for another body, if it answers."""
-        if self.idle and len(self._idle) < _MOST_IDLE:
-            self._idle.append(self)
+        """Keep the process for another body, if it answers, in place of the one that has waited longest."""
+        if not self.idle:
+            self._end()
             return
+        self._idle.append(self)
+        own = [process for process in self._idle if process._master == os.getpid()]  # not those of before a fork
+        if len(own) > _MOST_IDLE:
+            self._idle.remove(own[0])
+            own[0]._end()
+
+    def _end(self) -> None:
         self._process.kill()
         with suppress(OSError), self._process, self._requests, self._answers:  # which waits for it
             self._folder.cleanup()
