@@ -143,7 +143,7 @@ COEFFICIENTS = [(0.7,), (0.7, -2.3), (0.7, -2.3, 1.9), (1e-6, 40.0, -3e3)]
 @pytest.mark.parametrize("size", [1e-5, 1e-3, 2.0])
 @pytest.mark.parametrize("a", COEFFICIENTS)
 def test_legendre_coefficients_and_derivatives_are_one_polynomial(a, size):
-    """To a few ulp of the largest coefficient: the conversions are sums of at most three terms."""
+    """They agree to a few ulp of the largest coefficient: the conversions are sums of at most three terms."""
     bound = 16 * EPS * max(map(abs, a))
     f = force.derivatives(a, size)
     exact = Legendre(a, domain=(0.0, size))

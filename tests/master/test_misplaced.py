@@ -75,7 +75,7 @@ TIED = {
 
 @pytest.mark.parametrize("case", TIED)
 def test_tied_ends_are_as_far_off_as_is_said(case):
-    """Where they part, and at degree 1, the estimate is of the right size; at degree 2 it is above the error."""
+    """The estimate is of the right size at degrees 0 and 1; at degree 2 it is above the error."""
     changes, known = TIED[case]
     scene = with_changes(SOFT, **changes)
     exact = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": 1.25e-4}))

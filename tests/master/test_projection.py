@@ -33,7 +33,7 @@ def work(projection, a, start, x):
 )  # fmt: skip
 @example(start=0.0, end=2.9e-158, mean=2.9e-158, skew=0.0, degree=2, q=1.0, chi=0.0)
 def test_damping_never_gives_energy(start, end, mean, skew, degree, q, chi):
-    """To 64 roundings of the energies; below 1e-308 J a rounding is the smallest double, whatever their size."""
+    """The energy is kept to 64 roundings; below 1e-308 J a rounding is the smallest double, whatever their size."""
     law = Compliance(1e4, q, chi)
     projection = Projection(law, degree)
     x = [end, mean, skew][: degree + 1]

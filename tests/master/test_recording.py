@@ -532,7 +532,7 @@ def test_a_disk_without_room_for_a_new_run_keeps_the_old_one(tmp_path, size):
 
 
 def test_a_run_is_handed_over_up_to_where_it_goes_wrong():
-    """Of its second block the records before one that is not finite, with their events; then nothing of it is lost."""
+    """A record of the second block is not finite: those before it are kept with their events."""
     recorder, judged = MemoryRecorder(PAIR), []
     log = Log(PAIR, recorder, lambda steps, first: judged.append((len(steps), first["time"].tolist())))
     for begin in (0, 30):

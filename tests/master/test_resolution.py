@@ -148,7 +148,7 @@ def test_ends_that_the_law_would_have_elsewhere_are_said(degree, share, resolved
 
 
 def test_what_resolves_ends_that_are_elsewhere_is_said():
-    """Of steps from tolerances, those of a soft law are judged by their error alone."""
+    """Steps that follow from tolerances are judged by their error alone where the law is soft."""
     adaptive, off = {"coupling": {"relative_tolerance": 1e-3}}, 2.0 * max(MISPLACED)
     assert not_resolved(with_changes(STIFF, **adaptive), off) is None
     assert not_resolved(with_changes(PAIR, **adaptive), off).endswith("; smaller tolerances resolve it")

@@ -15,7 +15,7 @@ from springbeam.studies.converge import Converge, settled
 @pytest.mark.parametrize("sizes", [(1, 2, 4, 8), (1, 2, 5, 10), (3, 4, 7, 30)])
 @pytest.mark.parametrize("order", [0.7, 2.0, 4.0])
 def test_a_sequence_of_one_order_gives_it_and_its_limit(order, sizes):
-    """Also where the sizes are no halvings: 10, 5, 2 and 1 modes were taken for these."""
+    """Sizes need not be halvings: 10, 5, 2 and 1 modes were taken for these."""
     found = settled([3.0 + 0.1 * n**-order for n in sizes], sizes)
     assert (found.order, found.limit) == pytest.approx((order, 3.0), rel=1e-9)
     assert found.error == pytest.approx(0.1 * sizes[-1] ** -order, rel=1e-6)

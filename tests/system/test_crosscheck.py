@@ -141,7 +141,7 @@ def test_quick_compares_the_first_quarter_and_leaves_the_last_halving_out(tmp_pa
 
 
 def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
-    """And shows again what it has found, until it is to begin anew."""
+    """It shows again what it has found, until it is to begin anew."""
     out = tmp_path / "both"
     arguments = ["crosscheck", "duffing", "--set", "time.t_end=1", "--out", out]
     right = event_driven.simulate

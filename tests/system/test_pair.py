@@ -25,7 +25,7 @@ def test_what_numerical_damping_takes_is_no_error():
 
 
 def test_the_papers_law_injects_all_of_the_energy_residual():
-    """Also under a constant load on the spring, whose work, 2e-4 J, is none of it."""
+    """A constant load on the spring acts, whose work, 2e-4 J, is none of it."""
     changes = {"beam": {"n_elements": 20, "n_modes": 0}, "time": {"t_end": 0.7}, "spring": {"external_force": 0.5}}
     found = simulate(with_changes(load_scene("paper-fig2"), contact={"law": "paper"}, **changes))
     injected = found.summary["injected_into_beam"] + found.summary["injected_into_spring"]

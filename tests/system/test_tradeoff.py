@@ -153,7 +153,7 @@ LOADS = [
     ],
 )
 def test_scipy_solves_what_the_reference_solves(scene, changes, until):
-    """To its tolerance; what it evaluates is no more than the equations of motion."""
+    """The motion is right to its tolerance; what it evaluates is no more than the equations of motion."""
     beam = {} if scene == "duffing" else {"n_elements": 6, **changes.get("beam", {})}
     what = with_changes(load_scene(scene), **{**changes, "time": {"t_end": until}} | ({"beam": beam} if beam else {}))
     times = np.linspace(what.contact_time or 0.0, until, 101)

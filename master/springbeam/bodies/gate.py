@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..scene import Scene, SceneError
 from ..scene.messages import Rule, told
@@ -31,13 +31,17 @@ class Start(NamedTuple):
     apart: bool  #: whether more than rounding is between them
 
 
+def _numbers(scene: Scene, start: Start) -> dict[str, Any]:
+    return start._asdict()
+
+
 _ENDS = "the upper end starts at {u:.9g} m and the lower one at {y:.9g} m"
 #: How ends cannot start; a rule is asked of the scene and the `Start`.
 FORBIDDEN_STARTS = (
     Rule(
         lambda s, start: s.contact.lasting and s.contact.rigid and start.apart,
         f'{{contact.law}}: {_ENDS}; let them start at one height, or use "link"',
-        lambda s, start: start._asdict(),
+        _numbers,
     ),
     Rule(
         lambda s, start: s.contact.facts.strikes and s.contact.impact == "tip" and start.mass == inf,
@@ -48,12 +52,12 @@ FORBIDDEN_STARTS = (
         lambda s, start: not s.contact.lasting and start.time > 0.0 and start.z != 0.0,
         "{beam.approach}: the body in [spring] starts with {z:.6g} m/s, but nothing moves until the tip arrives at "
         't = {time:.6g} s; let it start at rest, or use approach = "elastic"',
-        lambda s, start: start._asdict(),
+        _numbers,
     ),
     Rule(
         lambda s, start: not s.contact.lasting and start.apart and start.u < start.y,
         f"[beam]: {_ENDS}; it must start there or above",
-        lambda s, start: start._asdict(),
+        _numbers,
     ),
     Rule(
         lambda s, start: (
@@ -65,7 +69,7 @@ FORBIDDEN_STARTS = (
         ),
         f"{{beam.approach}}: {_ENDS}, and where the body below is when they meet is not known beforehand; use "
         'approach = "elastic", or let them start at one height',
-        lambda s, start: start._asdict(),
+        _numbers,
     ),
 )
 

@@ -139,7 +139,7 @@ def _opened(study: Study, default: str, frame: Frame) -> Records:
 
 @contextmanager
 def _going_on(records: Records, total: int) -> Iterator[None]:
-    """Where the study stops, end the command with the cause and how it goes on."""
+    """End the command with the cause, and how the study goes on, where it stops."""
     from ..monolithic.hybrid_system import ReferenceFailure
     from ..run.outcome import RunStopped
 

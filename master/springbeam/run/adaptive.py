@@ -85,7 +85,7 @@ class AdaptiveSteps(Stateful):
         self.state.energy = max(energy, self.state.energy)
 
     def accept(self, step: Step) -> None:
-        """The motion has come so far."""
+        """Note how far and how fast ``step``, which is made, has moved the ends."""
         self.state.ways, self.state.fastest = self._ways(step), self._fastest(step)
 
     def holds(self, state: State, step: Step, refused: str, *, to_kink: bool = False) -> bool:

@@ -33,7 +33,6 @@ _MODES, _ELEMENTS = 20, 50
 #: Ways that an end is off from which on nothing more is to be learnt.
 _LOST = 1e3
 
-
 #: ω² [1/s²], 2 ζ ω [1/s] and the displacement of the tip [1/√kg] of modes of unit mass, (n,) each.
 Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
 
