@@ -1,4 +1,4 @@
-"""Pictures and tables of docs/accuracy.md:  .venv/bin/python docs/accuracy.py [STUDY]…   (all: a quarter of an hour)
+"""Pictures and tables of docs/accuracy.md:  .venv/bin/python docs/accuracy.py [STUDY]…   (all: some ten minutes)
 
 The studies are those of `springbeam tradeoff`, one after the other, timed in processor time, of which what else runs on
 the machine takes none (with OMP_NUM_THREADS=1). Pictures go to docs/images/tradeoff-STUDY.png,
@@ -36,7 +36,6 @@ WINDOWS = {
     "soft": Window("soft", {}, 0.0712),
     "soft-events": Window("soft", {}, None),
     "steel-bumper": Window("steel-bumper", {}, None),
-    "beam-on-stop": Window("beam-on-stop", {}, None),
     "bar-impact": Window("bar-impact", {}, None),
     "paper-fig2": Window("paper-fig2", {"coupling": {"macro_step": 1e-7}}, 0.50002),
 }
@@ -58,7 +57,7 @@ def choices(rows: list[Row]) -> list[str]:
 
 
 def side_by_side(rows: list[Row], scene: Scene) -> list[str]:
-    """Compare error, time of events [s], energy residual and doStep calls."""
+    """Compare the errors of the motion and of the times of events [s]."""
     lines = []
     for H in (4.0 * scene.coupling.H, scene.coupling.H):
         here = {row["family"]: row for row in rows if row.get("coupling.macro_step") == H}
@@ -71,7 +70,7 @@ def side_by_side(rows: list[Row], scene: Scene) -> list[str]:
 def compared(row: Row) -> str:
     if row["status"] != "done":
         return "stopped"
-    return f"{worst(row):.0e}, {row['error_event_time']:.0e}, {row['error_energy']:.0e}, {row['cost_do_steps']}"
+    return f"{worst(row):.0e}, {row['error_event_time']:.0e}"
 
 
 def taken(scene: Scene, H: float) -> str:

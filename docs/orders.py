@@ -55,12 +55,11 @@ def orders(errors: np.ndarray) -> str:
 
 
 def rows(errors: dict[tuple[str, int], np.ndarray]) -> list[list[str]]:
-    """Return orders phase by phase, then errors of y before any event and in the flight."""
+    """Return orders phase by phase, those before any event left out."""
     return [
-        [f"`{scheme}` {degree}", *(orders(values[:, k]) for k in range(1, len(PHASES))),
-         *(", ".join(f"{error:.1e}" for error in values[1:, k, 0]) for k in (0, 2))]
+        [f"`{scheme}` {degree}", *(orders(values[:, k]) for k in range(1, len(PHASES)))]
         for (scheme, degree), values in errors.items()
-    ]  # fmt: skip
+    ]
 
 
 def picture(errors: dict[tuple[str, int], np.ndarray]) -> None:
@@ -83,8 +82,7 @@ def picture(errors: dict[tuple[str, int], np.ndarray]) -> None:
 def main() -> None:
     errors = measured()
     picture(errors)
-    head = ["order of", *(f"{phase}: y, v" for phase in list(PHASES)[1:]),
-            "y before any event at 1 ms … 1/8 ms [m]", "in the flight"]  # fmt: skip
+    head = ["order of", *(f"{phase}: y, v" for phase in list(PHASES)[1:])]
     write_section("measured.md", "orders", table(head, rows(errors)))
 
 
