@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial.polynomial import polyint, polymul, polyval
 
-from springbeam.bodies.end_loaded import EndLoaded
+from springbeam.bodies.elements import EndLoaded
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.force import shifted, work_on
 from springbeam.bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion

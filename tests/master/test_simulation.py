@@ -8,9 +8,8 @@ from bodies import DuffingBody, Upper, simulate, stopping
 from references import dips
 from scenes import kinds, scene_from_dict
 
-from springbeam.bodies.abilities import Abilities
 from springbeam.bodies.gate import admit
-from springbeam.bodies.protocol import NO_FORCE, StepRefused
+from springbeam.bodies.protocol import NO_FORCE, Abilities, StepRefused
 from springbeam.contact.phases import Joint, Phase
 from springbeam.monolithic import event_driven
 from springbeam.results.recording import MemoryRecorder

@@ -14,11 +14,26 @@ from typing import NamedTuple
 import numpy as np
 
 from ..scene import Load
-from .end_loaded import EndLoaded
-from .force import work_on
+from .force import combined, work_on
 from .protocol import NO_FORCE, Body, Energies, Force, Motion
 
 _SIZES_REMEMBERED = 64
+
+
+class EndLoaded(Body):
+    """A body that takes loads on its end; if it is a mass there, also the acceleration of its base."""
+
+    _on_end: Force = NO_FORCE
+
+    def expect_loads(self, loads: Sequence[Load]) -> None:
+        #: What a unit of each load is at the end [N].
+        self._at_end = [-self.mass if load.on == "base" else 1.0 for load in loads]
+
+    def set_loads(self, forces: Sequence[Force]) -> None:
+        self._on_end = combined(self._at_end, forces)
+
+    def load_on_end(self) -> Force:
+        return self._on_end
 
 
 class MassState(NamedTuple):

@@ -17,7 +17,7 @@ from typing_extensions import Self
 from ..scene import Beam, Load, Spring
 from ..scene.statics import SHAPE_POINTS
 from .archive import own_fmu
-from .end_loaded import EndLoaded
+from .elements import EndLoaded
 from .fmu import Fmu
 from .force import combined
 from .functions import WARNING

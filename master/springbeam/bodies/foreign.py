@@ -16,12 +16,11 @@ from typing import Any, NamedTuple, NoReturn
 
 from ..scene.partners import ForeignFmu
 from . import force
-from .abilities import Abilities
-from .end_loaded import EndLoaded
+from .elements import EndLoaded
 from .fmu import Fmu
 from .fmu_bodies import FmuBody
 from .functions import OK
-from .protocol import NO_FORCE, Body, BodyFailed, Energies, FmuError, Force, Motion
+from .protocol import NO_FORCE, Abilities, Body, BodyFailed, Energies, FmuError, Force, Motion
 
 #: Relative tolerance of a holding force, and the share of motion without it that it may leave.
 _AT_REST, _STAYS = 1e-12, 1e-6

@@ -1,75 +1,177 @@
 """Refuse bodies that a scene cannot be run with, whoever made them: our FMUs, FMUs of others, bodies of the caller's.
 
-The rules of the scene see what its keys tell. This gate asks the bodies themselves, once, before the first step.
+The rules of the scene see what its keys tell. This gate asks the bodies themselves, once, before the first step: what
+they can do, and where and with which velocities they start.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..scene import Scene, SceneError
 from ..scene.messages import Rule, told
-from .abilities import Abilities, refusals
-from .protocol import Body
+from ..scene.tables import ORDINARY_SCHEMES
+from .protocol import Abilities, Body
+
+# -- what bodies can do ------------------------------------------------------------------------------------------------
+
+#: What is said of a body that lacks a capability.
+_LACKS = {
+    "state": "its state cannot be saved (canGetAndSetFMUstate = false)",
+    "any_size": "its steps have one size (canHandleVariableCommunicationStepSize = false)",
+    "velocity": "it has no velocity",
+    "integrals": "it has not integral and integral_2",
+    "impulse": "it has no impulse, or of a body of your own no apply_impulse",
+}
+_TO_BE_STRUCK = ("state", "any_size", "velocity", "impulse")
+_LEFT_OUT, _MULTIPLE = 'leave it out, or use scheme = "energy"', "use a multiple of {coupling.macro_step}"
+#: A share of a step that is rounding.
+_SAME = 1e-9
+
+
+def _exchanges(scene: Scene) -> bool:
+    return scene.coupling.scheme in ORDINARY_SCHEMES
+
+
+def _integrals(scene: Scene) -> int:
+    """Return how many integrals of the gap the scheme sets to 0."""
+    return 0 if _exchanges(scene) else scene.coupling.degree - (scene.coupling.scheme == "hermite")
+
+
+def _falls_between(scene: Scene) -> bool:
+    """Return whether a load jumps or bends between equal macro steps."""
+    H, start = scene.coupling.H, scene.contact_time or 0.0
+    kinks = [t for load in scene.loads if not load.is_finer_than(H) for t in load.kinks]
+    steps = [(t - start) / H for t in kinks if start <= t < scene.time.t_end]
+    return any(abs(n - round(n)) > _SAME for n in steps)
+
+
+def _followed(scene: Scene, body: Abilities, table: str) -> dict[str, Any]:
+    followed = body.slopes if _exchanges(scene) else min(body.integrals, body.slopes)
+    return {"table": table, "slopes": body.slopes, "followed": followed}
+
+
+def _needs(asked: str, when: Callable[[Scene], bool], instead: str, *abilities: str) -> list[Rule]:
+    """Return a rule for each of the ``abilities`` that a body must have for what is ``asked``."""
+    most = Abilities()
+    return [
+        Rule(
+            lambda s, body, table, ability=ability: when(s) and getattr(body, ability) < getattr(most, ability),
+            f"{asked}: the body in [{{table}}] cannot do that, {_LACKS[ability]}; {instead}",
+            _followed,
+        )
+        for ability in abilities
+    ]
+
+
+#: What a scene asks of a body that it cannot do; a rule is asked of the scene, what the body can do, and its table.
+LACKING: tuple[Rule, ...] = (
+    *_needs(
+        "{coupling.scheme}",
+        lambda s: not _exchanges(s),
+        'use scheme = "jacobi" or "gauss_seidel" with [contact] law = "link" or "compliance", without [stop]',
+        "state",
+    ),
+    *_needs("{coupling.scheme}", lambda s: s.coupling.scheme == "hermite", 'use scheme = "energy"', "velocity"),
+    *_needs("{coupling.degree}", lambda s: _exchanges(s) and s.coupling.degree > 0, _LEFT_OUT, "velocity"),
+    *_needs("{contact.damping}", lambda s: _exchanges(s) and s.contact.damping > 0.0, _LEFT_OUT, "velocity"),
+    *_needs(
+        "{contact.law}",
+        lambda s: s.joins and s.contact.facts.strikes,
+        'use "compliance", "link" or "tie"',
+        *_TO_BE_STRUCK,
+    ),
+    *_needs("[stop]", lambda s: s.stop is not None, "leave it out", *_TO_BE_STRUCK),
+    *_needs(
+        "[coupling] relative_tolerance, absolute_tolerance",
+        lambda s: s.coupling.adaptive,
+        "use macro_step",
+        *("any_size", "velocity", "integrals"),
+    ),
+    Rule(
+        lambda s, body, table: s.coupling.degree > body.slopes,
+        "{coupling.degree}: the body in [{table}] cannot do that, its input takes derivatives of order {slopes} at "
+        "most (canInterpolateInputs; FMI 3.0 has none); use degree = {followed}",
+        _followed,
+    ),
+    Rule(
+        lambda s, body, table: _integrals(s) > body.integrals,
+        f"{{coupling.degree}}: the body in [{{table}}] cannot do that, {_LACKS['integrals']}; "
+        "use degree = {followed}",
+        _followed,
+    ),
+    *_needs("{time.t_end}", lambda s: not s.coupling.adaptive and s.equal_steps[1] != 0.0, _MULTIPLE, "any_size"),
+    *_needs(
+        "[[loads]]: a step ends where each jumps or bends",
+        lambda s: not s.coupling.adaptive and _falls_between(s),
+        _MULTIPLE,
+        "any_size",
+    ),
+)
+
+
+def refusals(scene: Scene, abilities: Mapping[str, Abilities]) -> list[str]:
+    """Return why ``scene`` cannot be run with bodies of these ``abilities``, by table, each with a remedy."""
+    return [line for table, body in abilities.items() for line in told(scene, LACKING, body, table)]
+
+
+#: What a capability allows, for people: (capability, how a body shows it, what is offered with it, what without it).
+OFFERED = (
+    ("state", "canGetAndSetFMUstate", 'scheme "energy", tie, transmission, foundation', '"jacobi", "gauss_seidel"'),
+    ("any_size", "canHandleVariableCommunicationStepSize", "events, adaptive steps", "equal macro steps only"),
+    ("serialized", "canSerializeFMUstate", "--checkpoint and resume", "no checkpoints"),
+    ("slopes", "canInterpolateInputs", "degree 1, 2", "degree 0"),
+    ("integrals", "integral, integral_2", "degree 1, 2; adaptive steps", "degree 0"),
+    ("velocity", "velocity", "events, hermite, adaptive steps", "the mean over a step in its place"),
+    ("impulse", "impulse", "rigid impacts, foundation", '"compliance", "link", "tie" of equal velocities'),
+    ("energies", "kinetic_energy, potential_energy", "the whole ledger", "the ledger of the interface"),
+)
+
+
+# -- how they start ----------------------------------------------------------------------------------------------------
 
 #: Velocities closer than this share are one where an end takes no impulse: told, and measured from displacements.
 _SAME_SPEED, _SAME_SPEED_MEASURED = 1e-13, 1e-6
 #: Heights closer than this share are one.
 _SAME_PLACE = 1e-12
-
-
-class Start(NamedTuple):
-    """How the ends of two bodies start."""
-
-    time: float  #: [s]
-    u: float  #: height of the upper end [m]
-    y: float  #: height of the lower end [m]
-    z: float  #: velocity of the lower end [m/s]
-    mass: float  #: of the lower end [kg]
-    apart: bool  #: whether more than rounding is between them
-
-
-def _numbers(scene: Scene, start: Start) -> dict[str, Any]:
-    return start._asdict()
-
-
 _ENDS = "the upper end starts at {u:.9g} m and the lower one at {y:.9g} m"
-#: How ends cannot start; a rule is asked of the scene and the `Start`.
+#: How ends cannot start; a rule is asked of the scene, and of where they start as `admit` says.
 FORBIDDEN_STARTS = (
     Rule(
-        lambda s, start: s.contact.lasting and s.contact.rigid and start.apart,
+        lambda s, start: s.contact.lasting and s.contact.rigid and start["apart"],
         f'{{contact.law}}: {_ENDS}; let them start at one height, or use "link"',
-        _numbers,
+        lambda s, start: start,
     ),
     Rule(
-        lambda s, start: s.contact.facts.strikes and s.contact.impact == "tip" and start.mass == inf,
+        lambda s, start: s.contact.facts.strikes and s.contact.impact == "tip" and start["mass"] == inf,
         "{contact.impact}: gives the lower body the velocity of the tip, and the body in [spring] has an infinite "
         'mass; use impact = "inelastic"',
     ),
     Rule(
-        lambda s, start: not s.contact.lasting and start.time > 0.0 and start.z != 0.0,
+        lambda s, start: not s.contact.lasting and start["time"] > 0.0 and start["z"] != 0.0,
         "{beam.approach}: the body in [spring] starts with {z:.6g} m/s, but nothing moves until the tip arrives at "
         't = {time:.6g} s; let it start at rest, or use approach = "elastic"',
-        _numbers,
+        lambda s, start: start,
     ),
     Rule(
-        lambda s, start: not s.contact.lasting and start.apart and start.u < start.y,
+        lambda s, start: not s.contact.lasting and start["apart"] and start["u"] < start["y"],
         f"[beam]: {_ENDS}; it must start there or above",
-        _numbers,
+        lambda s, start: start,
     ),
     Rule(
         lambda s, start: (
             not s.contact.lasting
-            and start.apart
-            and start.u > start.y
+            and start["apart"]
+            and start["u"] > start["y"]
             and s.beam is not None
             and s.beam.approach == "undeformed"
         ),
         f"{{beam.approach}}: {_ENDS}, and where the body below is when they meet is not known beforehand; use "
         'approach = "elastic", or let them start at one height',
-        _numbers,
+        lambda s, start: start,
     ),
 )
 
@@ -94,7 +196,8 @@ def admit(scene: Scene, start_time: float, upper: Body | None, lower: Body | Non
         (u, v, *_), (y, z, *_) = upper.motion(), lower.motion()
         # An undeformed tip has come down by v t, which rounds.
         apart = not scene.static and abs(u - y) > _SAME_PLACE * max(abs(u), abs(y), start_time * abs(v))
-        lines += told(scene, FORBIDDEN_STARTS, Start(start_time, u, y, z, lower.mass, apart))
+        start = {"time": start_time, "u": u, "y": y, "z": z, "mass": lower.mass, "apart": apart}
+        lines += told(scene, FORBIDDEN_STARTS, start)
         if scene.contact.lasting and scene.contact.rigid:
             lines += _joined(scene, upper, lower)
     if lines:

@@ -1,8 +1,7 @@
 """A foreign FMU in a process of its own, which may crash or hang: the run then ends by name and keeps what it has.
 
-The process, `springbeam.bodies.worker`, holds the body. A request is a list of calls, of which the last is answered.
-Those that need no answer, as `mark` and `rewind`, wait for the next that does, so that a step costs one exchange (some
-20 µs).
+The process holds the body and runs `answer`. A request is a list of calls, of which the last is answered. Those that
+need no answer, as `mark` and `rewind`, wait for the next that does, so that a step costs one exchange (some 20 µs).
 """
 
 from __future__ import annotations
@@ -11,18 +10,21 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
+import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import Any, ClassVar
 
+from ..scene import SceneError
 from ..scene.partners import ForeignFmu
-from .end_loaded import EndLoaded
-from .foreign import Findings
-from .protocol import NO_FORCE, Energies, FmuError, Force, Motion
+from .elements import EndLoaded
+from .foreign import Findings, ForeignBody
+from .protocol import NO_FORCE, BodyFailed, Energies, FmuError, Force, Motion, StepRefused
 
 #: From when on Ctrl-C means the FMU, not the run [s].
 LONG = 5.0
@@ -41,13 +43,14 @@ class FmuProcess:
 
     def __init__(self, path: str) -> None:
         self._path, self._master = path, os.getpid()
-        self._folder = TemporaryDirectory(prefix="springbeam-", ignore_cleanup_errors=True)
+        self._folder = tempfile.TemporaryDirectory(prefix="springbeam-", ignore_cleanup_errors=True)
         self._errors = Path(self._folder.name) / "errors"
         # Two pipes: by a pair of sockets an exchange takes 1.4 times as long.
         requests, self._requests = Pipe(duplex=False)
         self._answers, answers = Pipe(duplex=False)
         ends = requests.fileno(), answers.fileno()
-        command = [sys.executable, "-m", "springbeam.bodies.worker", self._folder.name, *map(str, ends)]
+        program = f"from {__name__} import answer; answer()"
+        command = [sys.executable, "-c", program, self._folder.name, *map(str, ends)]
         with self._errors.open("wb") as printed, requests, answers:
             # Not in a session of its own: on a busy machine Linux lets that wait, and a step takes five times as long.
             self._process = subprocess.Popen(
@@ -115,6 +118,35 @@ class FmuProcess:
         self._process.kill()
         with suppress(OSError), self._process, self._requests, self._answers:  # which waits for it
             self._folder.cleanup()
+
+
+def answer() -> None:
+    """Do in the process of an FMU what `FmuProcess.ask` asks for, until nobody is there to ask."""
+    tempfile.tempdir, *ends = sys.argv[1:]
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the master's
+    requests, answers = (Connection(int(end)) for end in ends)
+    threading.Thread(target=_end_with_the_master, daemon=True).start()
+    body: Any = None
+    while True:
+        value: Any = None
+        try:
+            for name, *arguments in requests.recv():
+                if name == "make":
+                    body = ForeignBody(*arguments)
+                    value = body.mass, body.abilities
+                else:
+                    value = getattr(body, name)(*arguments)
+        except EOFError:
+            return
+        except (BodyFailed, StepRefused, SceneError) as failure:
+            value = failure
+        answers.send((value, None if body is None else body.told()))
+
+
+def _end_with_the_master() -> None:
+    """End when the master does, which keeps standard input open; also while the FMU does not return."""
+    sys.stdin.read()
+    os._exit(1)
 
 
 def _forwarded(name: str, doing: str) -> Callable[..., Any]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from ..scene import Load, SceneError
-from .abilities import Abilities
-from .stateful import Stateful
 
 #: A force over one step, as FMI carries it: (F, Ḟ, F̈) at the step's start [N, N/s, N/s²].
 Force = tuple[float, float, float]
@@ -60,6 +60,43 @@ class Felt(NamedTuple):
     clamp_force: float  #: of the clamp on the beam, upward [N]
     clamp_moment: float  #: of the clamp on the beam, counter-clockwise [N·m]
     bending_stress: float  #: the largest along the beam [Pa]; 0 where the height of its section is not known
+
+
+#: All that a run changes while it runs: by part, what `Stateful.save` returns.
+RunState = dict[str, bytes]
+
+
+class Memory(msgspec.Struct, forbid_unknown_fields=True):
+    """Named numbers that a part changes in place."""
+
+
+class Stateful:
+    """A part of a run whose future depends on its past."""
+
+    #: All that changes and is not set anew before it is used: a number, a typed tuple, or a `Memory`.
+    state: Any = None
+
+    def save(self) -> bytes:
+        """Return `state` as MessagePack, numbers to the last bit."""
+        return msgspec.msgpack.encode(self.state)
+
+    def restore(self, saved: bytes) -> None:
+        """Go on from what `save` of an equal part returned. Raises msgspec.DecodeError if it was of another kind."""
+        self.state = msgspec.msgpack.decode(saved, type=type(self.state))
+
+
+@dataclass(frozen=True)
+class Abilities:
+    """What a body can do; the default is that of our own."""
+
+    state: bool = True  #: its state can be saved and restored
+    serialized: bool = True  #: … and written to a file
+    any_size: bool = True  #: its steps may have any size
+    velocity: bool = True  #: it tells its velocity
+    integrals: int = 2  #: it tells ∫x (1) and ∫∫x (2) over a step
+    slopes: int = 2  #: highest derivative of a force over a step that it follows
+    impulse: bool = True  #: it takes impulses
+    energies: bool = True  #: it tells its energies
 
 
 class Body(Stateful):

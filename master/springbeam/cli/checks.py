@@ -108,8 +108,8 @@ def _loaded(name: str, make: Callable[[], OwnBody]) -> dict[str, Any]:
 
 def _examine(scene: Scene, as_json: bool) -> None:
     """Print what the bodies of ``scene`` can do; end the command if the scene cannot be run with them."""
-    from ..bodies.abilities import OFFERED, refusals
     from ..bodies.factory import findings
+    from ..bodies.gate import OFFERED, refusals
 
     found, shown = findings(scene), list[Any]()
     for name, body in {"beam": scene.upper, "spring": scene.lower}.items():

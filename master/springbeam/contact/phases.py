@@ -11,8 +11,7 @@ from enum import Enum
 from functools import cached_property
 from math import inf
 
-from ..bodies.protocol import Ends, Motion
-from ..bodies.stateful import Stateful
+from ..bodies.protocol import Ends, Motion, Stateful
 from ..results.trajectory import EventKind
 from ..scene import Scene, Spring
 from ..scene.resolution import VIBRATION

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Motion, StepRefused
-from ..bodies.stateful import Memory, Stateful
+from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Memory, Motion, Stateful, StepRefused
 from ..contact.phases import Impact, Phase
 from ..results.trajectory import EventKind
 

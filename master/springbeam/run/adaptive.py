@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import ceil, inf, log2
 
-from ..bodies.stateful import Memory, Stateful
+from ..bodies.protocol import Memory, Stateful
 from ..contact.phases import Phase
 from ..coupling.protocol import Scales, Step
 from ..results.paths import Path

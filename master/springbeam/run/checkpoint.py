@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from ..bodies.stateful import RunState
+from ..bodies.protocol import RunState
 from ..results.files import replaced
 from ..scene import Scene, scene_from_dict
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 
-from ..bodies.stateful import Stateful
+from ..bodies.protocol import Stateful
 from ..scene.scene import SHORTEST_STEP
 
 #: A remainder of the macro grid shorter than this fraction of H joins the next step.

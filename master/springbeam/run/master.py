@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..bodies.gate import admit
-from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, Ends, StepRefused
-from ..bodies.stateful import RunState, Stateful
+from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, Ends, RunState, Stateful, StepRefused
 from ..contact.laws import stiffest
 from ..contact.phases import Impact, Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step

@@ -6,8 +6,7 @@ from math import inf
 
 from ..bodies import force
 from ..bodies.elements import RigidWall
-from ..bodies.protocol import NO_FORCE, Body, Ends, Force
-from ..bodies.stateful import Memory
+from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Memory
 from ..contact.laws import law_of
 from ..contact.phases import Joint, Phase
 from ..coupling import coupling_of

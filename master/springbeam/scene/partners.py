@@ -17,7 +17,7 @@ from .tables import Beam, Spring, Table, key
 class ForeignFmu(Table):
     """A co-simulation FMU of FMI 2.0 or 3.0 with one end that a force moves, and the names of its variables.
 
-    What has no name decides what can be offered: `springbeam.bodies.abilities`.
+    What has no name decides what can be offered: `springbeam.bodies.gate`.
     """
 
     INPUTS: ClassVar = ("force", "impulse")
