@@ -55,7 +55,9 @@ def why_not_resolved(
     """Return in words why a run in steps of H [s] that shows ``seen`` is not resolved; ``None`` if it is."""
     least = SHORT_IMPULSE * seen.momentum
     lasted = shortest_contact(steps, events, SHORT * H, least, free_at_end=free_at_end)
-    return not_resolved(scene, seen.misplaced, shortest_contact=lasted)
+    sizes = steps["size"][steps["size"] > 0.0]
+    late = float(np.sqrt(np.mean(sizes**3) / np.mean(sizes))) if scene.coupling.adaptive and len(sizes) else None
+    return not_resolved(scene, seen.misplaced, shortest_contact=lasted, H=late)
 
 
 def _momenta(scene: Scene, pair: Pair, steps: np.ndarray) -> tuple[float, float]:

@@ -30,8 +30,9 @@ MISPLACED, MISPLACED_TIED = (0.006, 0.002, 0.001), (0.0025, 0.002, 0.001)
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
 #: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
 STABLE = 3.0
-#: What all steps of generalized-α together may turn the fastest waves that an impact sets off too little [rad].
-WAVE_LAG = 1.0
+#: What all steps of generalized-α together may turn waves too little [rad]: the fastest ones that an impact sets off;
+#: where nothing strikes, those of a few times the beam's lowest frequency, or of a load, which move the tip more.
+WAVE_LAG, SMOOTH_LAG, SMOOTH_WAVES = 1.0, 0.01, 5.0
 #: ω α_b above which waves die out within two periods and need no resolution.
 DIES_OUT = 0.15
 #: Macro steps that a contact must last for its end not to be decided by the force of one or two of them.
@@ -52,9 +53,12 @@ class _Seen(NamedTuple):
 
     misplaced: float
     shortest_contact: float
+    H: float | None
 
 
-def not_resolved(scene: Scene, misplaced: float = 0.0, *, shortest_contact: float = inf) -> str | None:
+def not_resolved(
+    scene: Scene, misplaced: float = 0.0, *, shortest_contact: float = inf, H: float | None = None
+) -> str | None:
     """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
 
     Parameters
@@ -66,10 +70,12 @@ def not_resolved(scene: Scene, misplaced: float = 0.0, *, shortest_contact: floa
     shortest_contact
         How long the shortest contact, touch or rest on the foundation has lasted [s]; of a soft law it counts where the
         force is exchanged once per macro step.
+    H
+        Steps of one length that make waves as late as those of the run [s]; needed if these follow from tolerances.
     """
-    # Steps that follow from tolerances are judged by their error.
-    of_steps = () if scene.coupling.adaptive else _OF_STEPS
-    return next(told(scene, (*of_steps, *_OF_CONTACT), _Seen(misplaced, shortest_contact)), None)
+    # Steps that follow from tolerances are judged by their error, which does not tell of waves inside a beam.
+    of_steps = _OF_STEPS[-1:] if scene.coupling.adaptive else _OF_STEPS
+    return next(told(scene, (*of_steps, *_OF_CONTACT), _Seen(misplaced, shortest_contact, H)), None)
 
 
 def lateness(scene: Scene, turn: float) -> float:
@@ -147,14 +153,23 @@ def _unstable(scene: Scene, seen: _Seen) -> dict[str, Any]:
 
 
 def _waves_lag(scene: Scene, seen: _Seen) -> dict[str, Any]:
-    """Return by how much generalized-α makes waves of an impact late, nothing if it follows them.
+    """Return by how much generalized-α makes waves of the beam late, nothing if it follows them.
 
-    It leaves no mismatch of velocities that would tell.
+    Neither a mismatch of velocities nor the energy would tell. A beam that starts bent to a straight line springs back
+    from its clamp as from an impact.
     """
-    beam, H = _struck(scene), scene.coupling.H
-    fastest = 0.0 if beam is None or beam.integrator == "modal" or not scene.contact.rigid else impact_frequency(beam)
-    lag = scene.duration / H * (fastest * H) ** 3 / 12.0
-    return {"lag": lag, "size": _rounded_down(H * sqrt(WAVE_LAG / lag))} if lag > WAVE_LAG else {}
+    beam = scene.beam
+    if beam is None or scene.massless or beam.integrator == "modal":
+        return {}
+    H = seen.H or scene.coupling.H
+    waves, omega, limit = "the fastest waves that an impact or a bent start sets off", impact_frequency(beam), WAVE_LAG
+    bent = beam.approach == "elastic" and beam.initial_deflection_slope != 0.0
+    if not (bent or (scene.contact.rigid and _struck(scene))):
+        omega = max(SMOOTH_WAVES * slowest_frequency(beam), *(load.rate for load in scene.loads), 0.0)
+        waves, omega, limit = f"waves of {omega:.3g} rad/s", min(omega, lasting_frequency(beam)), SMOOTH_LAG
+    damped = (1.0 - beam.rho_inf) / (1.0 + beam.rho_inf)
+    lag = scene.duration / H * (omega * H) ** 3 * (1.0 + 4.5 * damped**2) / 12.0
+    return {"waves": waves, "lag": lag, "size": _rounded_down(H * sqrt(limit / lag))} if lag > limit else {}
 
 
 def force_window(scene: Scene, stiffness: float = 0.0) -> float:
@@ -239,7 +254,7 @@ _OF_STEPS = (
     ),
     Rule(
         _waves_lag,
-        "not resolved: generalized-α turns the fastest waves that an impact sets off {lag:.2g} rad too little in all; "
+        "not resolved: generalized-α turns {waves} {lag:.2g} rad too little in all; "
         "coupling.macro_step <= {size} resolves them, beam.alpha_b > 0 lets them die out, and "
         'beam.integrator = "modal" is exact',
     ),
