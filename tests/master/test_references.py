@@ -211,7 +211,7 @@ CASES = {
         spring={"external_force": -5.0},
     ),
     "link, unstable spring": soft(contact={"law": "link"}, spring=UNSTABLE),
-    "stiff link": linear(contact={"law": "link", "stiffness": 1e8}, stop=None),  # which is part of the modes
+    "stiff link": linear(contact={"law": "link", "stiffness": 1e7}, stop=None),
     "Hunt and Crossley": linear(
         contact={"law": "compliance", "exponent": 1.5, "damping": 0.8}, beam={"alpha_b": 1e-3}, spring={"damping": 0.2}
     ),

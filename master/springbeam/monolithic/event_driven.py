@@ -154,7 +154,7 @@ class _Run:
             if self._limit is not None and clock.process_time() - self._began > self._limit:
                 raise ReferenceFailure(f"takes more than {self._limit:g} s; it is at t = {state.time:.6g} s")
             target = min(self._due[0], end) if self._due else end
-            segment = propagator.advance(max(target - state.time, 1e-16 * self.t_end), 4.0 * np.spacing(target))
+            segment = propagator.advance(max(target - state.time, 1e-16 * self.t_end))
             self._counts["steps"] += 1
             event, reach = first_event(s, state.phase, watched, segment) or (None, segment.size)
             state.time = begin + propagator.elapsed if event is None else state.time + reach

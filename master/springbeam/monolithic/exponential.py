@@ -28,7 +28,7 @@ _MAX_ITERATIONS = 60
 _STEP_PHASE = 2.0
 #: What all faster motion together may amount to: of the tip's displacement, of a contact force, of the energy that
 #: damping takes.
-_UNSEEN_DISPLACEMENT, _UNSEEN_FORCE, _UNSEEN_ENERGY = 1e-12, 1e-9, 1e-13
+_UNSEEN_DISPLACEMENT, _UNSEEN_FORCE, _UNSEEN_ENERGY = 1e-12, 1e-9, 1e-14
 #: Largest accepted impulse of the last two Legendre coefficients of r over a step, as a share of the momentum there.
 #: The step's end is far more exact: Gauss points integrate what these coefficients leave out.
 _TAIL = 1e-12
@@ -59,8 +59,8 @@ class Segment:
 class LinearForm:
     """The linear part of a phase, in the modes ξ of what moves in it: x = basis ξ + offset.
 
-    A constraint g·x = const leaves the space orthogonal to g, and a linear law adds its stiffness; the modes are those
-    of both. Without either they are the coordinates x themselves.
+    A constraint g·x = const leaves the space orthogonal to g, and the modes are those in it. Without one they are the
+    coordinates x themselves.
 
     Attributes
     ----------
@@ -69,10 +69,8 @@ class LinearForm:
     constant, loads : (p,), (loads, p) arrays
         Constant loads, and forces of a unit of each load that varies.
     inputs : (k, p) array
-        P: the forces r. First, on the top, what is left of the spring's damping, and −k2 y³; then the law's force C, or
-        what `linked` leaves of it; each if the phase has it.
-    linked : float
-        Stiffness [N/m] of a linear law that is part of the modes, damped like them.
+        P: the forces r. First, on the top, what is left of the spring's damping, and −k2 y³; then the law's force C;
+        each if the phase has it.
     ends, at : (2, p) array, (2, 1) array
         u and y are ends @ ξ + at.
     pressing : (p,) array
@@ -85,36 +83,27 @@ class LinearForm:
         loads, tip, top, between = (rows[..., moving] for rows in (s.patterns, s.tip, s.top, s.between))
         row = s.row(phase)
         self.moving = moving
-        self.linked, self.damper = 0.0, 0.0  #: [N/m], and what is left of the law's damper beside it [N·s/m]
-        if s.law.linear:
-            k, damper = s.law.stiffness, s.law.damping
-            left = damper - s.alpha_b * k
-            # The modes' damping α_b k may be far from c; what is left must not be faster than the law itself.
-            if abs(left) * s.mobility <= max(damper * s.mobility, float(np.sqrt(k * s.mobility))):
-                self.linked, self.damper = k, left
         self.offset, self.pressing = np.zeros(len(omega2)), np.zeros(len(omega2))
         self.at = np.array([[0.0], [s.stop.position * s.fixed(phase)]])
         #: Damping of the spring that ``c`` does not hold yet [N·s/m].
         self.damping = 0.0
         #: `offset` + this @ ξ = x; ``None`` where x are the modes.
         self.basis: np.ndarray | None = None
-        if row is not None or self.linked > 0.0:
-            space = np.eye(len(omega2)) if row is None else scipy.linalg.null_space(row[None, moving])
-            if row is not None and phase.seated:
+        if row is not None:
+            if phase.seated:
                 self.offset = tip * (s.stop.position / s.tip_mobility)
                 self.at[0] = s.stop.position
-            if row is not None and (phase.seated or phase.contact == "touch"):
+            if phase.seated or phase.contact == "touch":
                 self.pressing = row[moving] * omega2
-            constant = constant - omega2 * self.offset + between * (self.linked * self.at[1])
-            omega2, modes = _modes(omega2, space, self.linked, between)
-            self.basis = space @ modes
+            constant = constant - omega2 * self.offset
+            omega2, self.basis = _modes(omega2, scipy.linalg.null_space(row[None, moving]))
             constant, loads, tip, top, between, self.pressing = (
                 rows @ self.basis for rows in (constant, loads, tip, top, between, self.pressing)
             )
             c, self.damping = s.alpha_b * omega2, s.spring.damping - s.alpha_b * s.spring.linear_stiffness
         self.omega2, self.c, self.constant, self.loads = omega2, c, constant, loads
         self.of_spring = bool(np.any(top)) and s.has_spring and bool(self.damping or s.spring.cubic_stiffness)
-        self.of_law = s.law.acts(phase.contact) and not (self.linked > 0.0 and self.damper == 0.0)
+        self.of_law = s.law.acts(phase.contact)
         inputs = [top] * self.of_spring + [between] * self.of_law
         self.inputs = np.reshape(inputs, (len(inputs), len(omega2)))
         self.ends = np.array([tip, top])
@@ -148,18 +137,17 @@ class LinearForm:
         if self.of_spring:
             found.append(-self.damping * z - spring.cubic_stiffness * y**3)
         if self.of_law:
-            found.append(self.damper * (z - v) if self.linked > 0.0 else self.system.law.force(y - u, z - v))
+            found.append(self.system.law.force(y - u, z - v))
         return np.array(found).reshape(len(found), len(xi))
 
     def weights(self, size: float) -> StepWeights:
-        """Return the weights of a step of ``size`` [s]; the last ones used are kept."""
+        """Return the weights of a step of ``size`` [s]; those of some sizes are kept."""
         digits = f"{size:.12e}"
-        if (known := self._weights.pop(digits, None)) is None:
-            known = self.oscillators.weights(size)
+        if digits not in self._weights:
             if len(self._weights) >= _CACHED_SIZES:
-                self._weights.pop(next(iter(self._weights)))
-        self._weights[digits] = known
-        return known
+                self._weights.clear()
+            self._weights[digits] = self.oscillators.weights(size)
+        return self._weights[digits]
 
     def longest_step(self, xi: np.ndarray, xi_dot: np.ndarray, r: np.ndarray, X: np.ndarray) -> float:
         """Return the step [s] that resolves the free motion seen in displacements, contact forces and dissipation.
@@ -189,17 +177,16 @@ class LinearForm:
         return min(_STEP_PHASE / fastest if fastest > 0.0 else np.inf, self.system.loads.longest_step)
 
 
-def _modes(omega2: np.ndarray, space: np.ndarray, k: float, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return ω² and orthonormal modes in ``space`` of the stiffness diag(omega2) + k rowᵀrow.
+def _modes(omega2: np.ndarray, space: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return ω² and orthonormal modes in ``space`` of the stiffness diag(omega2).
 
     By singular values of its factor (see `semi_discrete`), unless a part of it is negative.
     """
     if np.all(omega2 >= 0.0):
-        factor = np.vstack([np.sqrt(omega2)[:, None] * space, np.sqrt(k) * row @ space])
-        omega, modes = singular_modes(factor)
-        return omega**2, modes
-    omega2, modes = np.linalg.eigh(space.T @ (np.diag(omega2) + k * np.outer(row, row)) @ space)
-    return omega2, modes
+        omega, modes = singular_modes(np.sqrt(omega2)[:, None] * space)
+        return omega**2, space @ modes
+    omega2, modes = np.linalg.eigh(space.T @ (omega2[:, None] * space))
+    return omega2, space @ modes
 
 
 class ExponentialPropagator:
@@ -210,18 +197,18 @@ class ExponentialPropagator:
         self._speed = speed  #: largest interface velocity so far × √mass, the scale of `_TAIL`
         self._force_limit = np.inf  #: what resolving r allows [s]
         self.elapsed = 0.0  #: since the start [s]
-        self._size, self._steps = 0.0, 0  #: of the present interval, and how many are left
 
-    def advance(self, remaining: float, resolution: float = 0.0) -> Segment:
-        """Make one step towards ``remaining`` [s] from here, which is known to ``resolution`` [s]."""
+    def advance(self, remaining: float) -> Segment:
+        """Make one step towards ``remaining`` [s] from here."""
         xi, xi_dot = self.form.pack(self.X)
         r = self.form.forces(xi[None], xi_dot[None])
         limit = self.form.longest_step(xi, xi_dot, r[:, 0], self.X)
         while True:
-            size = self._next_size(remaining, resolution, min(limit, self._force_limit))
+            size = min(limit, self._force_limit)
+            # Powers of two recur, also in other segments: weights are dear.
+            size = remaining if remaining <= size else 2.0 ** float(np.floor(np.log2(size)))
             segment = self._step(size, xi, xi_dot, r)
             if segment is not None:
-                self._steps -= 1
                 self._force_limit = min(2.0 * self._force_limit, 1e300)
                 self.X = segment.states[-1]
                 self.elapsed += size
@@ -229,16 +216,6 @@ class ExponentialPropagator:
             self._force_limit = 0.5 * size
             if size < _SMALLEST_SHARE * remaining:
                 raise ReferenceFailure(f"no step resolves the interface force in phase {self.phase.name}")
-
-    def _next_size(self, remaining: float, resolution: float, limit: float) -> float:
-        """Divide the way to the target into 2ᵏ equal steps, k changing on it: sizes recur, as weights are dear."""
-        if abs(remaining - self._steps * self._size) > resolution or self._steps == 0:
-            self._size, self._steps = remaining, 1
-        while self._size > limit:
-            self._size, self._steps = 0.5 * self._size, 2 * self._steps
-        while self._steps % 2 == 0 and 2.0 * self._size <= limit:
-            self._size, self._steps = 2.0 * self._size, self._steps // 2
-        return self._size
 
     def _step(self, size: float, xi: np.ndarray, xi_dot: np.ndarray, start: np.ndarray) -> Segment | None:
         """Make one step, or None where it is too long for the forces r, whose values at its start are given."""
