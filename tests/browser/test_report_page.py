@@ -65,11 +65,9 @@ class Shown:
         self.data = json.loads(self.page.locator("#data").inner_text())
 
     def path(self, part):
-        """The path that is drawn of a part of the motion, of the beam where it is enlarged."""
-        parts = self.data["motion"]["parts"]
-        chart = "motion-beam" if part == "beam" and "motion-beam" in parts else "motion"
-        index = parts[chart]["traces"].index(part)
-        return str(self.page.locator(f"#{chart} .scatterlayer .js-line").nth(index).get_attribute("d"))
+        """The path that is drawn of a part of the motion."""
+        index = self.data["motion"]["parts"]["motion"]["traces"].index(part)
+        return str(self.page.locator("#motion .scatterlayer .js-line").nth(index).get_attribute("d"))
 
     def height_of_end(self, part):
         """Where a part's path ends [m], from its pixels and the axis."""

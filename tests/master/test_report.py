@@ -177,7 +177,6 @@ def test_frames_are_the_recorded_shapes_with_the_spring_of_the_same_time():
     times = run.time[::3]
     sparse = dataclasses.replace(run, shape_table=run.shape_table[::3])
     motion = shown(sparse).data["motion"]
-    assert "motion-beam" not in motion["parts"]
     assert motion["time"] == pytest.approx(times, rel=1e-8)
     assert np.array(motion["deflection"]) == pytest.approx(sparse.shapes[1], rel=1e-8)
     assert motion["y"] == pytest.approx(run.y[::3], rel=1e-8)

@@ -94,20 +94,16 @@ class _Picture:
     def __init__(self, trajectory: Trajectory, frames: Frames) -> None:
         self.trajectory, self.frames = trajectory, frames
         self.figure = Figure(figsize=_SIZE, dpi=_DPI, layout="constrained")
-        shown = [sketch for sketch in sketches(trajectory, frames) if sketch.name != "motion-contact"]
-        heights = [*(sketch.height for sketch in shown), 1.5]
-        *axes, below = self.figure.subplots(len(heights), 1, height_ratios=heights)
+        above, below = self.figure.subplots(2, 1, height_ratios=[2.0, 1.0])
         self._moving: list[tuple[Line2D, Part, float]] = []
-        for ax, sketch in zip(axes, shown, strict=True):
-            self._sketch(ax, sketch)
+        self._sketch(above, sketches(trajectory, frames)[0])
         self._clock = time_unit(trajectory)
         shade(below, trajectory)
         paint(below, positions(trajectory), self._clock)
         self._cursor = below.axvline(0.0, color=BLACK, lw=1.0, ls=":")
         self.figure.suptitle(trajectory.scene.title, fontsize=10.0, x=0.01, ha="left")
         self._words = self.figure.text(0.99, 0.985, "", fontsize=9.0, ha="right", va="top", family="monospace")
-        if words := mark(trajectory):
-            axes[0].set_title(words, fontsize=9.0, loc="right", color=VERMILLION, y=1.0)
+        above.set_title(mark(trajectory), fontsize=9.0, loc="right", color=VERMILLION, y=1.0)
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")  # what stands still stays where it is
 
@@ -130,4 +126,4 @@ class _Picture:
             if part is not None:
                 self._moving.append((line, part, sketch.unit.factor))
         ax.set(xlim=sketch.x, ylim=sketch.y, xlabel=f"position along the beam x [{sketch.along.name}]",
-               ylabel=f"{sketch.quantity} [{sketch.unit.name}]")  # fmt: skip
+               ylabel=f"height [{sketch.unit.name}]")  # fmt: skip

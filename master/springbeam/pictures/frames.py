@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -20,7 +20,6 @@ from .drawing import (
     Look,
     Unit,
     length_along,
-    much_smaller,
     near_levels,
     present,
     readable_unit,
@@ -89,10 +88,8 @@ class Sketch:
 
     name: str
     heading: str
-    quantity: str  #: what the heights are
     unit: Unit
     along: Unit
-    height: float  #: [inch]
     x: tuple[float, float]
     y: tuple[float, float]
     strokes: list[Stroke]  #: what moves first
@@ -104,15 +101,10 @@ class Sketch:
 
 
 def sketches(trajectory: Trajectory, frames: Frames) -> list[Sketch]:
-    """Return beam and spring; once more, enlarged, what is too small to be seen in that picture."""
+    """Return beam and spring; once more, enlarged, a contact that is too small to be seen in that picture."""
     found = [_sketch("motion", "Motion", trajectory, frames, (frames.low, frames.high))]
     if contact := _contact_heights(trajectory, frames):
         found.append(_sketch("motion-contact", "The contact, enlarged", trajectory, frames, contact, _NEAR_TIP))
-    if frames.deflection is not None and "u_tip" in much_smaller(trajectory):
-        reach = 1.1 * float(np.max(np.abs(frames.deflection)))
-        alone = replace(frames, y=None, levels={})
-        found.append(_sketch("motion-beam", "The beam alone, enlarged", trajectory, alone, (-reach, reach)))
-        found[-1].quantity, found[-1].height = "beam alone u", 1.5
     return found
 
 
@@ -151,7 +143,7 @@ def _sketch(
             if symbol == "φ":
                 strokes.append(Stroke(Look(STONE, "foundation", Line(7.0)), ends, np.full(2, height)))
             strokes.append(Stroke(LEVELS[symbol], ends, np.full(2, height), label=symbol))
-    return Sketch(name, heading, "height", unit, along, 3.0, (begin_at, end_at), (low, high), strokes)
+    return Sketch(name, heading, unit, along, (begin_at, end_at), (low, high), strokes)
 
 
 def frames_of(trajectory: Trajectory) -> Frames | None:

@@ -32,7 +32,6 @@ from .drawing import (
     Unit,
     decimated,
     drawable,
-    much_smaller,
     near_levels,
     present,
     readable_unit,
@@ -100,7 +99,6 @@ def panels(trajectory: Trajectory) -> list[Panel]:
         return []
     found = [
         positions(trajectory),
-        enlarged(trajectory),
         velocities(trajectory, VELOCITIES),
         forces(trajectory),
         impulses(trajectory),
@@ -120,14 +118,6 @@ def positions(trajectory: Trajectory) -> Panel:
     ends = trajectory["time"][[0, -1]]
     curves += [Curve(symbol, LEVELS[symbol], ends, np.full(2, height)) for symbol, height in near.items()]
     return Panel("positions", "Positions", "position", "m", curves, 2.4)
-
-
-def enlarged(trajectory: Trajectory) -> Panel:
-    """Return a panel of its own for the one of two positions whose motion is lost beside the other's."""
-    small = much_smaller(trajectory)
-    looks = {name: Look(POSITIONS[name].colour, f"{POSITIONS[name].words}, enlarged") for name in small}
-    name = "-".join(["position", *small])
-    return Panel(name, "The smaller one, enlarged", "position", "m", _curves(trajectory, looks), 1.2)
 
 
 def velocities(trajectory: Trajectory, names: Iterable[str]) -> Panel:

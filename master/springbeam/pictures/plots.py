@@ -95,13 +95,12 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
     if len(times) < 2 or trajectory.shapes is None:
         return None
     times, shapes = times[:_SHAPES_EARLY], trajectory.shapes[1][since][:_SHAPES_EARLY]
-    figure = figure_for(trajectory, "(A) The beam right after first contact", 3.6)
-    left, right = figure.subplots(1, 2)
-    _curves(left, trajectory, times, shapes, "deflection u", "m")
     steps = np.diff(times)
     some = steps > 1e-6 * np.max(steps)  # between rows of one event Δu is rounding
     middles, velocities = 0.5 * (times[1:] + times[:-1])[some], np.diff(shapes, axis=0)[some] / steps[some, None]
-    _key(right, _curves(right, trajectory, middles, velocities, "mean velocity Δu/Δt", "m/s"))
+    figure, axes = _side_by_side(trajectory, "(A) The beam right after first contact", 2)
+    _curves(axes[0], trajectory, times, shapes, "deflection u", "m")
+    _key(axes[1], _curves(axes[1], trajectory, middles, velocities, "mean velocity Δu/Δt", "m/s"))
     return figure
 
 
@@ -120,21 +119,26 @@ def _moments(trajectory: Trajectory) -> Figure | None:
 
 
 def _later(trajectory: Trajectory, title: str, quantities: Mapping[str, tuple[str, np.ndarray]]) -> Figure | None:
-    """Draw quantities along the beam, a row each: curves at some times with their envelope, and a map of all."""
+    """Draw quantities along the beam side by side: curves at some times, and the envelope of all."""
     times, since = _since_contact(trajectory)
     if len(times) < _SHAPES_EARLY:
         return None
-    figure = figure_for(trajectory, title, 0.6 + 3.0 * len(quantities))
-    rows = figure.subplots(len(quantities), 2, squeeze=False, gridspec_kw={"wspace": 0.06})
+    figure, axes = _side_by_side(trajectory, title, len(quantities))
     some = np.unique(np.searchsorted(times, np.linspace(times[0], times[-1], _SHAPES_LATER)))
-    for (left, right), (what, (unit, found)) in zip(rows, quantities.items(), strict=True):
-        values = found[since]
-        _key(left, _curves(left, trajectory, times[some], values[some], what, unit))
-        factor, x = readable_unit([values[some]], unit).factor, _along_the_beam(left, trajectory)
-        left.plot(x, factor * np.transpose([values.max(axis=0), values.min(axis=0)]), color=BLACK, lw=0.8, ls=":")
-        left.set_title("dotted: envelope of all", **REMARK)
-        _map(right, trajectory, times, values, what, unit)
+    for ax, (what, (unit, values)) in zip(axes, quantities.items(), strict=True):
+        found = values[since]
+        lines = _curves(ax, trajectory, times[some], found[some], what, unit)
+        ends = np.transpose([found.max(axis=0), found.min(axis=0)])
+        factor, x = readable_unit([found[some]], unit).factor, length_along(trajectory.scene)[1] * SHAPE_POINTS
+        ax.plot(x, factor * ends, color=BLACK, lw=0.8, ls=":")
+        ax.set_title("dotted: envelope of all", **REMARK)
+    _key(axes[-1], lines)
     return figure
+
+
+def _side_by_side(trajectory: Trajectory, title: str, number: int) -> tuple[Figure, list[Axes]]:
+    figure = figure_for(trajectory, title, 3.6)
+    return figure, figure.subplots(1, number, squeeze=False)[0].tolist()
 
 
 def _curves(
@@ -142,13 +146,13 @@ def _curves(
 ) -> LineCollection:
     """Draw curves over x, coloured from early (dark) to late; beside deflections [m] the levels that are near."""
     readable, clock = readable_unit([curves], unit), readable_unit([times], "s")
-    x = _along_the_beam(ax, trajectory)
-    segments = [np.column_stack([x, readable.factor * curve]) for curve in curves]
+    along, length = length_along(trajectory.scene)
+    segments = [np.column_stack([length * SHAPE_POINTS, readable.factor * curve]) for curve in curves]
     label = f"time t [{clock.name}]"
     lines = LineCollection(segments, array=clock.factor * times, cmap=_CLOCK, linewidths=1.0, label=label)
     ax.add_collection(lines)
     ax.axhline(0.0, color=GREY, lw=0.5, zorder=0)
-    ax.set(xlim=(x[0], x[-1]), ylabel=f"{what} [{readable.name}]")
+    ax.set(xlim=(0.0, length), xlabel=f"position along the beam x [{along.name}]", ylabel=f"{what} [{readable.name}]")
     ax.autoscale_view(scalex=False)
     near = near_levels(trajectory.scene, [curves]) if unit == "m" else {}
     for symbol, height in near.items():
@@ -163,26 +167,6 @@ def _key(ax: Axes, lines: LineCollection) -> None:
     ax.figure.colorbar(lines, ax=ax, label=lines.get_label(), pad=0.05, aspect=30)
 
 
-def _map(ax: Axes, trajectory: Trajectory, times: np.ndarray, shapes: np.ndarray, what: str, unit: str) -> None:
-    """Draw values over x and t."""
-    readable, clock = readable_unit([shapes], unit), readable_unit([times], "s")
-    x = _along_the_beam(ax, trajectory)
-    distinct = np.r_[True, np.diff(times) > 0.0]
-    times, shapes = times[distinct], shapes[distinct]
-    largest = readable.factor * float(np.max(np.abs(shapes))) or 1.0
-    mesh = ax.pcolormesh(x, clock.factor * times, readable.factor * shapes, cmap="PuOr", vmin=-largest, vmax=largest,
-                         shading="gouraud", rasterized=True)  # fmt: skip
-    ax.set_ylabel(f"time t [{clock.name}]")
-    ax.figure.colorbar(mesh, ax=ax, label=f"{what} [{readable.name}]", pad=0.02, aspect=30)
-
-
-def _along_the_beam(ax: Axes, trajectory: Trajectory) -> np.ndarray:
-    """Name the axis of positions, and return those of `SHAPE_POINTS` in its unit."""
-    unit, length = length_along(trajectory.scene)
-    ax.set_xlabel(f"position along the beam x [{unit.name}]")
-    return length * SHAPE_POINTS
-
-
 # -- (C), (D), (E): over time -------------------------------------------------------------------------------------
 
 
@@ -190,7 +174,7 @@ def _positions(trajectory: Trajectory) -> Figure | None:
     positions, speeds = present(trajectory, POSITIONS), present(trajectory, VELOCITIES)[:1]
     whose = "beam's tip" if "v_tip" in speeds else "spring's top"
     title = "(C) Positions, and velocity" if len(positions) > 1 else "(C) Position and velocity"
-    shown = [panels.positions(trajectory), panels.enlarged(trajectory), panels.velocities(trajectory, speeds)]
+    shown = [panels.positions(trajectory), panels.velocities(trajectory, speeds)]
     return timeline(trajectory, f"{title} of the {whose}", shown)
 
 

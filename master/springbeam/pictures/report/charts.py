@@ -30,6 +30,8 @@ _FINE = 1e-3
 _PIXELS = 1.8
 #: Pixels of a chart's height: for each inch of its picture, and for what stands around it.
 _PIXELS_PER_INCH, _PIXELS_BESIDE = 82, 110
+#: Of a sketch [inch].
+_SKETCH_HEIGHT = 3.0
 
 
 @dataclass
@@ -122,10 +124,10 @@ def _timeline(trajectory: Trajectory) -> Chart:
 
 def moving_chart(sketch: Sketch, frames: Frames) -> Chart:
     """Draw a sketch at the first frame; the page's script moves it."""
-    figure = go.Figure(layout=_layout(_height_of(sketch.height)))
+    figure = go.Figure(layout=_layout(_height_of(_SKETCH_HEIGHT)))
     figure.update_layout(hovermode="closest", margin_r=30, showlegend=len(sketch.moving) > 1)
     figure.update_xaxes(range=list(sketch.x), title_text=f"position along the beam x [{sketch.along.name}]")
-    figure.update_yaxes(range=list(sketch.y), title_text=f"{sketch.quantity} [{sketch.unit.name}]", zeroline=False)
+    figure.update_yaxes(range=list(sketch.y), title_text=f"height [{sketch.unit.name}]", zeroline=False)
     for look, x, y, part, label in sketch.strokes:
         shown = part in ("beam", "top")
         figure.add_scatter(
