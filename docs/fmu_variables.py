@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from fmpy import read_model_description
@@ -10,9 +11,9 @@ from pages import DOCS, table  # beside this script
 TARGET = DOCS / "fmu_variables.md"
 HEAD = """# Variables of the FMUs
 
-Made from the FMUs by `python docs/fmu_variables.py`. Everything is SI, up is positive; what the symbols mean is in
-[model.md](model.md). Every input but an impulse is continued over a step by its FMI input derivatives of order 1 and 2.
-What is local can be read like an output; tools that record or plot every output leave it alone.
+Everything is SI, up is positive; what the symbols mean is in [model.md](model.md). Every input but an impulse is
+continued over a step by its FMI input derivatives of order 1 and 2. What is local can be read like an output; tools
+that record or plot every output leave it alone. (Made from the FMUs by `python docs/fmu_variables.py`.)
 """
 
 
@@ -29,10 +30,11 @@ def section(name: str) -> str:
             shown.add(stem)
             label = f"{stem}[1..{sum(v.name.startswith(stem + '[') for v in description.modelVariables)}]"
         start = "" if variable.start is None else str(variable.start)
-        unit = variable.unit or ("–" if variable.type == "Real" else variable.type)
-        text = (variable.description or "").replace("|", "\\|")
-        rows.append((f"`{label}`", variable.causality, unit, start, text))
-    return "\n".join([f"\n## {name}\n", *table(("variable", "kind", "unit", "start", ""), rows), ""])
+        unit = f" [{variable.unit}]" if variable.unit else ""
+        kind = variable.causality if variable.type == "Real" else f"{variable.type} {variable.causality}"
+        text = re.sub(r"; derivatives as for \w+", "", variable.description or "").replace("|", "\\|")  # HEAD says it
+        rows.append((f"`{label}`{unit}", kind, start, text))
+    return "\n".join([f"\n## {name}\n", *table(("variable", "kind", "start", ""), rows), ""])
 
 
 def files() -> dict[Path, str]:

@@ -11,12 +11,11 @@ from springbeam.scene import reference
 
 HEAD = """# Scene files
 
-Made by `python docs/scene.py` from the declarations that `springbeam keys` lists.
-
-A scene is a TOML file of tables. All values are SI, up is positive. A missing `[beam]`, `[spring]` or `[stop]` is a
-scene without it. Invalid keys and values are rejected; the error names the key and the allowed values. A key that
-plays no part in the scene is named in a warning. `springbeam new NAME` writes a commented scene to start from. The
-symbols are those of [model.md](model.md), the schemes those of [coupling.md](coupling.md).
+A scene is a TOML file of tables; `springbeam new NAME` writes a commented one to start from. All values are SI, up is
+positive. A missing `[beam]`, `[spring]` or `[stop]` is a scene without it. An invalid key or value is an error that
+names the key and the allowed values; a key that plays no part in the scene is named in a warning. Symbols are those of
+[model.md](model.md). A key without a default may be left out. (Made by `python docs/scene.py`; `springbeam keys` lists
+the same.)
 
 **Editors** complete and check keys by the JSON Schema [scene.schema.json](scene.schema.json), which
 `springbeam keys --schema` prints: with Taplo or Even Better TOML, the first line of a scene beside it is
@@ -36,7 +35,7 @@ SHORT = {
     " and ": ", ",
     '" or "': '", "',
 }
-COLUMNS = ("key", "unit", "value", "default", "meaning")
+COLUMNS = ("key", "value", "default", "meaning")
 
 
 def row(key: reference.Key) -> tuple[str, ...]:
@@ -44,7 +43,9 @@ def row(key: reference.Key) -> tuple[str, ...]:
     value = key.allowed
     for words, short in SHORT.items():
         value = value.replace(words, short)
-    return f"`{key.name}`", key.unit, value, key.default, key.meaning.replace("|", "\\|")
+    unit = "" if key.unit == "–" else f" [{key.unit}]"
+    default = "" if key.default == "none" else key.default
+    return f"`{key.name}`{unit}", value, default, key.meaning.replace("|", "\\|")
 
 
 def elements() -> list[str]:

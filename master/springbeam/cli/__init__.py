@@ -1,7 +1,8 @@
 """The ``springbeam`` command: one module per group of commands.
 
 A command is a thin function: it reads its input, calls the library, prints.
-Exit codes: 0 done, 1 a check failed, 2 bad input, 3 the run stopped early (what was computed is on disk).
+Exit codes: 0 done, 1 a check failed, 2 bad input, 3 the run stopped early (what was computed is on disk), 4 a run
+cannot be compared (`crosscheck`).
 """
 
 from __future__ import annotations

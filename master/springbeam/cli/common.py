@@ -62,7 +62,8 @@ SettingsOption = Annotated[
 ]
 RunArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Directory with the results of springbeam run.")]
 MeasuredArgument = Annotated[
-    Path, typer.Argument(metavar="FILE", help="Measured columns: time first, names with [units] in the first line.")
+    Path,
+    typer.Argument(metavar="FILE", help="Measured columns, time first; the first line names them and their units."),
 ]
 MapOption = Annotated[
     list[str] | None,

@@ -256,7 +256,7 @@ def spectrum(
     since: Annotated[
         float | None,
         typer.Option(
-            "--since", metavar="SECONDS", help="Begin of the power spectra. Default: where the motion settles."
+            "--since", metavar="SECONDS", help="Start of the power spectra. Default: where the motion settles."
         ),
     ] = None,
     segments: Annotated[
@@ -270,7 +270,7 @@ def spectrum(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Spectra of a run: shock response, power, and the points and the period of a driven motion.
+    """Find spectra of a run: shock response, power, and the points and the period of a driven motion.
 
     Example: springbeam spectrum results/soft --of a_tip --quality 25
     """

@@ -65,12 +65,12 @@ def run(
         typer.Option(
             "--accuracy",
             metavar="RELATIVE",
-            help="Pick scheme, macro step and tolerances that keep tip displacement and event times so accurate.",
+            help="Largest relative error of motion, contact times and impulses; picks scheme and steps.",
         ),
     ] = None,
     mesh: Annotated[
         bool,
-        typer.Option("--mesh", help="With --accuracy: refine the mesh too, until the continuous beam is met so well."),
+        typer.Option("--mesh", help="With --accuracy: refine the mesh too, until two meshes agree."),
     ] = False,
     checkpoint: Annotated[
         float | None,
@@ -78,7 +78,7 @@ def run(
             "--checkpoint",
             metavar="SECONDS",
             min=0.0,
-            help="Save every so many seconds what springbeam resume needs. Not beside an accuracy.",
+            help="Save every so many seconds what springbeam resume needs. Not with an accuracy.",
         ),
     ] = None,
     interval: Annotated[

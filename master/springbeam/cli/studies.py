@@ -186,7 +186,7 @@ MetricOption = Annotated[
     typer.Option(
         "--metric",
         metavar="NAME[=FORMULA]",
-        help="A number of each run, or yours as in a='max(a_tip)/g'; may be repeated. Default: those that fit.",
+        help="A metric of each run (springbeam keys --metrics), or a formula, a='max(a_tip)/g'; may be repeated.",
     ),
 ]
 QuickOption = Annotated[bool, typer.Option("--quick", help="A smaller study, for a first look.")]
@@ -262,7 +262,8 @@ def fit(
     ] = None,
     settings: SettingsOption = None,
 ) -> Study:
-    """Find keys of a scene by measured curves, with confidence intervals. Exit code 1 if the data does not tell.
+    """Find keys of a scene by measured curves, with confidence intervals. Exit code 1 if the data does not
+    determine them.
 
     Example: springbeam fit soft measured.csv --vary spring.linear_stiffness=3 --vary spring.damping=0.1
     """
@@ -354,7 +355,7 @@ def stability(
     seed: SeedOption = 1,
     quick: QuickOption = False,
 ) -> Study:
-    """Run extreme scenes and classify each result. Exit code 1 if one is wrong.
+    """Run extreme scenes and classify each result. Exit code 1 if one is garbage.
 
     Example: springbeam stability --samples 100 --resolution 0
     """

@@ -21,7 +21,7 @@ TURN = 1.0
 #: By degree d of the force: a step that turns spring and massless beam by x rad makes them late by x^(2d + 2) over this
 #: of itself, as a Gauss collocation of d + 1 stages would (for d = 0 the midpoint rule).
 COLLOCATION = (12.0, 720.0, 100800.0)
-#: What all of them together may turn too little [rad].
+#: By which angle all of them together may lag [rad].
 LAG = 0.12
 #: Share of its way that an end may be from where the law of the contact would have it, by degree of the force: a soft
 #: law, a tie. At degree 0 of a soft law that is known to some tenths of itself. Else it leaves out what the force feels
@@ -30,7 +30,7 @@ MISPLACED, MISPLACED_TIED = (0.006, 0.002, 0.001), (0.0025, 0.002, 0.001)
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
 #: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
 STABLE = 3.0
-#: What all steps of generalized-α together may turn waves too little [rad]: the fastest ones that an impact sets off;
+#: By which angle generalized-α may let waves lag at the end of the run [rad]: the fastest ones that an impact sets off;
 #: where nothing strikes, those of a few times the beam's lowest frequency, or of a load, which move the tip more.
 WAVE_LAG, SMOOTH_LAG, SMOOTH_WAVES = 1.0, 0.01, 5.0
 #: ω α_b above which waves die out within two periods and need no resolution.
@@ -243,8 +243,8 @@ _OF_STEPS = (
     ),
     Rule(
         _lags,
-        "not resolved: tip and lower end turn {turn:.3g} rad in a macro step together, and in all {lag:.2g} rad too "
-        "little; coupling.macro_step <= {size} resolves it{higher}",
+        "not resolved: tip and lower end together turn {turn:.3g} rad in a macro step, and lag by {lag:.2g} rad at the "
+        "end; coupling.macro_step <= {size} resolves it{higher}",
     ),
     Rule(
         _unstable,
@@ -254,7 +254,7 @@ _OF_STEPS = (
     ),
     Rule(
         _waves_lag,
-        "not resolved: generalized-α turns {waves} {lag:.2g} rad too little in all; "
+        "not resolved: with generalized-α {waves} lag by {lag:.2g} rad at the end; "
         "coupling.macro_step <= {size} resolves them, beam.alpha_b > 0 lets them die out, and "
         'beam.integrator = "modal" is exact',
     ),

@@ -35,7 +35,7 @@ class Scene(Table):
 
     title: str = key("–", "what the scene is, for pictures and reports", "")
     accuracy: float | None = key(
-        "–", "picks scheme, steps and tolerances that keep tip displacement and event times so accurate", None,
+        "–", "largest relative error of motion, contact times and impulses; picks scheme, steps and tolerances", None,
         gt=0.0, lt=1.0,
     )  # fmt: skip
     time: Time

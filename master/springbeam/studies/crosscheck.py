@@ -29,7 +29,7 @@ class Crosscheck(Study):
     """A scene beside the reference of its law."""
 
     kind: ClassVar[str] = "crosscheck"
-    announced: ClassVar[str] = "2 runs and 2 references; with law paper 1 run and 2 references"
+    announced: ClassVar[str] = "2 runs (1 with law paper) and 2 references"
 
     scene: Scene  #: its first quarter if quick
 
