@@ -254,7 +254,7 @@ _OF_STEPS = (
     ),
     Rule(
         _waves_lag,
-        "not resolved: with generalized-α {waves} lag by {lag:.2g} rad at the end; "
+        "not resolved: generalized-α lets {waves} lag by {lag:.2g} rad at the end; "
         "coupling.macro_step <= {size} resolves them, beam.alpha_b > 0 lets them die out, and "
         'beam.integrator = "modal" is exact',
     ),
