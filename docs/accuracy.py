@@ -33,8 +33,7 @@ class Window(NamedTuple):
 
 
 WINDOWS = {
-    "soft": Window("soft", {}, 0.0712),
-    "soft-events": Window("soft", {}, None),
+    "soft": Window("soft", {}, None),
     "steel-bumper": Window("steel-bumper", {}, None),
     "bar-impact": Window("bar-impact", {}, None),
     "paper-fig2": Window("paper-fig2", {"coupling": {"macro_step": 1e-7}}, 0.50002),

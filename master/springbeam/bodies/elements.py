@@ -1,4 +1,4 @@
-"""Simple partners that need no FMU: a free mass, a mass on a linear spring and damper, an end that moves as told.
+"""Simple partners that need no FMU: a free mass, a mass on a linear spring and damper, an end that moves as prescribed.
 
 They fit in either place. Each step of a mass is exact: the state with the polynomial force and the integrals is one
 linear system, s = (x, ẋ, F, Ḟ, F̈, ∫x, ∫∫x), ṡ = A s, stepped by exp(A H). Damping takes what the forces do and the

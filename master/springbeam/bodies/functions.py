@@ -1,4 +1,4 @@
-"""FMUs of FMI 2.0 and of FMI 3.0 as FMPy has them, with the calls that each step makes; with `fmu`, all of FMPy.
+"""Load FMUs of FMI 2.0 and 3.0 by FMPy, and make the calls of each step. Only this module and `fmu` import FMPy.
 
 FMPy does what is done once. It looks at each argument of each call, which takes as long as the call: what a step calls
 is bound to its arguments here.

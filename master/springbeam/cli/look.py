@@ -1,4 +1,4 @@
-"""``springbeam report``, ``animate``, ``export``, ``compare`` and ``spectrum``: what a run has come to."""
+"""``springbeam report``, ``animate``, ``export``, ``compare`` and ``spectrum``: the results of runs."""
 
 from __future__ import annotations
 

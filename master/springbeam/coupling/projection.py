@@ -1,4 +1,4 @@
-"""The projected contact law: C over a step from what the penetration's ends and moments say, exact in energy.
+"""Project a soft law onto a step: the force that follows from the penetration's ends and moments, exact in energy.
 
 Let p̃ be the polynomial of degree d + 1 that has the penetration's values at both ends of the step and its first d
 moments, and let C be the projection of F(p̃) + D(p̃, p̃′) onto degree d in L². Then ∫ C ṗ dτ = ∫ C p̃′ dτ, by parts, and

@@ -1,4 +1,4 @@
-"""Soft laws at any degree: the step whose force is the projected law of the step's own penetration.
+"""Soft laws at any degree: find the force that is the projection of the law for the penetration which it causes.
 
 Given the responses of both bodies, the force that a penetration would have and the penetration that a force would make
 are two lines (or curves) whose crossing is sought, on the penetration's numbers x (`Projection`), without a step of any

@@ -1,4 +1,4 @@
-"""The tie: both ends move together, and the contact force is whatever that takes."""
+"""The tie: both ends move together, and the contact force is what keeps them together."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When contact opens and closes and the foundation is struck, how hard, and how far two runs are apart in it.
+"""Times at which contact opens, closes and strikes the foundation, their impulses, and how far two runs differ in them.
 
 What lasts less than a window and passes on hardly any impulse is no evidence either way: whether such a contact closes
 at all is decided by rounding.

@@ -1,4 +1,4 @@
-"""What judges a run by its energy ledger, and what is said where something has changed the energy."""
+"""Judge a run by its energy ledger: when it warns, when it stops, and what it then says."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One attempted step: both bodies from their marks, by any size, under the law of the phase."""
+"""Attempt one step: advance both bodies from their marks by any size, under the law of the phase."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Convergence of a run with the beam's mesh and with the modes kept: what of a result is the model's, not the beam's.
+"""Convergence of a run's results with finer meshes and more modes.
 
 A macro step, a scheme, an accuracy say how well the equations of one mesh are solved. This study changes the mesh, and
 shows how fast each quantity settles (Richardson 1911, Roache 1994).

@@ -1,4 +1,4 @@
-"""What is kept of a run: one number per metric, the same on every machine that runs it, its cost, and its errors.
+"""Metrics: numbers that studies keep of a run, with its cost and its errors beside a reference.
 
 A metric is named: one of `METRICS`, or one's own, ``NAME=FORMULA`` (of columns and metrics) or
 ``NAME=module:function`` (of the run).

@@ -1,4 +1,4 @@
-"""Many runs of one scene: a row of metrics per run, errors as rows.
+"""Run a scene with many values of its keys: one row of metrics per run, also of one that fails.
 
 The rows depend on the design alone: not on the number of workers, nor on the order in which they finish.
 
