@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from springbeam.scene import Load, SceneError
 from springbeam.signals.driven import repeating, response
 from springbeam.signals.expressions import Expression, function_of, signal
-from springbeam.signals.shock import shock_spectrum
+from springbeam.signals.spectra import shock_spectrum
 
 # -- formulas -----------------------------------------------------------------------------------------------------
 

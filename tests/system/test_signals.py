@@ -12,9 +12,7 @@ from scenes import scene_from_dict
 
 from springbeam import SceneError, load_scene, simulate, with_changes
 from springbeam.signals.driven import responses, settled
-from springbeam.signals.report import spectra
-from springbeam.signals.shock import shock_of_run, shock_spectrum
-from springbeam.signals.spectra import power_spectrum, sampled
+from springbeam.signals.spectra import power_spectrum, sampled, shock_of_run, shock_spectrum, spectra
 from springbeam.studies.metrics import METRICS
 from springbeam.studies.study import record_all
 from springbeam.studies.sweep import Sweep

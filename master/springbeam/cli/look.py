@@ -172,7 +172,7 @@ def _beside_measured(
     """Show how far a run is from measured curves."""
     from ..signals.expressions import Expression
     from ..signals.measured import model, read_measured, residuals, time_shift
-    from ..signals.shock import without_peak
+    from ..signals.spectra import without_peak
     from ..studies.fit import mapping
 
     with bad_input_reported():
@@ -274,7 +274,7 @@ def spectrum(
 
     Example: springbeam spectrum results/soft --of a_tip --quality 25
     """
-    from ..signals.report import spectra
+    from ..signals.spectra import spectra
 
     with bad_input_reported():
         trajectory = load_trajectory(results_directory(run))

@@ -20,7 +20,7 @@ from ..results.trajectory import COLUMNS, TOLD, EventKind, Trajectory
 from ..scene import SceneError
 from ..scene.messages import nearest
 from ..signals.driven import drive_of, poincare, settled
-from ..signals.shock import without_peak
+from ..signals.spectra import without_peak
 
 #: The transient of a driven motion that does not settle, as a share of the run.
 _TRANSIENT = 2.0 / 3.0
