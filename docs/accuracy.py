@@ -16,7 +16,7 @@ from pages import IMAGES, shrink, table, write_section  # beside this script
 from springbeam import load_scene, with_changes
 from springbeam.run import runner
 from springbeam.scene import Scene
-from springbeam.scene.automatic import choice
+from springbeam.scene.resolution import choice
 from springbeam.studies import rivals, tradeoff
 from springbeam.studies.metrics import worst
 from springbeam.studies.study import Row, record_all

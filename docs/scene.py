@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pages import DOCS, table  # beside this script
 
-from springbeam.scene import reference
+from springbeam.scene import messages
 
 HEAD = """# Scene files
 
@@ -38,7 +38,7 @@ SHORT = {
 COLUMNS = ("key", "value", "default", "meaning")
 
 
-def row(key: reference.Key) -> tuple[str, ...]:
+def row(key: messages.Key) -> tuple[str, ...]:
     """Return a line of a table."""
     value = key.allowed
     for words, short in SHORT.items():
@@ -50,13 +50,13 @@ def row(key: reference.Key) -> tuple[str, ...]:
 
 def elements() -> list[str]:
     """Return one table of the keys of all bodies that need no FMU."""
-    names = [name for name in reference.MODELS if name in reference.PARTNERS and name != "fmu"]
+    names = [name for name in messages.MODELS if name in messages.PARTNERS and name != "fmu"]
     of: dict[tuple[str, ...], list[str]] = {}
     for name in names:
-        for key in reference.listed(name):
+        for key in messages.listed(name):
             if key.name != "element":
                 of.setdefault(row(key), []).append(f"`{name}`")
-    about = [f'* `element = "{name}"`: {reference.about(name)}' for name in names]
+    about = [f'* `element = "{name}"`: {messages.about(name)}' for name in names]
     rows = [(*cells, ", ".join(of[cells])) for cells in of]
     return ["## [beam] or [spring] with element\n", *about, "", *table((*COLUMNS, "of"), rows), ""]
 
@@ -64,21 +64,21 @@ def elements() -> list[str]:
 def page() -> str:
     """Return the text of scene.md."""
     lines = [HEAD]
-    for name, model in reference.MODELS.items():
-        if name in reference.PARTNERS and name != "fmu":
+    for name, model in messages.MODELS.items():
+        if name in messages.PARTNERS and name != "fmu":
             continue
-        heading = reference.heading(name)
-        lines += [f"## {heading}\n\n{reference.about(name)}\n" if name else f"## {heading.capitalize()}\n"]
+        heading = messages.heading(name)
+        lines += [f"## {heading}\n\n{messages.about(name)}\n" if name else f"## {heading.capitalize()}\n"]
         for ways in model.WAYS:
             marked = ", or ".join(" and ".join(f"`{key}`" for key in group) for group in ways)
             lines.append(f"Give only one of these: {marked}.\n")
-        lines += [*table(COLUMNS, map(row, reference.listed(name))), ""]
+        lines += [*table(COLUMNS, map(row, messages.listed(name))), ""]
     return "\n".join([*lines, *elements()])
 
 
 def files() -> dict[Path, str]:
     """Return the text of each file."""
-    schema = json.dumps(reference.schema(), indent=1, ensure_ascii=False)
+    schema = json.dumps(messages.schema(), indent=1, ensure_ascii=False)
     return {DOCS / "scene.md": page(), DOCS / "scene.schema.json": f"{schema}\n"}
 
 

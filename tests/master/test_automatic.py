@@ -6,9 +6,8 @@ import pytest
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam
-from springbeam.scene.automatic import choice, with_scheme_chosen
 from springbeam.scene.linearised import spring_frequency
-from springbeam.scene.resolution import STABLE, mesh_frequency, slowest_frequency
+from springbeam.scene.resolution import STABLE, choice, mesh_frequency, slowest_frequency, with_scheme_chosen
 from springbeam.studies.stability.linear import LinearBody, LinearPair, spectral_radius
 
 PAIR = load_scene("soft")

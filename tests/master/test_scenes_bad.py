@@ -11,12 +11,12 @@ import pytest
 import tomli_w
 from commands import refused
 
-from springbeam.scene import load_scene, reference, scene_from_dict, shipped_scenes
+from springbeam.scene import load_scene, messages, scene_from_dict, shipped_scenes
 from springbeam.scene.reading import tomllib
 
 GROUPS = tomllib.loads(Path(__file__).with_name("scenes_bad.toml").read_text(encoding="utf-8"))
 BASE = GROUPS.pop("base")
-SCHEMA = jsonschema.Draft202012Validator(reference.schema())
+SCHEMA = jsonschema.Draft202012Validator(messages.schema())
 #: How each message about syntax ends.
 TOML_IS = "; a line is a [table] or key = value, with numbers like 0.5 or 1e-3 and texts in quotes"
 CASES = {f"{group}-{name}": case for group, cases in GROUPS.items() for name, case in cases.items()}
@@ -152,7 +152,7 @@ def test_the_schema_refuses_it_too(name):
 def test_the_schema_accepts_the_scenes_that_are_shipped_and_begun():
     SCHEMA.check_schema(SCHEMA.schema)
     texts = [
-        reference.beginning('a "scene"'),
+        messages.beginning('a "scene"'),
         *(path.read_text(encoding="utf-8") for path in shipped_scenes().values()),
     ]
     for text in texts:

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from springbeam.bodies.archive import fmu_directory
 from springbeam.cli import app
 from springbeam.results.files import load_summary
-from springbeam.scene import load_scene, reference, scene_keys, shipped_scenes, with_changes
+from springbeam.scene import load_scene, messages, scene_keys, shipped_scenes, with_changes
 from springbeam.scene.reading import tomllib
 from springbeam.studies.metrics import METRICS
 from springbeam.studies.stability.predict import predict
@@ -169,7 +169,7 @@ def test_json_of_a_run_that_stops_early_is_its_summary_and_the_error_is_on_stder
 
 
 def test_keys_has_the_schema_and_the_metrics_too():
-    assert json.loads(printed("keys", "--schema")) == reference.schema()
+    assert json.loads(printed("keys", "--schema")) == messages.schema()
     listed = json.loads(printed("keys", "--metrics", "--json"))
     assert [(m["name"], m["unit"]) for m in listed] == [(name, m.unit) for name, m in METRICS.items()]
     lines = printed("keys", "--metrics").splitlines()

@@ -13,8 +13,7 @@ import typer
 from rich.text import Text
 
 from ..scene import load_scene, shipped_scenes
-from ..scene.messages import nearest
-from ..scene.reference import MODELS
+from ..scene.messages import MODELS, nearest
 from ..studies.tables import number, table
 from .common import (
     BAD_INPUT,
@@ -70,10 +69,10 @@ def keys(
 
     Example: springbeam keys beam
     """
-    from ..scene import reference
+    from ..scene import messages
 
     if schema:
-        print_json(reference.schema())
+        print_json(messages.schema())
         return
     if metrics:
         from ..studies.metrics import METRICS, heading
@@ -83,18 +82,18 @@ def keys(
         for name, m in () if as_json else METRICS.items():
             typer.echo(f"{heading(name)}: {m.words}")
         return
-    found = reference.listed()
+    found = messages.listed()
     if what is not None:
         wanted = re.sub(r"\.\d+", "", what)  # loads.0.frequency is a key of loads
         found = [key for key in found if wanted in (key.table, f"{key.table}.{key.name}".lstrip("."))]
         if not found:
             table, _, name = wanted.partition(".")
-            there = [key.name for key in reference.listed(table)] if table in MODELS else [*filter(None, MODELS)]
+            there = [key.name for key in messages.listed(table)] if table in MODELS else [*filter(None, MODELS)]
             kind, hint = ("key", nearest(name, there)) if table in MODELS else ("table", nearest(table, there))
             fail(BAD_INPUT, f"{what}: unknown {kind}; {hint}allowed: {', '.join(there)}")
     shown: list[Any] = []
     for name, group in groupby(found, lambda key: key.table):
-        title = f"\n{reference.heading(name)}  {reference.about(name)}" if name else reference.heading(name)
+        title = f"\n{messages.heading(name)}  {messages.about(name)}" if name else messages.heading(name)
         shown.append(Text(title, style="bold"))
         for key in group:
             unit = "" if key.unit == "–" else f" [{key.unit}]"
@@ -113,7 +112,7 @@ def new(
 
     Example: springbeam new my_scene
     """
-    from ..scene.reference import beginning
+    from ..scene.messages import beginning
 
     path = Path(name).with_suffix(".toml")
     with bad_input_reported():

@@ -26,8 +26,7 @@ from ..results.steps import joined as are_joined
 from ..results.totals import totals
 from ..results.trajectory import Event, EventKind
 from ..scene import Scene
-from ..scene.automatic import with_scheme_chosen
-from ..scene.resolution import force_window, peak_force_doubt
+from ..scene.resolution import force_window, peak_force_doubt, with_scheme_chosen
 from .adaptive import AdaptiveSteps
 from .detection import Detector
 from .ledger import Balance

@@ -1,16 +1,17 @@
 """What is simulated: scene files, their keys, and what follows from them before anything is built or loaded.
 
 Imports nothing else of the package. Floors, from below: ``tables`` (the keys), ``loads`` (those of ``[[loads]]``, and
-each load as a function of time) → ``statics`` → ``scene`` (all tables) → ``linearised`` (energies and frequencies),
-``messages`` → ``suspicions`` (warnings) → ``rules`` (errors) → ``reading`` (files, overrides; start here) →
-``resolution``, ``automatic``. ``shipped/`` has the scenes that come with the package.
+each load as a function of time; ``recorded`` reads its file) → ``statics`` → ``scene`` (all tables) → ``linearised``
+(energies and frequencies), ``messages`` (keys and errors in words) → ``rules`` (errors and warnings) → ``reading``
+(files, overrides; start here) → ``resolution`` (are steps short enough, which scheme). ``shipped/`` has the scenes that
+come with the package.
 """
 
 from .loads import Load
 from .messages import key_kind, scene_keys
 from .reading import load_scene, parse_value, scene_from_dict, shipped_scenes, with_changes
+from .rules import suspicions
 from .scene import Scene
-from .suspicions import suspicions
 from .tables import Beam, Contact, Coupling, SceneError, Spring, Stop, Time
 
 __all__ = [

@@ -12,9 +12,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from .messages import explain, nearest, one_line
+from .messages import explain, model_of, nearest, one_line
 from .partners import kind_of
-from .reference import model_of
 from .rules import impossible
 from .scene import TABLES, Scene, split_key
 from .tables import PICKED_BY_ACCURACY, SceneError

@@ -22,8 +22,7 @@ from ..run import runner
 from ..run.ledger import CHANGED
 from ..run.outcome import Progress, RunStopped
 from ..scene import Scene, SceneError, with_changes
-from ..scene.automatic import choice
-from ..scene.resolution import STABLE, TURN, joined_frequency, lasting_frequency, slow_oscillations
+from ..scene.resolution import STABLE, TURN, choice, joined_frequency, lasting_frequency, slow_oscillations
 from ..scene.tables import ALL_MODES_UP_TO
 from .metrics import motion_errors, worst
 from .stability.predict import contact_frequency

@@ -29,8 +29,7 @@ from ..results.contact_times import ContactChange, contact_changes
 from ..results.trajectory import TOLD, Trajectory, columns_of
 from ..run.runner import simulate
 from ..scene import Scene, with_changes
-from ..scene.automatic import with_scheme_chosen
-from ..scene.resolution import mesh_frequency, slowest_frequency
+from ..scene.resolution import mesh_frequency, slowest_frequency, with_scheme_chosen
 from .study import Row
 
 Verdict = Literal["agrees", "differs", "not comparable"]

@@ -19,7 +19,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..scene import Load, Scene, SceneError
-from ..scene.reference import unit_of
+from ..scene.messages import unit_of
 from .design import Axis, Sampling, compatible, design, parse_axis
 from .metrics import PRINCIPAL, USUAL, Metric, heading, metrics_of
 from .study import Findings, Pictures, Row, Study

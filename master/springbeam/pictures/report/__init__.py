@@ -18,8 +18,8 @@ import tomli_w
 from ...results.totals import in_words
 from ...results.trajectory import Event, Trajectory, rounded
 from ...scene import Scene
-from ...scene.automatic import with_scheme_chosen
 from ...scene.partners import kind_of
+from ...scene.resolution import with_scheme_chosen
 from ...scene.statics import bending_stiffness, shear_stiffness
 from ..drawing import (
     EVENT_LOOKS,

@@ -37,7 +37,7 @@ from ...run.ledger import EXACT, bounds
 from ...run.outcome import RunStopped
 from ...run.runner import Simulation
 from ...scene import Scene, SceneError, scene_from_dict, with_changes
-from ...scene.automatic import with_scheme_chosen
+from ...scene.resolution import with_scheme_chosen
 from ..comparison import PERTURBATION, initial_speed
 from ..metrics import motion_errors, worst
 from ..study import Findings, Pictures, Row, Study

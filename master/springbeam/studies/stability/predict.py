@@ -15,9 +15,8 @@ from scipy.optimize import brentq
 from ...contact.laws import depth, law_of
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
 from ...scene import Beam, Scene, suspicions
-from ...scene.automatic import choice
 from ...scene.linearised import contact_energy, spring_frequency, spring_stiffness
-from ...scene.resolution import STABLE
+from ...scene.resolution import STABLE, choice
 from ...scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
 from ..design import RIGID, SOFT
 from .linear import LinearBody, LinearPair, spectral_radius
