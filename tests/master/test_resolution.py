@@ -216,6 +216,35 @@ def test_a_beam_that_lags_behind_its_own_waves_is_said(start, rho_inf):
     assert far < 0.01
 
 
+@pytest.mark.parametrize("on", ["tip", "base"])
+@pytest.mark.parametrize("coupling", [{}, {"relative_tolerance": 1e-2}])
+def test_a_table_in_resonance_with_a_mode_that_turns_far_in_a_step_is_said(tmp_path, on, coupling):
+    """The third mode turns 9 rad in each of 12 steps to a period: what drives it is not in their polynomials."""
+    sizes = {"density": 1e3, "area": 0.01, "second_moment_of_area": 8.3e-6, "young_modulus": 1e7, "shear_modulus": 4e6}
+    slender = {**sizes, "n_elements": 8, "reduced_integration": True}
+    beam = scene_from_dict({"time": {"t_end": 1.0}, "beam": slender}).beam
+    first, _, third = modal_beam(beam).omega[:3]
+    end, file = 4.0 * np.pi / first, tmp_path / "table.csv"
+    times = np.linspace(0.0, end, 2000)
+    np.savetxt(file, np.column_stack([times, np.sin(third * times)]), delimiter=",")
+    load = {"on": on, "signal": "table", "file": str(file), "interpolation": "cubic"}
+    scene = scene_from_dict({"time": {"t_end": end}, "beam": slender, "loads": [load]})
+
+    def run(**coupling):
+        return simulate(with_changes(scene, coupling=coupling))
+
+    exact = run(macro_step=end / 1000.0)
+    coarse = run(**coupling or {"macro_step": end / 24.0})
+    off = np.abs(coarse.u_tip - exact.at(coarse.time).u_tip).max() / np.abs(exact.u_tip).max()
+    told = [text for text in coarse.summary["warnings"] if "tables of loads" in text]
+    assert exact.summary["resolved"] is True
+    assert coarse.summary["resolved"] is not bool(told)
+    assert bool(told) == (off > 0.01)
+    if not coupling:
+        assert off > 0.3
+        assert run(macro_step=float(told[0].split("macro_step <= ")[1].split()[0])).summary["resolved"] is True
+
+
 @pytest.mark.parametrize(("size", "degree"), [(1e-3, 0), (1e-3, 2), (7.8125e-4, 2)])
 def test_a_contact_that_is_not_resolved_is_said(size, degree):
     """60 rad a step (u_tip 11 % off); with 128 steps of degree 2 no row is in contact, only what lies between them."""

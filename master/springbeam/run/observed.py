@@ -15,6 +15,7 @@ from ..results.trajectory import Event
 from ..scene import Scene
 from ..scene.resolution import SHORT, SHORT_IMPULSE, not_resolved, slowest_frequency
 from ..scene.statics import tip_inertia
+from .averaged import left_out
 from .misplaced import misplaced
 from .stepping import Pair
 
@@ -57,7 +58,7 @@ def why_not_resolved(
     lasted = shortest_contact(steps, events, SHORT * H, least, free_at_end=free_at_end)
     sizes = steps["size"][steps["size"] > 0.0]
     late = float(np.sqrt(np.mean(sizes**3) / np.mean(sizes))) if scene.coupling.adaptive and len(sizes) else None
-    return not_resolved(scene, seen.misplaced, shortest_contact=lasted, H=late)
+    return not_resolved(scene, seen.misplaced, shortest_contact=lasted, left_out=left_out(scene, steps), H=late)
 
 
 def _momenta(scene: Scene, pair: Pair, steps: np.ndarray) -> tuple[float, float]:

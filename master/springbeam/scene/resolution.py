@@ -28,6 +28,8 @@ LAG = 0.12
 #: law, a tie. At degree 0 of a soft law that is known to some tenths of itself. Else it leaves out what the force feels
 #: of fast waves; and of ends that part, what these decide from one step to the next.
 MISPLACED, MISPLACED_TIED = (0.006, 0.002, 0.001), (0.0025, 0.002, 0.001)
+#: Share of its way by which what the steps leave out of measured loads may move an end; that is known to a factor of 3.
+LEFT_OUT = 0.01
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
 #: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
 STABLE = 3.0
@@ -54,11 +56,17 @@ class _Seen(NamedTuple):
 
     misplaced: float
     shortest_contact: float
+    left_out: float
     H: float | None
 
 
 def not_resolved(
-    scene: Scene, misplaced: float = 0.0, *, shortest_contact: float = inf, H: float | None = None
+    scene: Scene,
+    misplaced: float = 0.0,
+    *,
+    shortest_contact: float = inf,
+    left_out: float = 0.0,
+    H: float | None = None,
 ) -> str | None:
     """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
 
@@ -71,12 +79,16 @@ def not_resolved(
     shortest_contact
         How long the shortest contact, touch or rest on the foundation has lasted [s]; of a soft law it counts where the
         force is exchanged once per macro step.
+    left_out
+        How far what the steps leave out of tables moves an end, over its way.
     H
         Steps of one length that make waves as late as those of the run [s]; needed if these follow from tolerances.
     """
     # Steps that follow from tolerances are judged by their error, which does not tell of waves inside a beam.
     of_steps = _OF_STEPS[-1:] if scene.coupling.adaptive else _OF_STEPS
-    return next(told(scene, (*of_steps, *_OF_CONTACT), _Seen(misplaced, shortest_contact, H)), None)
+    return next(
+        told(scene, (*of_steps, _OF_LOADS, *_OF_CONTACT), _Seen(misplaced, shortest_contact, left_out, H)), None
+    )
 
 
 def lateness(scene: Scene, turn: float) -> float:
@@ -114,11 +126,8 @@ def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
     raises &= scene.beam is None or scene.beam.integrator == "modal"
     if scene.contact.rigid and scene.contact.impact != "inelastic":
         remedy = f'impact = "{scene.contact.impact}" leaves their velocities apart, "inelastic" does not'
-    elif coupling.adaptive:
-        remedy = "smaller tolerances resolve it"
     else:
-        size = _rounded_down(coupling.H / sqrt(excess))
-        remedy = f"coupling.macro_step <= {size} resolves it{_HIGHER if raises else ''}"
+        remedy = _shorter(scene, sqrt(excess)) + (_HIGHER if raises and not coupling.adaptive else "")
     far = f"about {100.0 * seen.misplaced:.2g} %" if seen.misplaced <= 1.0 else "more than all"
     return {"far": far, "remedy": remedy}
 
@@ -228,6 +237,13 @@ def slow_oscillations(scene: Scene) -> list[tuple[str, float, str]]:
     return found
 
 
+def _shorter(scene: Scene, times: float) -> str:
+    """Return what makes steps ``times`` as short."""
+    if scene.coupling.adaptive:
+        return "smaller tolerances resolve it"
+    return f"coupling.macro_step <= {_rounded_down(scene.coupling.H / times)} resolves it"
+
+
 def _rounded_down(size: float) -> str:
     """Return ``size`` [s] in two digits, rounded down."""
     return f"{0.95 * size:.1e} s"
@@ -259,6 +275,13 @@ _OF_STEPS = (
         "coupling.macro_step <= {size} resolves them, beam.alpha_b > 0 lets them die out, and "
         'beam.integrator = "modal" is exact',
     ),
+)
+#: How steps may miss loads whose frequencies the scene does not give.
+_OF_LOADS = Rule(
+    lambda s, seen: seen.left_out > LEFT_OUT,
+    "not resolved: what the steps leave out of the tables of loads moves an end by about {far:.2g} % of its way, since "
+    "a mode of it turns far in a step; {remedy}",
+    lambda s, seen: {"far": 100.0 * seen.left_out, "remedy": _shorter(s, (seen.left_out / LEFT_OUT) ** (1.0 / 3.0))},
 )
 #: How steps may miss what joins the ends.
 _OF_CONTACT = (
