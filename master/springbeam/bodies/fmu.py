@@ -226,14 +226,6 @@ class Fmu:
             raise self.failed(status, f"cannot step at t = {time:.9g} s")
         self._worst = max(self._worst, status)
         cause = self._cause(f"{self._slave.PREFIX}DoStep returned {_STATUS[status]}")
-        if status == DISCARD:
-            try:
-                cause += f" (reached t = {self._slave.reached():.9g} s)"
-            except OSError:
-                pass  # many lack the function that tells
-            except FMICallException as error:
-                if error.status >= ERROR:
-                    raise self.failed(error.status, f"{cause}, and does not say how far it came") from None
         # Also after fmi2Error a saved state may be restored and the step tried again (FMI 2.0.4, section 2.1.3).
         raise StepRefused(f"{self._name}: {cause}")
 

@@ -61,7 +61,6 @@ class Slave:
     dll: Any
     instanceName: str
     _log: Log
-    _reached: c_double  #: how far a step came that was discarded [s]
 
     def __init__(self, description: ModelDescription, folder: Path) -> None:
         identifier, here = description.coSimulation.modelIdentifier, Path.cwd()
@@ -74,7 +73,7 @@ class Slave:
     def instance(self, name: str, log: Log) -> Self:
         """Return an instance, whose messages ``log`` takes. Raises whatever FMPy does if the FMU makes none."""
         made = copy(self)
-        made.instanceName, made._log, made._reached = name, log, c_double()
+        made.instanceName, made._log = name, log
         made.make()
         return made
 
@@ -109,10 +108,6 @@ class Slave:
         there = byref(values) if isinstance(values, Array) else values
         return self.bound(verb + self.REAL, byref(references), c_size_t.from_param(len(references)), there)
 
-    def reached(self) -> float:
-        """Return how far a step came that was discarded [s]."""
-        return self._reached.value
-
 
 class FMU2(Slave, fmi2.FMU2Slave):  # type: ignore[misc]
     """An FMU of FMI 2.0."""
@@ -138,10 +133,6 @@ class FMU2(Slave, fmi2.FMU2Slave):  # type: ignore[misc]
         """Return what makes a step; a step that does not come to its end is discarded."""
         return self.bound("DoStep", time, size, c_int.from_param(0))
 
-    def reached(self) -> float:
-        reached: float = self.getRealStatus(fmi2.fmi2LastSuccessfulTime)
-        return reached
-
 
 class FMU3(Slave, fmi3.FMU3Slave):  # type: ignore[misc]
     """An FMU of FMI 3.0: events stay inside it, and a step goes to its end.
@@ -164,8 +155,8 @@ class FMU3(Slave, fmi3.FMU3Slave):  # type: ignore[misc]
         return partial(accessor, c_size_t.from_param(n_values))
 
     def stepping(self, time: c_double, size: c_double) -> Call:
-        event, end, early = c_bool(), c_bool(), c_bool()
-        out = (byref(event), byref(end), byref(early), byref(self._reached))
+        event, end, early, reached = c_bool(), c_bool(), c_bool(), c_double()
+        out = (byref(event), byref(end), byref(early), byref(reached))
         call = self.bound("DoStep", time, size, c_bool(False), *out)
 
         def step() -> int:
