@@ -1,5 +1,7 @@
 """The error that a step tells of itself, which chooses adaptive steps, and events that crowd."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 from bodies import DuffingBody, Upper
@@ -28,17 +30,14 @@ def test_the_moment_inside_and_the_work_on_it_are_those_of_the_gap(degree):
     assert force.work(c, end, H) == pytest.approx(work, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("apart", "most", "words"),
-    [(0.0, 500, "500 events at once"), (1.9e-9, 500, "500 events at once"), (2.1e-9, 20_000, "20000 .*within a macro")],
-)
-def test_events_that_crowd_stop_the_run(apart, most, words):
-    """500 at once, which is within 1e-6 H, or 20,000 within a macro step, are none too many."""
-    H = 1e-3
+@pytest.mark.parametrize("apart", [0.0, 4.9e-5, 5.1e-5])
+def test_events_that_crowd_stop_the_run(apart):
+    """20,000 within a macro step are none too many, and as many in each of two."""
+    H, most = 1e-3, 20_000
     state = State(0.0, (Motion(0.0, 0.0, 0.0, 0.0),) * 2)
     for k in range(most):
         state.count_cut(apart * k * H, apart * H, H)
-    with pytest.raises(RunStopped, match=words):
+    with pytest.raises(RunStopped, match=r"20000 .*within a macro") if apart < 5e-5 else nullcontext():
         state.count_cut(apart * most * H, apart * H, H)
 
 

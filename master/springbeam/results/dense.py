@@ -29,7 +29,7 @@ from numpy.polynomial.polynomial import polyval
 
 from ..scene import Scene
 from .columns import columns
-from .paths import Path
+from .paths import Path, derivative, sign_changes, value
 from .steps import joined
 from .trajectory import Event, Trajectory
 
@@ -51,11 +51,7 @@ _DEGREE = 5
 _BERNSTEIN = np.array(
     [[comb(i, k) / comb(_DEGREE, k) if k <= i else 0.0 for k in range(_DEGREE + 1)] for i in range(_DEGREE + 1)]
 )
-#: Bernstein coefficients on [0, ½] from those on [0, 1], by de Casteljau; turned about, those on [½, 1].
-_FIRST_HALF = np.array(
-    [[comb(i, k) / 2.0**i if k <= i else 0.0 for k in range(_DEGREE + 1)] for i in range(_DEGREE + 1)]
-)
-#: Values that differ by less than this share of the largest one are alike: well above what halving rounds off.
+#: Values that differ by less than this share of the largest one are alike: well above what rounding leaves.
 _ALIKE = 1e-13
 
 
@@ -130,9 +126,9 @@ def extremes(scene: Scene, steps: np.ndarray, name: str) -> Extremes:
         before, size = steps[after - 1], steps["size"][after]
         powers = motion(scene, before, steps[after])[name]
         for place, sign in ((0, 1.0), (2, -1.0)):
-            value, step, share = _lowest(sign * powers, below=sign * found[place])
+            lowest, step, share = _lowest(sign * powers, below=sign * found[place])
             if step >= 0:
-                found[place : place + 2] = sign * value, float(before["time"][step] + share * size[step])
+                found[place : place + 2] = sign * lowest, float(before["time"][step] + share * size[step])
     return Extremes(*found)
 
 
@@ -212,8 +208,8 @@ def _impulses(after: np.ndarray, events: Sequence[Event]) -> np.ndarray:
 def _lowest(powers: np.ndarray, below: float) -> tuple[float, int, float]:
     """Return the lowest value on [0, 1] of any of n polynomials, which one has it, and where.
 
-    The number is -1 if none is lower than ``below``, but for rounding. Steps are halved as long as their Bernstein
-    coefficients leave room for a value lower than the lowest one found.
+    The number is -1 if none is lower than ``below``, but for rounding. The minima are looked for where the Bernstein
+    coefficients, which enclose a polynomial, leave room for a value lower than the lowest one found.
 
     Parameters
     ----------
@@ -223,16 +219,16 @@ def _lowest(powers: np.ndarray, below: float) -> tuple[float, int, float]:
         A value that is known.
     """
     best, step, share = below, -1, 0.0
-    coefficients = _BERNSTEIN @ powers
-    number, begin = np.arange(coefficients.shape[1]), np.zeros(coefficients.shape[1])
-    width, tolerance = 1.0, _ALIKE * float(np.abs(coefficients).max(initial=0.0))
-    while number.size:
-        ends = coefficients[-1]  # where it begins another one ends, or there is a row
-        if ends.min() < best:
-            at = int(np.argmin(ends))
-            best, step, share = float(ends[at]), int(number[at]), float(begin[at]) + width
-        room = coefficients.min(axis=0) < best - tolerance
-        coefficients, number, begin, width = coefficients[:, room], number[room], begin[room], 0.5 * width
-        coefficients = np.hstack([_FIRST_HALF @ coefficients, (_FIRST_HALF @ coefficients[::-1])[::-1]])
-        number, begin = np.tile(number, 2), np.concatenate([begin, begin + width])
-    return (best, step, share) if best < below - tolerance else (below, -1, 0.0)
+    enclosing = _BERNSTEIN @ powers
+    floors, tolerance = enclosing.min(axis=0), _ALIKE * float(np.abs(enclosing).max(initial=0.0))
+    for i in np.argsort(floors).tolist():
+        if floors[i] >= best - tolerance:
+            break
+        path = powers[:, i].tolist()
+        for s in (
+            *sign_changes(derivative(path), 0.0, 1.0),
+            1.0,
+        ):  # where it begins another one ends, or there is a row
+            if value(path, s) < best - tolerance:
+                best, step, share = value(path, s), i, s
+    return best, step, share

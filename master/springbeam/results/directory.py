@@ -8,7 +8,6 @@ each of them.
 from __future__ import annotations
 
 import os
-import tempfile
 from contextlib import suppress
 from itertools import chain, count
 from pathlib import Path
@@ -112,7 +111,7 @@ class RunDirectory:
         ResultsInUse
             If another process is writing them.
         OSError
-            If the directory cannot be made or written to.
+            If the directory cannot be made.
         """
         directory = cls(path)
         directory.path.mkdir(parents=True, exist_ok=True)
@@ -121,11 +120,6 @@ class RunDirectory:
         if results and not replace:
             directory.release()
             raise ResultsExist(f"{directory.path} already holds results ({results[0].name})")
-        try:
-            tempfile.TemporaryFile(dir=directory.path).close()
-        except OSError as error:
-            directory.discard()
-            raise OSError(error.errno, error.strerror, str(directory.path)) from error
         return directory
 
     @classmethod

@@ -49,7 +49,7 @@ def write_rows(run: RunDirectory, blocks: Iterable[Mapping[str, np.ndarray]]) ->
 
 
 def write_summary(run: RunDirectory, summary: Mapping[str, Any]) -> None:
-    """Replace ``summary.json``; where room was kept for it (`part_of`), also when the disk is full."""
+    """Replace ``summary.json``. Raises OSError; the file is then as before."""
     with replaced(run.summary) as file:
         file.write(as_json(summary) + b"\n")
 
@@ -59,19 +59,13 @@ def as_json(document: Any) -> bytes:
     return to_json(document, indent=2, inf_nan_mode="strings", fallback=lambda value: value.tolist())
 
 
-def part_of(path: Path) -> Path:
-    """Return the file in which ``path`` is written before it takes its place."""
-    return path.with_name(f"{path.name}.part")
-
-
 @contextmanager
 def replaced(path: Path) -> Iterator[BinaryIO]:
     """Open a file that takes the place of ``path`` once it is written; if that fails, the file is as before."""
-    part = part_of(path)
+    part = path.with_name(f"{path.name}.part")
     try:
-        with part.open("r+b" if part.exists() else "wb") as file:
+        with part.open("wb") as file:
             yield file
-            file.truncate()
         os.replace(part, path)
     except BaseException:
         with suppress(OSError):
@@ -88,19 +82,19 @@ def load_trajectory(directory: str | Path) -> Trajectory:
     Raises
     ------
     ResultsUnreadable
-        If a file is missing, is not what a run writes, or not what this one has written.
+        If a file is missing, was cut, or is not what a run writes.
     """
     run = RunDirectory(directory)
     refuse_cut(run, load_summary(run.path).get("files", {}))
     return read_run(run)
 
 
-def refuse_cut(run: RunDirectory, written: Mapping[str, int], *, longer: bool = False) -> None:
-    """Raise ResultsUnreadable if a file is not as long as it was ``written`` [bytes], or ``longer`` where it may be."""
+def refuse_cut(run: RunDirectory, written: Mapping[str, int]) -> None:
+    """Raise ResultsUnreadable if a file is missing or shorter than it was ``written`` [bytes]."""
     found = run.sizes()
     for name, size in written.items():
         there = found.get(name, -1)
-        if there < size or (there > size and not longer):
+        if there < size:
             remedy = f"; springbeam export {run.path} writes it again" if name == run.trajectory.name else ""
             said = "missing" if there < 0 else f"{there} bytes"
             raise ResultsUnreadable(f"{run.path / name}: {said}, {size} bytes were written{remedy}")
@@ -136,10 +130,8 @@ def load_summary(directory: str | Path) -> dict[str, Any]:
     path = RunDirectory(directory).summary
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ResultsUnreadable(f"{path}: missing; {directory} is not a run directory") from None
     except OSError as error:
-        raise ResultsUnreadable(f"{path}: {error.strerror}") from error
+        raise ResultsUnreadable(f"{path}: {error.strerror}; {directory} is not a run directory") from error
     except ValueError as error:
         raise ResultsUnreadable(f"{path}: not JSON: {error}") from error
     if not isinstance(summary, dict) or not isinstance(summary.get("scene"), dict):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from io import FileIO
@@ -16,16 +15,13 @@ from ..scene import Scene
 from .columns import blocks, trajectory_of
 from .dense import at_multiples
 from .directory import RunDirectory
-from .files import event_lines, lines, load_events, part_of, read_run, refuse_cut, write_rows, write_summary
+from .files import event_lines, lines, load_events, read_run, refuse_cut, write_rows, write_summary
 from .steps import STEP
 from .trajectory import EVENT_COLUMNS, SHAPE_COLUMNS, Event, Trajectory
 
-#: Bytes kept free for the last summary; longer ones are written if the disk has room.
-_SUMMARY_ROOM = 16384
 
-
-class Recorder(ABC):
-    """What a run reports to: any number of blocks, then ``finish``.
+class MemoryRecorder:
+    """What a run reports to, any number of blocks and then ``finish``: everything is kept in memory.
 
     Parameters
     ----------
@@ -35,8 +31,10 @@ class Recorder(ABC):
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
+        self._steps, self._shapes = [np.empty(0, STEP)], [np.empty((0, len(SHAPE_COLUMNS)))]
+        self._events: list[Event] = []
+        self._summary: dict[str, Any] = {}
 
-    @abstractmethod
     def keep(self, steps: np.ndarray, events: Sequence[Event], shapes: np.ndarray) -> None:
         """Keep the next steps of the run.
 
@@ -49,62 +47,35 @@ class Recorder(ABC):
         shapes
             The beam's shapes at some of them: the numbers of `SHAPE_COLUMNS`, shape (m, 64).
         """
+        self._steps.append(steps)
+        self._events += events
+        self._shapes.append(shapes)
 
-    @abstractmethod
     def steps(self) -> np.ndarray:
         """Return the records kept so far, shape (n,)."""
+        self._steps = [np.concatenate(self._steps)]
+        return self._steps[0]
 
-    @abstractmethod
     def events(self) -> list[Event]:
         """Return the events kept so far."""
+        return list(self._events)
 
-    @abstractmethod
     def trajectory(self) -> Trajectory:
         """Return everything kept so far."""
+        shapes = None if self.scene.beam is None else np.concatenate(self._shapes)
+        return trajectory_of(self.scene, self.steps(), self.events(), shapes, dict(self._summary))
 
-    @abstractmethod
     def finish(self, summary: Mapping[str, Any]) -> None:
         """End the record with ``summary``, which is JSON-like; the scene as run is added.
 
         The command line reports ``status`` (``done``, ``stopped``, ``interrupted``), ``macro_steps``, ``wall_time``
         [s], ``max_energy_residual`` (relative) and ``warnings`` (list of str), those that are there.
         """
-
-    def _with_scene(self, summary: Mapping[str, Any]) -> dict[str, Any]:
-        return {**summary, "scene": self.scene.model_dump(exclude_none=True)}
+        self._summary = _with_scene(summary, self.scene)
 
 
-class MemoryRecorder(Recorder):
-    """Keeps everything in memory."""
-
-    def __init__(self, scene: Scene) -> None:
-        super().__init__(scene)
-        self._steps, self._shapes = [np.empty(0, STEP)], [np.empty((0, len(SHAPE_COLUMNS)))]
-        self._events: list[Event] = []
-        self._summary: dict[str, Any] = {}
-
-    def keep(self, steps: np.ndarray, events: Sequence[Event], shapes: np.ndarray) -> None:
-        self._steps.append(steps)
-        self._events += events
-        self._shapes.append(shapes)
-
-    def steps(self) -> np.ndarray:
-        self._steps = [np.concatenate(self._steps)]
-        return self._steps[0]
-
-    def events(self) -> list[Event]:
-        return list(self._events)
-
-    def trajectory(self) -> Trajectory:
-        shapes = None if self.scene.beam is None else np.concatenate(self._shapes)
-        return trajectory_of(self.scene, self.steps(), self.events(), shapes, dict(self._summary))
-
-    def finish(self, summary: Mapping[str, Any]) -> None:
-        self._summary = self._with_scene(summary)
-
-
-class FileRecorder(Recorder):
-    """Streams into a `RunDirectory` and keeps nothing, so that memory does not grow with the run.
+class FileRecorder:
+    """Streams what `MemoryRecorder` keeps into a `RunDirectory`, so that memory does not grow with the run.
 
     Records are appended a block at a time, after their events and shapes: a run that is killed loses no more than that,
     and ``summary.json`` says from the start which scene they belong to. Rows are made from the records at the end.
@@ -115,7 +86,7 @@ class FileRecorder(Recorder):
     Parameters
     ----------
     scene
-        As of `Recorder`.
+        As of `MemoryRecorder`.
     directory
         Where the results go (`RunDirectory.create`).
     interval
@@ -123,8 +94,7 @@ class FileRecorder(Recorder):
     """
 
     def __init__(self, scene: Scene, directory: RunDirectory, interval: float | None = None) -> None:
-        super().__init__(scene)
-        self.directory, self.interval = directory, interval
+        self.scene, self.directory, self.interval = scene, directory, interval
         self._finished = False
         #: The first line of each file that grows, in the order in which they do.
         self._headers = {directory.events: lines([EVENT_COLUMNS]), directory.steps: b""}
@@ -154,6 +124,7 @@ class FileRecorder(Recorder):
         return float(self.steps()["time"][-1:].sum())
 
     def keep(self, steps: np.ndarray, events: Sequence[Event], shapes: np.ndarray) -> None:
+        """See `MemoryRecorder.keep`. Raises OSError."""
         self._begin()
         directory = self.directory
         if directory.shapes in self._files:
@@ -182,7 +153,7 @@ class FileRecorder(Recorder):
         self._end({name: run.summary[name] for name in run.summary.keys() - {"scene", "files"}}, [columns])
 
     def finish(self, summary: Mapping[str, Any]) -> None:
-        """See `Recorder.finish`. Raises OSError."""
+        """See `MemoryRecorder.finish`. Raises OSError."""
         self._begin()
         steps = self.steps()
         if self.interval is None or not len(steps):
@@ -196,7 +167,7 @@ class FileRecorder(Recorder):
         try:
             write_rows(self.directory, rows)
         finally:  # also where the disk has no room for them
-            write_summary(self.directory, self._with_scene({**summary, "files": self.directory.sizes()}))
+            write_summary(self.directory, _with_scene({**summary, "files": self.directory.sizes()}, self.scene))
             if summary.get("status") == "done":
                 self.directory.checkpoint.unlink(missing_ok=True)
 
@@ -227,7 +198,7 @@ class FileRecorder(Recorder):
             If another process is writing them.
         """
         self.directory.claim()
-        refuse_cut(self.directory, saved, longer=True)
+        refuse_cut(self.directory, saved)
         self._open()
         for path, file in self._files.items():
             file.truncate(saved[path.name])
@@ -235,14 +206,9 @@ class FileRecorder(Recorder):
         self._say_it_runs()
 
     def _begin(self) -> None:
-        """Remove earlier results and write the files with their headers, once the disk has room for them."""
+        """Remove earlier results and write the files with their headers."""
         if self._files:
             return
-        try:
-            self._reserve_summary()
-        except OSError:
-            part_of(self.directory.summary).unlink(missing_ok=True)
-            raise
         for file in self.directory.results():
             file.unlink()
         self._open()
@@ -254,12 +220,10 @@ class FileRecorder(Recorder):
         self._files = {path: path.open("ab", buffering=0) for path in self._headers}
 
     def _say_it_runs(self) -> None:
-        write_summary(self.directory, self._with_scene({"status": "running"}))
-        self._reserve_summary()
+        write_summary(self.directory, _with_scene({"status": "running"}, self.scene))
 
-    def _reserve_summary(self) -> None:
-        """Keep room on the disk for the last summary, which has to be written also when the disk is full."""
-        part_of(self.directory.summary).write_bytes(b" " * _SUMMARY_ROOM)
+
+Recorder = MemoryRecorder | FileRecorder
 
 
 def save(run: Trajectory, directory: str | Path, *, replace: bool) -> Path:
@@ -268,6 +232,10 @@ def save(run: Trajectory, directory: str | Path, *, replace: bool) -> Path:
     with FileRecorder(run.scene, target) as recorder:
         recorder.write(run)
     return target.path
+
+
+def _with_scene(summary: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
+    return {**summary, "scene": scene.model_dump(exclude_none=True)}
 
 
 def _append(file: FileIO, content: bytes) -> None:

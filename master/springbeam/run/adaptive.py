@@ -34,7 +34,6 @@ class Adapted(Memory):
     """The size of the next step, and how far the motion has come."""
 
     ways: list[tuple[float, float]]  #: lowest and highest position of each end [m]
-    fastest: float = 0.0  #: [m/s]
     energy: float = 0.0  #: the largest [J]
     number: int = _FIRST * _PER_OCTAVE  #: k of the size
     just_rejected: bool = False
@@ -85,8 +84,8 @@ class AdaptiveSteps(Stateful):
         self.state.energy = max(energy, self.state.energy)
 
     def accept(self, step: Step) -> None:
-        """Note how far and how fast ``step``, which is made, has moved the ends."""
-        self.state.ways, self.state.fastest = self._ways(step), self._fastest(step)
+        """Note how far ``step``, which is made, has moved the ends."""
+        self.state.ways = self._ways(step)
 
     def holds(self, state: State, step: Step, refused: str, *, to_kink: bool = False) -> bool:
         """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set.
@@ -142,7 +141,8 @@ class AdaptiveSteps(Stateful):
         if not spans:
             return 0.0, _CUBIC
         span, pair = min(spans), self._pair
-        scales = Scales(span, self._fastest(step), self.state.energy, pair.reduced_mass(Phase()))
+        fastest = max(state.fastest, *(abs(end.velocity) for end in step.end))
+        scales = Scales(span, fastest, self.state.energy, pair.reduced_mass(Phase()))
         tolerance = self._relative + self._absolute / span
         told = pair.coupling(state.phase).local_errors(step, scales)
         return max((curve, _CUBIC), *((error / tolerance, order) for error, order in told)) if told else (curve, _CUBIC)
@@ -154,6 +154,3 @@ class AdaptiveSteps(Stateful):
             (min(low, a.displacement, b.displacement), max(high, a.displacement, b.displacement))
             for (low, high), a, b in told
         ]
-
-    def _fastest(self, step: Step) -> float:
-        return max(self.state.fastest, *(abs(end.velocity) for end in (*step.start, *step.end)))

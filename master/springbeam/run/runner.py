@@ -5,7 +5,6 @@ from __future__ import annotations
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from math import inf
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -62,7 +61,7 @@ class Simulation:
         lower: Body | None = None,
     ) -> None:
         began = perf_counter()
-        _refuse_accuracy(scene, upper, lower)
+        _refuse_accuracy(scene)
         self.scene, self.recorder = scene, recorder or MemoryRecorder(scene)
         of_scene = _without_own(scene, upper=upper, lower=lower)
         start_time = 0.0 if upper is not None else scene.contact_time or 0.0
@@ -80,18 +79,13 @@ class Simulation:
         self._summary: dict[str, Any] = {}  #: of the run when it has ended
 
     def _go_on(self, start: Checkpoint) -> None:
-        recorder = self._in_directory()
+        assert isinstance(self.recorder, FileRecorder), "the results of a checkpoint are in its directory"
         try:
             self._master.go_on(start.state)
         except ValueError as error:
-            path = recorder.directory.checkpoint
+            path = self.recorder.directory.checkpoint
             raise CheckpointRefused(f"{path}: written by another version: {error}") from error
-        recorder.restore(start.results)
-
-    def _in_directory(self) -> FileRecorder:
-        if not isinstance(self.recorder, FileRecorder):
-            raise TypeError("a run with checkpoints has its results in a directory")
-        return self.recorder
+        self.recorder.restore(start.results)
 
     def __enter__(self) -> Simulation:
         return self
@@ -136,9 +130,9 @@ class Simulation:
 
     def finish(self, progress: Progress | None = None, seconds: float | None = None) -> dict[str, Any]:
         """Make all steps that are left and return the summary. Raises RunStopped; parameters as of `run`."""
-        master, due = self._master, inf
+        master, recorder, due = self._master, self.recorder, 0.0
         if seconds is not None:
-            recorder, due = self._in_directory(), 0.0
+            assert isinstance(recorder, FileRecorder), "a run with checkpoints has its results in a directory"
             _refuse_checkpoints(self.scene)
             files = fingerprints(self.scene)
         with self._ending():
@@ -146,7 +140,7 @@ class Simulation:
                 master.step()
                 if progress is not None:
                     progress(master.state.time, master.state.phase.name, master.state.macro_steps)
-                if seconds is not None and perf_counter() >= due:
+                if isinstance(recorder, FileRecorder) and seconds is not None and perf_counter() >= due:
                     master.hand_over()
                     kept, state = recorder.save(), master.run_state()
                     begun = self.scene, __version__, files, seconds, self._wall_time(), recorder.interval
@@ -293,19 +287,14 @@ def simulate(
         return simulation.run
 
 
-def _refuse_accuracy(scene: Scene, upper: Body | None, lower: Body | None) -> None:
+def _refuse_accuracy(scene: Scene) -> None:
     """Raise SceneError if ``scene`` asks for an accuracy, which is kept by settings that are picked before."""
-    if scene.accuracy is None:
-        return
-    if (upper or lower) is not None:
+    if scene.accuracy is not None:
         raise SceneError(
-            f"accuracy = {scene.accuracy:g}: is kept by pilot runs, and a body of your own can be run once; give "
-            "coupling.scheme, degree and macro_step instead"
+            f"accuracy = {scene.accuracy:g}: is kept by settings that pilot runs pick, and a body of your own can be "
+            "run once; run springbeam.studies.accuracy.pick(scene).scene, or give coupling.scheme, degree and "
+            "macro_step instead"
         )
-    raise SceneError(
-        f"accuracy = {scene.accuracy:g}: the settings that keep it are not picked yet; run "
-        "springbeam.studies.accuracy.pick(scene).scene, or take accuracy out"
-    )
 
 
 def _refuse_checkpoints(scene: Scene) -> None:

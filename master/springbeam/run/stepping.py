@@ -15,11 +15,10 @@ from ..scene import Scene
 from .loads import Loads
 from .outcome import RunStopped
 
-#: Events closer than this fraction of H are at once; so many of them and the contact is said to chatter. Impacts that
-#: die out are up to 370 (e = 0.997) between this and `_NO_TIME` of `springbeam.run.detection`, where they are seated.
-SIMULTANEOUS, _MAX_SIMULTANEOUS = 1e-6, 500
-#: Events within H. Impacts that die out are up to 18,000 (e = 0.999); those of a lossy body on a lossless stop are
-#: without end.
+#: Events closer than this fraction of H are at once.
+SIMULTANEOUS = 1e-6
+#: Events within H; more of them and the contact is said to chatter. Impacts that die out are up to 18,000 (e = 0.999);
+#: those of a lossy body on a lossless stop are without end.
 _MAX_IN_STEP = 20_000
 #: The force of a step is continued over at most this many times its size; beyond, its end value is held.
 _REACH_OF_FORCE = 4.0
@@ -44,8 +43,7 @@ class State(Memory):
     begun: bool = False  #: whether the row of the start is made
     energy_at_start: float = 0.0  #: before an impact there [J]
     last_opening: float = -inf  #: when a contact or a rest was last let go [s]
-    #: Steps cut by events at once, and within one macro step: how many, and since when [s].
-    at_once: tuple[int, float] = (0, -inf)
+    #: Steps cut by events within one macro step: how many, and since when [s].
     in_step: tuple[int, float] = (0, -inf)
     macro_steps: int = 0
     events: int = 0
@@ -65,10 +63,8 @@ class State(Memory):
 
     def count_cut(self, end: float, size: float, macro_step: float) -> None:
         """Count a step of ``size`` [s] that was cut and ends at ``end`` [s]. Raises RunStopped if events crowd."""
-        self.at_once = _counted(self.at_once, end, SIMULTANEOUS * macro_step)
-        self.in_step = _counted(self.in_step, end, macro_step)
-        if self.at_once[0] > _MAX_SIMULTANEOUS:
-            raise RunStopped(f"the contact chatters: {_MAX_SIMULTANEOUS} events at once", end - size)
+        number, since = self.in_step
+        self.in_step = (number + 1, since) if end - since <= macro_step else (1, end)
         if self.in_step[0] > _MAX_IN_STEP:
             raise RunStopped(
                 f"the contact chatters: {_MAX_IN_STEP} events within a macro step of {macro_step:g} s; a restitution "
@@ -87,11 +83,6 @@ class State(Memory):
             self.contact = NO_FORCE
         if not phase.seated:
             self.foundation = NO_FORCE
-
-
-def _counted(events: tuple[int, float], end: float, span: float) -> tuple[int, float]:
-    number, since = events
-    return (number + 1, since) if end - since <= span else (1, end)
 
 
 #: In place of a body that the scene does not have: at rest at 0.
