@@ -19,7 +19,7 @@ from springbeam.scene import Scene
 from springbeam.scene.resolution import choice
 from springbeam.studies import rivals, tradeoff
 from springbeam.studies.metrics import worst
-from springbeam.studies.study import Row, record_all
+from springbeam.studies.study import Row, record_all, troubles
 from springbeam.studies.tables import number
 from springbeam.studies.tradeoff import Tradeoff, cheapest
 
@@ -85,7 +85,7 @@ def main(names: list[str]) -> None:
         scene = with_changes(load_scene(window.scene), **window.changes)
         study = Tradeoff.of(scene, window.until)
         records = record_all(study)
-        rows, remarks = study.rows(records), study.notes(records)
+        rows, remarks = study.rows(records), troubles(records)
         study.draw(records)["tradeoff"].savefig(IMAGES / f"tradeoff-{name}.png", dpi=110)
         shrink(IMAGES / f"tradeoff-{name}.png")
         notes = [f"* {note}" for note in remarks]

@@ -3,7 +3,9 @@
 import os
 import subprocess
 from functools import cache
+from pathlib import Path
 
+import pyarrow.parquet as parquet
 import typer
 from typer import testing
 from typer.testing import CliRunner
@@ -64,3 +66,8 @@ class Interrupt:
         self.left -= 1
         if self.left == 0:
             raise KeyboardInterrupt
+
+
+def swept(directory):
+    """The columns of a finished sweep."""
+    return parquet.read_table(Path(directory, "sweep.parquet")).to_pydict()

@@ -24,7 +24,7 @@ from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
 from springbeam.run.outcome import RunStopped
 from springbeam.scene import Beam
-from springbeam.studies.stability.linear import impulse_integrals
+from springbeam.studies.stability.predict import impulse_integrals
 
 
 class Double(Body):

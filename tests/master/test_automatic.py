@@ -8,7 +8,7 @@ from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam
 from springbeam.scene.linearised import spring_frequency
 from springbeam.scene.resolution import STABLE, choice, mesh_frequency, slowest_frequency, with_scheme_chosen
-from springbeam.studies.stability.linear import LinearBody, LinearPair, spectral_radius
+from springbeam.studies.stability.predict import LinearBody, LinearPair, spectral_radius
 
 PAIR = load_scene("soft")
 

@@ -16,7 +16,8 @@ from springbeam.monolithic.laws import Phase, Watch, law_of
 from springbeam.monolithic.oscillators import GAUSS
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.scene import Beam, load_scene, with_changes
-from springbeam.studies import exact, verify
+from springbeam.studies import verify
+from springbeam.studies.verify import laws
 from springbeam.studies.verify.alone import clamped_free_frequencies
 
 
@@ -100,7 +101,7 @@ def test_soft_agrees_with_extended_precision():
         assert (event.z, event.v_tip) == pytest.approx((velocity, velocity), abs=2e-13)
 
 
-LAWS = [verify.compliant_impact, verify.hunt_crossley, verify.linked_masses, verify.damped_link, verify.tied_masses]
+LAWS = [verify.compliant_impact, verify.hunt_crossley, verify.link, verify.damped_link, verify.tie]
 
 
 @pytest.mark.parametrize(
@@ -125,13 +126,13 @@ def test_the_closed_forms_are_those_of_the_oscillator_and_of_the_quadrature():
     """q = 1: half a period of √(λ/μ), damping without closed form as Hertz's in the limit; q = 1.5: ∫ dp/v."""
     reduced, stiffness = 0.4, 1e4
     omega = np.sqrt(stiffness / reduced)
-    found = exact.impact(reduced, 3.0, stiffness, 1.0)
+    found = laws.impact(reduced, 3.0, stiffness, 1.0)
     assert (found.duration, found.penetration) == pytest.approx((np.pi / omega, 3.0 / omega), rel=1e-14)
-    hertz = exact.impact(reduced, 3.0, stiffness, 1.5)
+    hertz = laws.impact(reduced, 3.0, stiffness, 1.5)
     # p = p_max (1 − s²) takes the singularity of 1/ṗ at p_max away.
     half, _ = quad(lambda s: 2.0 * s * hertz.penetration / 3.0 / np.sqrt(1.0 - (1.0 - s * s) ** 2.5), 0.0, 1.0)
     assert hertz.duration == pytest.approx(2.0 * half, rel=1e-9)
-    weak = exact.impact(reduced, 3.0, stiffness, 1.5, 1e-4)
+    weak = laws.impact(reduced, 3.0, stiffness, 1.5, 1e-4)
     assert weak.penetration == pytest.approx(hertz.penetration, rel=2e-4)
     assert weak.rebound == pytest.approx(3.0 * (1.0 - 2e-4), rel=1e-7)  # e = 1 − 2χv/3 + …, whatever q
 
@@ -146,7 +147,7 @@ def test_a_beam_on_a_link_is_the_matrix_exponential(stiffness, damping, alpha):
     result = event_driven.simulate(scene, sample_times=times, t_end=0.2)
     mesh = assemble(scene.beam)
     x = mesh.slope_shape
-    expected = exact.linked(scene, mesh.M.toarray(), mesh.K.toarray(), 0.02 * x, -x, times)
+    expected = laws.linked(scene, mesh.M.toarray(), mesh.K.toarray(), 0.02 * x, -x, times)
     found = np.column_stack([result.u_tip, result.y])
     np.testing.assert_allclose(found, expected, atol=2e-13)
 

@@ -12,14 +12,14 @@ from springbeam.coupling.exchange import Exchange
 from springbeam.coupling.soft import SoftSolver
 from springbeam.coupling.tie import Tie
 from springbeam.scene import load_scene, with_changes
-from springbeam.studies.stability.linear import (
+from springbeam.studies.stability.predict import (
     LinearBody,
     LinearPair,
     amplification,
     impulse_integrals,
+    predict,
     spectral_radius,
 )
-from springbeam.studies.stability.predict import predict
 
 ENERGY = [("energy", 0), ("energy", 1), ("energy", 2)]
 TIES = [*ENERGY, ("hermite", 1), ("hermite", 2)]

@@ -7,7 +7,7 @@ import signal
 from pathlib import Path
 
 import pytest
-from commands import Interrupt, command, printed, refused
+from commands import Interrupt, command, printed, refused, swept
 
 from springbeam.results.directory import ResultsExist, ResultsInUse
 from springbeam.scene import load_scene
@@ -97,7 +97,7 @@ def test_an_interrupted_study_says_how_it_goes_on_and_does(tmp_path, monkeypatch
     there = "2 of 5 records are in results/duffing-sweep"
     assert f"error: interrupted; {there}; springbeam resume results/duffing-sweep goes on" in cut.stderr
     printed("resume", "results/duffing-sweep")
-    resumed, whole = sweep.rows("results/duffing-sweep"), sweep.rows("whole")
+    resumed, whole = swept("results/duffing-sweep"), swept("whole")
     assert len(resumed.pop("cost_wall_time")) == len(whole.pop("cost_wall_time")) == 5
     assert resumed == whole
     assert json.loads(printed(*SWEEP, "--json"))["directory"] == "results/duffing-sweep"  # shows what is there

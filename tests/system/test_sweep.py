@@ -9,7 +9,7 @@ from time import sleep
 
 import numpy as np
 import pytest
-from commands import HANGS, command
+from commands import HANGS, command, swept
 from runs import a_trajectory
 
 from springbeam.run.runner import simulate
@@ -52,14 +52,6 @@ def test_an_axis(text, values):
     assert [type(v) for v in axis.values] == [type(v) for v in values]
 
 
-@pytest.mark.parametrize("order", [1, -1])
-@pytest.mark.parametrize("tolerance", ["relative_tolerance", "absolute_tolerance"])
-def test_a_macro_step_beside_a_tolerance_is_refused_with_both_named(tolerance, order):
-    texts = ["coupling.macro_step=1e-3,2e-3", f"coupling.{tolerance}=1e-3,1e-4"]
-    with pytest.raises(SceneError, match=rf"--vary coupling\.macro_step.* --vary coupling\.{tolerance}"):
-        planned(*texts[::order]).cases()
-
-
 def test_a_latin_hypercube_has_one_sample_in_each_of_its_rows():
     axes = [parse_axis("spring.mass=1:1000:log"), parse_axis("spring.damping=0:1"), parse_axis("beam.n_elements=1,2,4")]
     values = design(axes, 30, 7, "latin_hypercube")
@@ -68,6 +60,9 @@ def test_a_latin_hypercube_has_one_sample_in_each_of_its_rows():
     assert sorted(v[2] for v in values) == [1] * 10 + [2] * 10 + [4] * 10
     assert design(axes, 30, 7, "latin_hypercube") == values
     assert design(axes, 30, 8, "latin_hypercube") != values
+    by_chance = design(axes, 300, 7, "random")
+    assert by_chance == design(axes, 300, 7, "random")
+    assert np.mean([v[1] for v in by_chance]) == pytest.approx(0.5, abs=3.0 / np.sqrt(12.0 * 300.0))
 
 
 def test_the_largest_speed_may_be_downward():
@@ -81,7 +76,7 @@ def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
     assert plan.findings(records).document["runs"] == {"done": 6, "stopped": 0, "refused": 3, "lost": 0}
     plan.write(records, tmp_path, pictures=True)
     assert (tmp_path / "sweep.png").stat().st_size > 10_000
-    rows = sweep.rows(tmp_path)
+    rows = swept(tmp_path)
     assert rows["index"] == list(range(9))
     for k, values in enumerate(plan.cases().values()):
         assert [rows[name][k] for name in values] == list(values.values())
@@ -146,7 +141,7 @@ def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_dou
     )
     records = record_all(todo)
     todo.write(records, tmp_path, pictures=False)
-    columns = sweep.rows(tmp_path)
+    columns = swept(tmp_path)
     once, doubled = (np.unique(np.round(np.array(points), 5)) for points in columns["stroboscopic"])
     assert (len(once), len(doubled)) == (1, 2)
     dots = todo.draw(records)["sweep"].axes[0].lines[0]
@@ -209,4 +204,4 @@ def test_a_worker_of_a_cluster_that_is_killed_costs_no_row(tmp_path):
     assert done < 40
     assert process.returncode == 0, errors
     alone = record_all(sweep.Sweep(scene=load_scene("duffing", ["time.t_end=0.1"]), vary=(vary,), metric=(metric,)))
-    assert sweep.rows(out)[metric] == [row[metric] for row in alone.values()]
+    assert swept(out)[metric] == [row[metric] for row in alone.values()]

@@ -12,7 +12,7 @@ from springbeam.scene import load_scene, with_changes
 from springbeam.studies import tradeoff
 from springbeam.studies.metrics import errors, motion_errors, worst
 from springbeam.studies.rivals import Rival
-from springbeam.studies.study import record_all
+from springbeam.studies.study import record_all, troubles
 from springbeam.studies.tradeoff import Tradeoff, cheapest, pareto
 
 
@@ -118,8 +118,9 @@ def test_what_takes_too_long_is_given_up_and_named(monkeypatch):
     begun = [row for row in rows if row["status"] == "stopped"]
     assert len(begun) == len({row["family"] for row in rows}) < len(rows)
     assert all("takes more than 0 s" in row["error"] or "diverges" in row["error"] for row in begun)
-    (given_up,) = study.notes(record_all(study))
-    assert given_up.startswith("given up after 0 s, finer ones of their kind not run: energy 0, H = 0.004; ")
+    assert troubles(record_all(study)) == [
+        f"error     in {len(rows)} cases, first in energy 0, H = 0.004: takes more than 0 s at t = 0"
+    ]
     assert {row["status"] for row in rows} == {"stopped", "skipped"}
 
 

@@ -17,7 +17,7 @@ from typing import Annotated
 import typer
 
 from . import checks, look, run, scenes, studies
-from .common import STOPPED, Command, Group
+from .common import STOPPED, Command
 
 _WHAT = "A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs."
 _START = """\
@@ -31,7 +31,6 @@ springbeam doctor                 is this installation sound?"""
 _NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
 app = typer.Typer(
-    cls=Group,
     help=_WHAT,
     epilog="springbeam COMMAND --help shows options and an example; springbeam alone shows how to start.",
     invoke_without_command=True,

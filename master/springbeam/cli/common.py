@@ -18,7 +18,7 @@ import typer
 from rich.console import Console
 from rich.progress import Progress, ProgressColumn
 from rich.text import Text
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand
 
 from ..bodies.protocol import FmuError
 from ..results.directory import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory
@@ -77,44 +77,19 @@ ForceOption = Annotated[bool, typer.Option("--force", "-f", help="Replace what i
 NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help="Draw no pictures.")]
 
 
-class _TellingParameters:
-    """Shows flags without a type, which would make a reader try ``--force true``."""
+class Command(TyperCommand):
+    """A command that can be interrupted; its flags are shown without a type, which would have one try --force true."""
 
     def get_params(self, ctx: Any) -> list[Any]:
-        parameters: list[Any] = super().get_params(ctx)  # type: ignore[misc]
+        parameters: list[Any] = super().get_params(ctx)
         for parameter in parameters:
             if getattr(parameter, "is_flag", False):
                 parameter.metavar = ""
         return parameters
 
-
-class Command(_TellingParameters, TyperCommand):
-    """A command that can be interrupted, and that explains an unexpected argument."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        ctx.allow_extra_args = True
-        rest: list[str] = super().parse_args(ctx, args)
-        if rest and not ctx.resilient_parsing:
-            setting = next((text for text in rest if "=" in text and "." in text.partition("=")[0]), None)
-            settable = any("--set" in parameter.opts for parameter in self.get_params(ctx))
-            hint = f". Did you mean --set {setting}?" if setting and settable else ""
-            ctx.fail(f"Unexpected argument {' '.join(rest)}{hint}")
-        return rest
-
     def invoke(self, ctx: Any) -> Any:
         with interruptible():
             return super().invoke(ctx)
-
-
-class Group(_TellingParameters, TyperGroup):
-    """A group of commands that tells a scene from a command."""
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        word = args[0]
-        is_scene = word in shipped_scenes() or word.endswith(".toml")
-        if is_scene and word not in self.commands and not ctx.resilient_parsing:
-            ctx.fail(f"{word} is a scene, not a command. Did you mean {ctx.command_path} run {word}?")
-        return super().resolve_command(ctx, args)
 
 
 def console_for(*, silent: bool) -> Console:
@@ -160,15 +135,9 @@ def say(
 
 
 def results_directory(path: Path) -> Path:
-    """Return ``path`` if it holds a run; otherwise end the command with an error that names directories that do."""
+    """Return ``path`` if it holds a run; otherwise end the command with an error."""
     if not RunDirectory(path).summary.exists():
-        what = "holds no run" if path.is_dir() else "is no directory" if path.exists() else "no such directory"
-        there = sorted(file.parent for file in Path("results").glob("*/summary.json"))
-        meant = [found for found in there if found.name == path.name]
-        remedy = "springbeam run SCENE --out DIR makes one"
-        if there:
-            remedy = f"did you mean {meant[0]}?" if meant else f"runs here: {', '.join(map(str, there[:8]))}"
-        fail(BAD_INPUT, f"{path}: {what}; {remedy}")
+        fail(BAD_INPUT, f"{path}: holds no run; springbeam run SCENE --out DIR makes one")
     return path
 
 

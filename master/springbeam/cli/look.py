@@ -114,10 +114,6 @@ def _free(path: Path, force: bool) -> Path:
     return path
 
 
-#: Windows closer than this share are one.
-_SAME_WINDOW = 1e-9
-
-
 def compare(
     runs: Annotated[
         list[Path],
@@ -141,15 +137,12 @@ def compare(
 
     Example: springbeam compare results/soft results/light
     """
-    if len(runs) < 2:
-        fail(BAD_INPUT, "one run; compare takes two or more, or a file of measurements beside it")
-    if runs[-1].is_file():
-        if len(runs) > 2:
-            fail(BAD_INPUT, f"{runs[-1]}: is a file of measurements, which is laid beside one run")
+    measured = runs[-1].is_file()
+    if len(runs) < 2 or (measured and len(runs) > 2) or (not measured and (names or shift is not None)):
+        fail(BAD_INPUT, "compare takes runs; or one run and a file of measurements, with --map and --shift of these")
+    if measured:
         _beside_measured(runs[0], runs[1], names or [], shift, None if no_plots else out, quiet=quiet, as_json=as_json)
         return
-    if names or shift is not None:
-        fail(BAD_INPUT, f"{runs[-1]}: no such file; --map and --shift belong to a file of measurements")
     with bad_input_reported():
         trajectories = [load_trajectory(results_directory(run)) for run in runs]
         names = [str(run) for run in runs]
@@ -222,13 +215,11 @@ def _over_one_window(runs: list[Trajectory]) -> list[dict[str, Any]]:
     A mean over another window is another quantity. A run without steps, which has no force between its rows, has no
     peak beside those of other windows.
     """
-    windows = [run.summary.get("contact_force_window") for run in runs]
-    common = max((window for window in windows if window is not None), default=0.0)
+    common = max(run.summary.get("contact_force_window", 0.0) for run in runs)
     summaries = [dict(run.summary) for run in runs]
-    for run, window, summary in zip(runs, windows, summaries, strict=True):
-        if window is not None and abs(window - common) > _SAME_WINDOW * common:
-            for name in ("contact_force_max", "contact_force_window"):
-                del summary[name]
+    for run, summary in zip(runs, summaries, strict=True):
+        if summary.get("contact_force_window", common) != common:
+            del summary["contact_force_max"], summary["contact_force_window"]
             if run.steps is not None:
                 found = totals(run.scene, run.steps, run.events, common, free_at_end=True)
                 summary |= {"contact_force_max": found["contact_force_max"], "contact_force_window": common}

@@ -116,11 +116,9 @@ def new(
 
     path = Path(name).with_suffix(".toml")
     with bad_input_reported():
-        try:
-            with path.open("x", encoding="utf-8") as file:
-                file.write(beginning(path.stem))
-        except FileExistsError:
+        if path.exists():
             fail(BAD_INPUT, f"{path}: already there; give another NAME")
+        path.write_text(beginning(path.stem), encoding="utf-8")
     typer.echo(f"{path}: a scene to change; springbeam predict checks its values")
 
 

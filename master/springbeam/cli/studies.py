@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
 from rich.text import Text
 
 from ..results.directory import ResultsExist, RunDirectory
@@ -102,6 +102,8 @@ def carry_out(make: Callable[[], Study], scene: str | None, frame: Frame) -> Non
     ``make`` returns the study, and may raise what bad input raises. The directory is ``out``, else
     ``results/SCENE-KIND``, or with -2, -3, … behind it where another study is.
     """
+    from ..studies.study import troubles
+
     console = console_for(silent=frame.quiet or frame.as_json)
     with bad_input_reported():
         study = make()
@@ -114,7 +116,7 @@ def carry_out(make: Callable[[], Study], scene: str | None, frame: Frame) -> Non
         found = study.findings(computed)
     say(
         {"directory": directory, "files": files, **found.document},
-        [*map(Text, study.remarks), *found.shown],
+        [*map(Text, study.remarks), *found.shown, *map(Text, troubles(computed))],
         [("results", file) for file in files],
         where=directory,
         quiet=frame.quiet,
@@ -166,17 +168,12 @@ def _computed(study: Study, records: Records, console: Console, frame: Frame) ->
     console.print(Text(study.announced.format(total)))
     if there:
         console.print(f"{there} of {total} records are there")
-    state, left = TextColumn("{task.fields[failed]} failed"), TimeRemainingColumn()
-    bar = progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), state, left, quiet=frame.quiet or frame.as_json)
-    task, failed = bar.add_task("", total=total, completed=there, failed=0), [0]
-
-    def report(record: Row) -> None:
-        failed[0] += study.failed(record)
-        bar.update(task, advance=1, failed=failed[0])
-
+    columns = BarColumn(bar_width=20), MofNCompleteColumn(), TimeRemainingColumn()
+    bar = progress_bar(*columns, quiet=frame.quiet or frame.as_json)
+    task = bar.add_task("", total=total, completed=there)
     processes = (frame.workers or os.cpu_count() or 1) if study.parallel else 0
     with records, dask_cluster(frame.scheduler) if frame.scheduler else nullcontext() as cluster, bar:
-        return record_all(study, records, processes, cluster, report)
+        return record_all(study, records, processes, cluster, lambda record: bar.advance(task))
 
 
 # -- the commands ---------------------------------------------------------------------------------------------------

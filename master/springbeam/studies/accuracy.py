@@ -31,8 +31,6 @@ from .stability.predict import contact_frequency
 _FEWEST, _MOST = 8.0, 50_000
 #: Angle that a soft contact may turn in a macro step of degree 2 [rad].
 _CONTACT_TURN = 2.0
-#: Runs in a row that may stop early: one with half the macro step may not.
-_MOST_STOPPED = 6
 #: An estimate of the error is to be so many times smaller than the accuracy.
 _SAFETY = 1.5
 #: The coupling's and IDA's relative tolerance over the accuracy; a tip that moves less, relative to the beam, is held.
@@ -83,12 +81,11 @@ def pick(scene: Scene) -> Trajectory:
     Raises
     ------
     SceneError
-        If the scene asks for none, or it cannot be reached; the message says how far it was.
+        If it cannot be reached; the message says how far it was.
     RunStopped
         If the run with these settings would stop early.
     """
-    if scene.accuracy is None:
-        raise SceneError("accuracy: the scene asks for none")
+    assert scene.accuracy is not None
     if scene.contact.algorithm:
         raise SceneError(
             f'accuracy: [contact] law = "{scene.contact.law}" is defined by its macro step; take another law'
@@ -97,15 +94,13 @@ def pick(scene: Scene) -> Trajectory:
     pilots: list[Trajectory] = []
     coarse: Trajectory | None = None
     before: dict[str, float] = {}
-    stopped = 0
     while steps <= _MOST:
         prepared = _prepared(scene, scene.duration / steps)
         steps *= 2.0
         try:
-            fine, stopped = runner.simulate(prepared), 0
+            fine = runner.simulate(prepared)
         except RunStopped as error:
-            stopped += 1
-            if stopped == _MOST_STOPPED or error.run is None:
+            if steps > _MOST or error.run is None:
                 raise
             pilots.append(error.run)
             coarse, before = None, {}

@@ -145,7 +145,6 @@ class Converge(Study):
                 f"{row['beam.n_elements']} el. {row['unknowns']} modes {row['cost_wall_time']:.2g} s" for row in rows
             )
             shown.append(Text(f"runs      {', '.join(meshes)}"))
-        shown += [Text(f"stopped   {name}: {r['error']}") for name, r in records.items() if r["error"]]
         shown.append("error: of the run as given; in brackets the last change, where the values show no limit")
         return Findings(document, shown)
 

@@ -158,9 +158,8 @@ class Orders(Study):
             for row in rows
         ]  # fmt: skip
         names = ("phase", "from [s]", "quantity", *steps, "orders")
-        stopped = [Text(f"stopped   {name}: {r['error']}") for name, r in records.items() if r["error"]]
         shown = table(names, cells, "largest errors", words=("from [s]", "quantity"))
-        return Findings({"orders": rows}, [shown, *stopped])
+        return Findings({"orders": rows}, [shown])
 
     def draw(self, records: Mapping[str, Row]) -> Pictures:
         """Draw errors over the macro step, a panel a stretch."""

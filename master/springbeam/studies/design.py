@@ -11,16 +11,15 @@ from typing import Any, Literal
 import numpy as np
 from scipy.stats import qmc
 
-from ..scene import Scene, SceneError, key_kind, parse_value
+from ..scene import SceneError, key_kind, parse_value
 from ..scene.scene import split_key
-from ..scene.tables import PICKED_BY_ACCURACY, STEP_KEY, TOLERANCE_KEYS
 
 #: The couplings that studies run: scheme and degree, of rigid and of soft laws.
 RIGID = (("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2))
 SOFT = (*RIGID[:3], ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1))
 Sampling = Literal["random", "latin_hypercube"]
-#: A mistyped count, not a sweep.
-MOST_RUNS = 10_000_000
+#: Values of a grid; more are a mistyped count.
+_MOST = 10_000_000
 #: Whole numbers beyond are none in a column of floating-point numbers.
 _LARGEST_WHOLE = 2**53
 
@@ -88,10 +87,10 @@ def parse_axis(text: str) -> Axis:
         possible = low != high and math.isfinite(high - low) and (not log or min(low, high) > 0.0)
     except (ValueError, TypeError):
         possible = False
-    if not possible or (counted and not 2 <= count <= MOST_RUNS):
+    if not possible or (counted and not 2 <= count <= _MOST):
         raise _wrong(
             text,
-            f"a range is LOW:HIGH:COUNT with LOW and HIGH different and COUNT from 2 to {MOST_RUNS}, or LOW:HIGH with "
+            f"a range is LOW:HIGH:COUNT with LOW and HIGH different and COUNT from 2 to {_MOST}, or LOW:HIGH with "
             "--samples; :log may follow if both are greater than 0",
         )
     axis = Axis(target, (), low, high, log, kind is int)
@@ -123,30 +122,9 @@ def design(axes: Sequence[Axis], samples: int, seed: int, sampling: Sampling) ->
     if samples == 0:
         if open_ranges := [axis.name for axis in axes if not axis.values]:
             raise SceneError(f"--vary {open_ranges[0]}: a range without a count is sampled; give --samples, or a count")
-        total = math.prod(len(axis.values) for axis in axes)
-        if total > MOST_RUNS:
-            raise SceneError(f"--vary: {total} runs; at most {MOST_RUNS} are allowed")
         return list(itertools.product(*(axis.values for axis in axes)))
     if sampling == "latin_hypercube":
         unit = qmc.LatinHypercube(len(axes), seed=seed).random(samples)
     else:
         unit = np.random.default_rng(seed).random((samples, len(axes)))
     return [tuple(axis.at(float(x)) for axis, x in zip(axes, row, strict=True)) for row in unit]
-
-
-def compatible(scene: Scene, axes: Sequence[Axis]) -> None:
-    """Raise SceneError if an axis has no effect because of another one, or because of the accuracy of ``scene``."""
-    names = [axis.name for axis in axes]
-    for name in names if scene.accuracy is not None else ():
-        table, _, key = name.rpartition(".")
-        if key in PICKED_BY_ACCURACY.get(table, ()):
-            raise SceneError(
-                f"--vary {name}: accuracy = {scene.accuracy:g} picks it in each run; vary something else, or take "
-                "accuracy out of the scene"
-            )
-    tolerances = [f"coupling.{key}" for key in TOLERANCE_KEYS if f"coupling.{key}" in names]
-    if f"coupling.{STEP_KEY}" in names and tolerances:
-        raise SceneError(
-            f"--vary coupling.{STEP_KEY}: with --vary {tolerances[0]} the steps follow from the tolerance; vary one of "
-            "the two"
-        )

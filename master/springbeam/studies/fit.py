@@ -59,17 +59,13 @@ class Fit(Study):
 
     @classmethod
     def of(cls, scene: Scene, path: Path, vary: Sequence[str], **settings: Any) -> Fit:
-        """Return the study of a file. Raises SceneError if it cannot be read."""
-        try:
-            digest = sha256(path.read_bytes()).hexdigest()
-        except OSError as error:
-            raise SceneError(f"{path}: {error.strerror}") from error
+        """Return the study of a file. Raises OSError if it cannot be read."""
+        digest = sha256(path.read_bytes()).hexdigest()
         return cls(scene=scene, file=str(path), digest=digest, vary=tuple(vary), **settings)
 
     def cases(self) -> dict[str, Row]:
-        """Return the one search. Raises SceneError for keys, guesses or columns that are not there."""
+        """Return the one search. Raises SceneError for keys or guesses that are not there."""
         self.at(self.guesses())
-        self.data()
         return {_CASE: {}}
 
     def guesses(self) -> dict[str, float]:
@@ -92,25 +88,29 @@ class Fit(Study):
         return read_measured(self.file, self.scene, mapping(self.names))
 
     def record(self, case: Row) -> Row:
-        """Return the values found, their intervals, and every run on the way."""
+        """Return the values found, their intervals, and every run on the way.
+
+        Raises SceneError for columns that are not there, or too few points.
+        """
         data, guesses, free = self.data(), self.guesses(), self.shift is None
-        try:
-            run = simulate(self.at(guesses))
-        except (RunStopped, SceneError) as refused:
-            raise SceneError(f"the guess cannot be run: {refused}") from refused
+        run = simulate(self.at(guesses))
         # While keys are wrong the curves may fit best a period too late: a few places are tried.
         starts = [self.shift] if self.shift is not None else time_shifts(run, data)[0][:_TRIED]
         starts += [0.0] * int(free and data.covered(run).mean() > 0.5)
-        starts = [shift for shift in starts if data.covered(run, shift, _MARGIN * free).sum() > len(guesses) + free]
-        if not starts:
+        parts = {shift: data.covered(run, shift, _MARGIN * free) for shift in starts}
+        parts = {shift: part for shift, part in parts.items() if part.sum() > len(guesses) + free}
+        if not parts:
             raise SceneError(
                 f"{self.file}: fewer of its points lie in the run than are needed to find {', '.join(guesses)}"
                 f"{' and the shift of its clock' * free}; make time.t_end longer, give more points, or another --shift"
             )
-        searches = [_Search(self, data, guesses | {SHIFT: shift} if free else guesses, shift) for shift in starts]
-        record = min(searches, key=lambda search: search.least(_FIRST_LOOK).cost).found()
-        if record["undetermined"] and 0.0 in starts:  # the keys alone may be
-            searches.append(_Search(self, data, guesses, 0.0))
+        searches = [
+            _Search(self, data, part, guesses | {SHIFT: shift} if free else guesses, shift)
+            for shift, part in parts.items()
+        ]
+        record = min(searches, key=lambda search: search.least(most=_FIRST_LOOK).cost).found()
+        if record["undetermined"] and 0.0 in parts:  # the keys alone may be
+            searches.append(_Search(self, data, parts[0.0], guesses, 0.0))
             record = searches[-1].found()
         return {**record, "runs": [run for search in searches for run in search.runs]}
 
@@ -148,15 +148,15 @@ def mapping(names: Sequence[str]) -> dict[str, str]:
 
 
 class _Search:
-    """One search from guesses of keys, and of `SHIFT` if the clock moves; ``runs`` are the rows of its runs."""
+    """One search from guesses of keys, and of `SHIFT` if the clock moves; ``runs`` are the rows of its runs.
 
-    def __init__(self, fit: Fit, data: Measured, guesses: Mapping[str, float], shift: float) -> None:
-        self._fit, self._data, self._guesses, self._shift = fit, data, guesses, shift
+    The points that take part are ``part`` of the data, wherever the clock moves.
+    """
+
+    def __init__(self, fit: Fit, data: Measured, part: np.ndarray, guesses: Mapping[str, float], shift: float) -> None:
+        self._fit, self._data, self._part, self._guesses, self._shift = fit, data, part, guesses, shift
         self._spread = {name: float(np.std(values)) or 1.0 for name, values in data.values.items()}
         self._weights = {name: 1.0 / spread for name, spread in self._spread.items()}
-        self._best = np.zeros(len(guesses))  #: unknowns at which the search goes on
-        self._part: np.ndarray | None = None  #: which points take part, wherever the clock moves
-        self._elsewhere = False  #: whether the clock may have moved since these were chosen
         self.runs: list[Row] = []
 
     def values(self, unknowns: np.ndarray) -> dict[str, float]:
@@ -174,37 +174,28 @@ class _Search:
         try:
             run = simulate(self._fit.at(values))
         except (RunStopped, SceneError) as refused:
-            if self._part is None:
-                raise SceneError(f"the guess cannot be run: {refused}") from refused
             self.runs.append({**values, "error": str(refused)})
             return np.full(len(self._data.values) * int(self._part.sum()), _REFUSED)
-        covered = self._data.covered(run, shift, _MARGIN * (SHIFT in values))
-        if self._part is None or (self._elsewhere and covered.sum() > len(self._guesses)):
-            self._part = covered
-        self._elsewhere = False
         curves = run.at(np.clip(self._data.time[self._part] + shift, run.time[0], run.time[-1]))
         off = {name: signal(curves, name) - measured[self._part] for name, measured in self._data.values.items()}
         rms = {f"left_{name}": float(np.sqrt(np.mean(part**2))) for name, part in off.items()}
         self.runs.append({**values, **rms, "error": ""})
         return np.concatenate([self._weights[name] * part for name, part in off.items()])
 
-    def least(self, most: int = 60) -> Any:
-        """Search on from where the search is, by at most so many evaluations."""
-        result = least_squares(
-            self.left, self._best, jac="3-point", diff_step=_STEP, xtol=_TOLERANCE, ftol=_TOLERANCE, gtol=_TOLERANCE,
-            max_nfev=most,
-        )  # fmt: skip
-        self._best = result.x
-        return result
+    def least(self, start: np.ndarray | None = None, most: int = 60) -> Any:
+        """Search from ``start``, or from the guesses, by at most so many evaluations."""
+        begin = np.zeros(len(self._guesses)) if start is None else start
+        ends = dict.fromkeys(("xtol", "ftol", "gtol"), _TOLERANCE)
+        return least_squares(self.left, begin, jac="3-point", diff_step=_STEP, max_nfev=most, **ends)
 
     def found(self) -> Row:
         """Search, then once more with each curve weighed by what is left of it, and judge what was found."""
-        self.left(self.least().x)
+        first = self.least().x
+        self.left(first)
         self._weights = {
             name: 1.0 / max(self.runs[-1][f"left_{name}"], 1e-9 * spread) for name, spread in self._spread.items()
         }
-        self._elsewhere = True
-        result = self.least()
+        result = self.least(first)
         self.left(result.x)
         keys, undetermined = self._judged(result)
         left = {name: self.runs[-1][f"left_{name}"] for name in self._spread}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from operator import attrgetter, itemgetter
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -46,8 +46,8 @@ class Metric:
         return f"the run has no column {', '.join(absent)}" if absent else without_peak(run, self.takes)
 
 
-def _of(column: str, pick: Callable[[np.ndarray], float]) -> Callable[[Trajectory], float | None]:
-    return lambda run: float(pick(run[column])) if column in run.columns else None
+def _end(column: str) -> Callable[[Trajectory], float | None]:
+    return lambda run: float(run[column][-1]) if column in run.columns else None
 
 
 def _extreme(column: str, pick: Callable[[Extremes], float]) -> Callable[[Trajectory], float | None]:
@@ -98,23 +98,22 @@ def _stroboscopic(run: Trajectory) -> list[float] | None:
     return found
 
 
-_last: Callable[[np.ndarray], float] = itemgetter(-1)
 #: Columns with a unit, whose largest magnitudes are metrics.
 _UNITS = {name: unit for name, (unit, _) in (COLUMNS | TOLD).items() if unit and name != "time"}
 
 METRICS: dict[str, Metric] = {
     "u_tip_min": Metric("m", "lowest place of the tip", _extreme("u_tip", attrgetter("lowest"))),
     "u_tip_max": Metric("m", "highest place of the tip", _extreme("u_tip", attrgetter("highest"))),
-    "u_tip_end": Metric("m", "the tip at the end", _of("u_tip", _last)),
+    "u_tip_end": Metric("m", "the tip at the end", _end("u_tip")),
     "y_min": Metric("m", "lowest place of the spring's top", _extreme("y", attrgetter("lowest"))),
     "y_max": Metric("m", "highest place of the spring's top", _extreme("y", attrgetter("highest"))),
-    "y_end": Metric("m", "the spring's top at the end", _of("y", _last)),
+    "y_end": Metric("m", "the spring's top at the end", _end("y")),
     "z_max": Metric("m/s", "largest speed of the spring's top", _extreme("z", _magnitude)),
     "gap_max": Metric("m", "largest gap", _extreme("gap", attrgetter("highest"))),
     **{name: Metric(unit, words, _total(name)) for name, (words, unit) in TOTALS.items()},
     **{name: Metric("J", f"energy lost by {words}", _total(name)) for name, words in LOSS_NAMES.items()},
-    "dissipated": Metric("J", "energy lost to damping", _of("e_dissipated", _last)),
-    "impact_loss": Metric("J", "energy lost in impacts", _of("e_impact_loss", _last)),
+    "dissipated": Metric("J", "energy lost to damping", _end("e_dissipated")),
+    "impact_loss": Metric("J", "energy lost in impacts", _end("e_impact_loss")),
     "energy_residual": Metric("", "largest change of the sum of all energies, relative", _total("max_energy_residual")),
     "macro_steps": Metric("", "macro steps", _total("macro_steps")),
     **{f"first_{kind}": Metric("s", f"first event {kind}", _first(kind)) for kind in EventKind},
@@ -162,27 +161,20 @@ def metrics_of(texts: Sequence[str], *, several: bool = False) -> dict[str, Metr
     """
     found: dict[str, Metric] = {}
     for text in texts:
-        name, metric = _named(text)
+        name, separator, what = (part.strip() for part in text.partition("="))
         if name in found:
             raise SceneError(f"--metric {name}: given twice")
-        if metric.several and not several:
+        if separator and name in METRICS:
+            raise SceneError(f"--metric {text}: {name} is a metric already; give yours another name")
+        if name not in METRICS and not (separator and name.isidentifier()):
+            raise SceneError(
+                f"--metric {text}: unknown; {nearest(text, METRICS)}allowed: {', '.join(METRICS)}, and your own, as in "
+                "'shock=max(abs(a_tip))/9.81' or 'shock=module:function'"
+            )
+        found[name] = METRICS[name] if name in METRICS else _own(name, what)
+        if found[name].several and not several:
             raise SceneError(f"--metric {name}: is several numbers of a run; springbeam sweep keeps and draws them")
-        found[name] = metric
     return found
-
-
-def _named(text: str) -> tuple[str, Metric]:
-    if text in METRICS:
-        return text, METRICS[text]
-    name, separator, what = (part.strip() for part in text.partition("="))
-    if not separator or not name.isidentifier():
-        raise SceneError(
-            f"--metric {text}: unknown; {nearest(text, METRICS)}allowed: {', '.join(METRICS)}, and your own, as in "
-            "'shock=max(abs(a_tip))/9.81' or 'shock=module:function'"
-        )
-    if name in METRICS:
-        raise SceneError(f"--metric {text}: {name} is a metric already; give yours another name")
-    return name, _own(name, what)
 
 
 def _own(name: str, what: str) -> Metric:

@@ -14,7 +14,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from ..pictures.drawing import BLUE, VERMILLION
+from ..pictures.drawing import BLUE
 
 Rows = Sequence[Mapping[str, Any]]
 #: Values of an axis that are named on it, and columns of small multiples.
@@ -94,7 +94,7 @@ def multiples(rows: Rows, scales: Sequence[Scale], values: Mapping[str, str], ti
     axes, one for each pick of the others; of samples a panel over each axis.
     """
     levels = [list(dict.fromkeys(row[scale.name] for row in rows)) for scale in scales]
-    of_grid = len(scales) <= 2 or len(rows) == np.prod([len(level) for level in levels])
+    of_grid = len(scales) == 1 or len(rows) == np.prod([len(level) for level in levels])
     picks: list[tuple[Any, ...]] = list(itertools.product(*levels[2:])) if of_grid else [(scale,) for scale in scales]
     picks = picks[:: -(-len(picks) // _MOST)]
     figure, axes = panels(len(picks) * len(values), len(picks) if len(picks) > 1 else 3, (3.8, 3.0), title)
@@ -127,31 +127,22 @@ def _panel(
         return figure.colorbar(drawn, ax=ax).ax.yaxis
     (scale,) = scales
     places, levels = scale.places([row[scale.name] for row in rows])
-    order, failed = np.argsort(places, kind="stable"), np.isnan(values)
+    order = np.argsort(places, kind="stable")
     joined = "-" if alone and not scale.words and len(set(places)) == len(places) else "none"
     ax.plot(places[order], values[order], marker=".", linestyle=joined, color=BLUE, linewidth=1.0)
-    if failed.any():
-        low = ax.get_ylim()[0]
-        ax.plot(places[failed], np.full(failed.sum(), low), "x", color=VERMILLION, clip_on=False)
     scale.mark(ax.xaxis, levels, all_of_them=False)
     ax.grid(alpha=0.3)
     return ax.yaxis
 
 
 def cells(ax: Axes, rows: Rows, x: Scale, y: Scale, values: np.ndarray, **look: Any) -> ScalarMappable:
-    """Draw values over two axes: of a full grid as cells, else as dots."""
+    """Draw the values of a full grid over two axes as cells."""
     (across, columns), (up, lines) = (scale.places([row[scale.name] for row in rows]) for scale in (x, y))
-    full = len(values) == len(columns) * len(lines)
-    if full:
-        order = np.lexsort((across, up))
-        found = values[order].reshape(len(lines), len(columns))
-        borders = (_borders(np.unique(places), scale.log) for places, scale in ((across, x), (up, y)))
-        drawn: ScalarMappable = ax.pcolormesh(*borders, found, **look)
-    else:
-        drawn = ax.scatter(across, up, c=values, s=14, **look)
-    x.mark(ax.xaxis, columns, all_of_them=full)
-    y.mark(ax.yaxis, lines, all_of_them=full)
-    return drawn
+    found = values[np.lexsort((across, up))].reshape(len(lines), len(columns))
+    borders = (_borders(np.unique(places), scale.log) for places, scale in ((across, x), (up, y)))
+    x.mark(ax.xaxis, columns, all_of_them=True)
+    y.mark(ax.yaxis, lines, all_of_them=True)
+    return ax.pcolormesh(*borders, found, **look)
 
 
 def _borders(values: np.ndarray, log: bool) -> np.ndarray:
@@ -190,8 +181,5 @@ def curves(points: Sequence[Point], title: str, x: str, y: str, size: tuple[floa
         ax.set(yscale="log", title=name if x else "", xlabel=x or name, ylabel=y)
         logarithmic(ax.xaxis, np.array([point.x for point in points if point.panel == name and point.x] or [1.0]))
         ax.grid(alpha=0.3)
-    if every:
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", fontsize="small", ncols=5)
-    else:
-        axes[0].text(0.5, 0.5, "nothing to draw", transform=axes[0].transAxes, ha="center")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", fontsize="small", ncols=5)
     return figure

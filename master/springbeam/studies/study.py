@@ -143,10 +143,6 @@ class Study(BaseModel, ABC):
         """Return the record of a case whose worker process has died."""
         return {"status": "lost", "error": cause, "warnings": ""}
 
-    def failed(self, record: Row) -> bool:
-        """Tell whether the progress bar counts a record as failed."""
-        return bool(record.get("error"))
-
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
         """Return the table: a row per case, in their order."""
         cases = self.cases()
@@ -264,13 +260,25 @@ def study_in(directory: Path) -> Study | None:
     try:
         module, name = _STUDIES[first["study"]].split(":")
         study: Study = getattr(import_module(module, __package__), name).model_validate(first["settings"])
-    except (KeyError, ValidationError) as error:
-        raise ResultsUnreadable(f"{directory / FILE}: holds no study that is known: {error}") from error
-    if first != study.settings():
+        same = first == study.settings()
+    except (KeyError, ValidationError):
+        same = False
+    if not same:
         raise ResultsUnreadable(
             f"{directory}: was begun with another springbeam or other FMUs; the first command with --force begins anew"
         )
     return study
+
+
+def troubles(records: Mapping[str, Row]) -> list[str]:
+    """Return in how many cases there were errors, and warnings, with the first of each."""
+    found = []
+    for kind in ("error", "warnings"):
+        said = [(name, record[kind]) for name, record in records.items() if record.get(kind)]
+        if said:
+            name, text = said[0]
+            found.append(f"{kind:<10}in {len(said)} cases, first in {name}: {text.splitlines()[0]}")
+    return found
 
 
 # -- computing ------------------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from rich.text import Text
 
 from ..scene import Load, Scene, SceneError
 from ..scene.messages import unit_of
-from .design import Axis, Sampling, compatible, design, parse_axis
+from .design import Axis, Sampling, design, parse_axis
 from .metrics import PRINCIPAL, USUAL, Metric, heading, metrics_of
 from .study import Findings, Pictures, Row, Study
 from .tables import table, write_csv
@@ -67,7 +67,6 @@ class Sweep(Study):
     def cases(self) -> dict[str, Row]:
         """Return the values of the axes. Raises SceneError if a key or a metric is not there."""
         _, axes = self.metrics, self.axes
-        compatible(self.scene, axes)
         if self.boundary:
             self._pulse()
         names = [axis.name for axis in axes]
@@ -75,13 +74,9 @@ class Sweep(Study):
         return {str(index): dict(zip(names, several, strict=True)) for index, several in enumerate(values)}
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
-        """Count the rows by status, name the first error, and show the first values of metrics that were asked for."""
+        """Count the rows by status, and show the first values of metrics that were asked for."""
         counts = Counter(record["status"] for record in records.values())
         lines = [f"runs      {', '.join(f'{counts[status]} {status}' for status in STATUSES if counts[status])}"]
-        if first := next((record["error"] for record in records.values() if record["error"]), None):
-            lines.append(f"error     {first}, the first of them")
-        if warned := [record["warnings"] for record in records.values() if record["warnings"]]:
-            lines.append(f"warnings  of {len(warned)} runs, the first of them: {warned[0].splitlines()[0]}")
         document: dict[str, Any] = {"runs": {status: counts[status] for status in STATUSES}}
         if self.boundary:
             document["boundary"] = self._critical(records)
@@ -143,8 +138,6 @@ class Sweep(Study):
         if names != {amplitude, duration} or not table.startswith("loads."):
             raise SceneError("--boundary: takes --vary loads.0.amplitude=… and --vary loads.0.duration=… of one pulse")
         load = self.scene.loads[int(table.partition(".")[2])]
-        if load.duration is None:
-            raise SceneError(f'--boundary: the load is no pulse; its signal is "{load.signal}", without a duration')
         return load, amplitude, duration
 
     def _critical(self, records: Mapping[str, Row]) -> list[dict[str, float]]:
@@ -164,14 +157,6 @@ class Sweep(Study):
                 mean = float(pulse.value((np.arange(_POINTS) + 0.5) * length / _POINTS).mean())
                 found.append({"duration": length, "velocity_change": peak * mean * length, "peak": peak})
         return found
-
-
-def rows(directory: str | Path) -> dict[str, list[Any]]:
-    """Read a finished sweep: ``index``, the varied keys, ``status``, ``error``, ``warnings``, metrics and costs."""
-    import pyarrow.parquet as pq
-
-    columns: dict[str, list[Any]] = pq.read_table(Path(directory) / "sweep.parquet").to_pydict()
-    return columns
 
 
 def _in_words(value: Any) -> str:

@@ -154,7 +154,7 @@ class Tradeoff(Study):
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Name the cheapest configurations, and those that nothing beats."""
-        rows, notes, until = self.rows(records), self.notes(records), self.scene.time.t_end
+        rows, until = self.rows(records), self.scene.time.t_end
         best, front = cheapest(rows), pareto(rows)
         cells = [
             (f"{c['error']:.0e}", *_shown(c["co_simulation"]), *_shown(c["scipy"]), number(c["ratio"], ".1f"))
@@ -172,15 +172,9 @@ class Tradeoff(Study):
             table(names, cells, "cheapest for an error (solve time)", words=("co-simulation", "scipy")),
             table(("configuration", "error", "event [s]", "solve [ms]", "set-up [ms]", "doSteps"), on_front,
                   "Pareto front"),
-            *(Text(f"note      {note}") for note in notes),
         ]  # fmt: skip
         told = [c | {side: _told(c[side]) for side in ("co_simulation", "scipy")} for c in best]
-        return Findings({"until": until, "cheapest": told, "front": list(map(_told, front)), "notes": notes}, shown)
-
-    def notes(self, records: Mapping[str, Row]) -> list[str]:
-        """Return what was left out, and why."""
-        slow = [name for name, r in records.items() if r["status"] == "stopped" and "takes more" in r["error"]]
-        return [f"given up after {_LIMIT:g} s, finer ones of their kind not run: {'; '.join(slow)}"] * bool(slow)
+        return Findings({"until": until, "cheapest": told, "front": list(map(_told, front))}, shown)
 
     def draw(self, records: Mapping[str, Row]) -> Pictures:
         """Draw the work–precision diagrams: error over time, and over doStep calls."""

@@ -95,13 +95,9 @@ class Grid(Study):
         """Return the outcome of a cell that crashes."""
         return ended("garbage", f"crashed: {cause}")
 
-    def failed(self, record: Row) -> bool:
-        """Tell whether a cell is garbage."""
-        return bool(record["kind"] == "garbage")
-
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Count classes; passed if no cell is garbage."""
-        bad = {name: record["reason"] for name, record in records.items() if self.failed(record)}
+        bad = {name: record["reason"] for name, record in records.items() if record["kind"] == "garbage"}
         garbage = [Text(f"garbage   {_file(name)}: {reason}") for name, reason in bad.items()]
         errors = [record["error_motion"] for record in records.values() if record["error_motion"] is not None]
         resolved = sum(record["resolved"] for record in records.values())
@@ -134,7 +130,7 @@ class Grid(Study):
         """Write the table, the pictures, and the scenes of garbage."""
         cells = self.cases()
         for name, record in records.items():
-            if self.failed(record):
+            if record["kind"] == "garbage":
                 (directory / _file(name)).write_text(tomli_w.dumps(scene_dict(cells[name])), encoding="utf-8")
         return super().write(records, directory, pictures=pictures)
 

@@ -17,7 +17,7 @@ from .alone import (
     static_deflection,
 )
 from .coupled import added_mass, bar_impact, energy_scheme, moving_base, pulse, resonance, slow_ramp, two_masses
-from .laws import compliant_impact, damped_link, hunt_crossley, linked_masses, tied_masses
+from .laws import compliant_impact, damped_link, hunt_crossley, link, tie
 
 #: In the order of the table. Each raises FmuError if an FMU cannot be found, loaded or initialised.
 SECTIONS = (
@@ -25,5 +25,5 @@ SECTIONS = (
     *(duffing, escape),
     *(bar_impact, two_masses, added_mass, energy_scheme),
     *(resonance, pulse, slow_ramp, moving_base),
-    *(compliant_impact, hunt_crossley, linked_masses, damped_link, tied_masses),
+    *(compliant_impact, hunt_crossley, link, damped_link, tie),
 )

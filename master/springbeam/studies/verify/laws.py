@@ -1,6 +1,11 @@
 """Both FMUs under an interface law: free masses that meet, masses on a link, masses tied for good.
 
-`springbeam.studies.exact` has the solutions and the scenes.
+Two free masses meet: with the reduced mass μ = 1/(1/m₁ + 1/m₂) the penetration follows μ p̈ = −C(p, ṗ), from p = 0 and
+ṗ = v. Hunt & Crossley's C = λ p^q (1 + χ ṗ) separates, with w = ṗ along p::
+
+    μ w dw/(1 + χ w) = −λ p^q dp,     G(w) = (χ w − ln(1 + χ w))/χ²,     G(w) = G(v) − λ p^{q+1}/(q + 1)μ
+
+so that G = 0 at the largest penetration, and the ends part with −w, G(w) = G(v), w < 0 (χ → 0: G = w²/2, w = −v).
 """
 
 from __future__ import annotations
@@ -9,16 +14,117 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import product
 from math import nan, pi, sin, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.special import spherical_jn
+from scipy.linalg import block_diag, expm
+from scipy.special import beta, lambertw, spherical_jn
 
 from ...results.trajectory import Trajectory
 from ...run.runner import simulate
-from ...scene import Scene
-from .. import exact
+from ...scene import Beam, Scene, scene_from_dict
 from .alone import IDA, ida_error
 from .check import Check, section
+
+#: Stiffness [N, N·m²] that leaves the tip of a beam a free mass for a second, and rotary inertia that keeps θ at rest.
+_LIMP, _RIGID = 1e-13, 1e14
+
+
+class Impact(NamedTuple):
+    """Two free masses on normal compliance."""
+
+    penetration: float  #: largest p [m]
+    duration: float | None  #: of the contact [s]; ``None`` with damping, where no closed form is known
+    rebound: float  #: speed at which they part [m/s]
+    dissipated: float  #: [J]
+
+
+def impact(mass: float, speed: float, stiffness: float, exponent: float, damping: float = 0.0) -> Impact:
+    """Return how a reduced mass [kg] at ``speed`` [m/s] meets λ_nc = ``stiffness`` [N/m^q], q = ``exponent``, χ [s/m].
+
+    T = 2 p_max/v · B(1/(q+1), ½)/(q+1) without damping.
+    """
+    q = exponent
+    if damping == 0.0:
+        largest = ((q + 1.0) * mass * speed**2 / (2.0 * stiffness)) ** (1.0 / (q + 1.0))
+        return Impact(largest, float(2.0 * largest / speed * beta(1.0 / (q + 1.0), 0.5) / (q + 1.0)), speed, 0.0)
+    G = damping * speed - np.log1p(damping * speed)
+    largest = ((q + 1.0) * mass * G / (stiffness * damping**2)) ** (1.0 / (q + 1.0))
+    # x = 1 + χ w < 1 with x − ln x = 1 + G, that is −x e^{−x} = −e^{−1−G}.
+    rebound = float((1.0 + lambertw(-np.exp(-1.0 - G)).real) / damping)
+    return Impact(float(largest), None, rebound, 0.5 * mass * (speed**2 - rebound**2))
+
+
+def free_masses(
+    tip_mass: float, mass: float, speed: float, t_end: float, contact: dict[str, Any], **coupling: Any
+) -> Scene:
+    """Return a scene in which a tip of ``tip_mass`` [kg] meets a free ``mass`` [kg] at t = 0 with ``speed`` [m/s].
+
+    The beam is one linear element, whose tip has ρAL/3, too limp to hold it.
+    """
+    beam = {**Beam.ones(), "density": 3.0 * tip_mass, "young_modulus": _LIMP, "shear_modulus": _LIMP, "n_elements": 1}
+    return scene_from_dict(
+        {
+            "time": {"t_end": t_end},
+            "beam": {**beam, "initial_velocity_slope": -speed},
+            "spring": {"mass": mass, "linear_stiffness": 0.0},
+            "contact": contact,
+            "coupling": coupling,
+        }
+    )
+
+
+def linked_masses(stiffness: float, damping: float, t_end: float, **coupling: Any) -> Scene:
+    """Return a scene of two unit masses, each held by 4π² N/m, on a link [N/m, N·s/m]; the tip starts at 1 m."""
+    link, own = {"law": "link", "stiffness": stiffness, "damping": damping}, 4.0 * np.pi**2
+    return _held_masses(own, own, link, t_end, {"initial_deflection_slope": 1.0}, coupling)
+
+
+def tied_masses(tip: float, top: float, t_end: float, **coupling: Any) -> Scene:
+    """Return a scene of two unit masses, held by ``tip`` and ``top`` [N/m] and tied; the tip starts with −1 m/s."""
+    return _held_masses(tip, top, {"law": "tie"}, t_end, {"initial_velocity_slope": -1.0}, coupling)
+
+
+def _held_masses(
+    tip: float, top: float, contact: dict[str, Any], t_end: float, start: dict[str, float], coupling: dict[str, Any]
+) -> Scene:
+    """A scene of unit masses held by ``tip`` and ``top`` [N/m].
+
+    The beam is one linear element that can shear only: a huge rotary inertia keeps θ = 0.
+    """
+    beam = {**Beam.ones(), "density": 3.0, "second_moment_of_area": _RIGID, "shear_modulus": tip, "n_elements": 1}
+    return scene_from_dict(
+        {
+            "time": {"t_end": t_end},
+            "beam": {**beam, **start},
+            "spring": {"mass": 1.0, "linear_stiffness": top},
+            "contact": contact,
+            "coupling": coupling,
+        }
+    )
+
+
+def linked(scene: Scene, M: np.ndarray, K: np.ndarray, q: np.ndarray, v: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return (u, y) [m] at ``times`` [s], shape (len(times), 2), of a beam on a linear spring and a link.
+
+    ``M``, ``K`` are the matrices of the beam, whose last unknown is the tip; ``q``, ``v`` its state at the start.
+    Exact: M q̈ + (α_b K + c gᵀg) q̇ + (K + λ gᵀg) q = F with the spring's unknown added, p = g q.
+    """
+    assert scene.beam is not None
+    assert scene.spring is not None
+    spring, law, n = scene.spring, scene.contact, len(M) + 1
+    joint = np.pad([[1.0, -1.0], [-1.0, 1.0]], (n - 2, 0))  # gᵀg
+    mass = block_diag(M, spring.mass)
+    damping = block_diag(scene.beam.alpha_b * K, spring.damping) + law.damping * joint
+    stiffness = block_diag(K, spring.linear_stiffness) + law.stiffness * joint
+    load = np.append(np.zeros(n - 1), spring.external_force)[:, None]
+    rates = np.linalg.solve(mass, np.hstack([-stiffness, -damping, load]))
+    A = np.vstack([np.eye(n, 2 * n + 1, n), rates, np.zeros(2 * n + 1)])  # of displacements, velocities and 1
+    start = np.concatenate([q, [spring.equilibrium], v, [spring.initial_velocity, 1.0]])
+    return np.array([(expm(A * t) @ start)[[n - 2, n - 1]] for t in times])
+
+
+# -- the checks -------------------------------------------------------------------------------------------------------
 
 #: The masses that meet [kg], and λ_nc between them [N/m^q].
 _TIP, _TOP, _STIFFNESS = 0.5, 2.0, 1e4
@@ -51,7 +157,7 @@ def _halving(
 
 def _lasts(q: float) -> float:
     """Return how long the undamped contact of the free masses lasts [s]."""
-    duration = exact.impact(_REDUCED, 1.0, _STIFFNESS, q).duration
+    duration = impact(_REDUCED, 1.0, _STIFFNESS, q).duration
     assert duration is not None
     return duration
 
@@ -75,7 +181,7 @@ def compliant_impact(q: float) -> Iterator[Check]:
     """
     whole, steps, solver = _lasts(q), 40, ida_error(pi)
     law = {"law": "compliance", "stiffness": _STIFFNESS, "exponent": q}
-    scene = partial(exact.free_masses, _TIP, _TOP, 1.0, 1.5 * whole, law, degree=2)
+    scene = partial(free_masses, _TIP, _TOP, 1.0, 1.5 * whole, law, degree=2)
     if q == 1.0:
         for degree in (0, 1, 2):
             bound = whole * (_phase(degree, pi / steps) + solver)
@@ -93,9 +199,9 @@ def compliant_impact(q: float) -> Iterator[Check]:
 @section("Law: Hunt & Crossley, χ = 0.5 s/m", (1.0,), (1.5,), (3.0,))
 def hunt_crossley(q: float) -> Iterator[Check]:
     """C = λ_nc p₊^q (1 + χ ṗ), χ = 0.5 s/m: the masses part at w with χ w − ln(1 + χ w) as before, and w < 0."""
-    hit, whole = exact.impact(_REDUCED, 1.0, _STIFFNESS, q, 0.5), _lasts(q)
+    hit, whole = impact(_REDUCED, 1.0, _STIFFNESS, q, 0.5), _lasts(q)
     law = {"law": "compliance", "stiffness": _STIFFNESS, "exponent": q, "damping": 0.5}
-    scene = partial(exact.free_masses, _TIP, _TOP, 1.0, 2.0 * whole, law, degree=2)
+    scene = partial(free_masses, _TIP, _TOP, 1.0, 2.0 * whole, law, degree=2)
     quantities = (
         (f"q = {q:g}: part at [m/s]", hit.rebound, _parting),
         (f"q = {q:g}: dissipated [J]", hit.dissipated, lambda run: float(run["e_dissipated"][-1])),
@@ -108,13 +214,13 @@ _LINK, _M, _K = 16.0 * pi**2, np.eye(1), np.full((1, 1), 4.0 * pi**2)
 
 
 @section("Law: two masses on a link", *product((0, 1, 2), (0.025, 0.0125)))
-def linked_masses(degree: int, size: float) -> Iterator[Check]:
+def link(degree: int, size: float) -> Iterator[Check]:
     """Unit masses held by 4π² each, on a link of 16π² N/m: u, y = (cos 2πt ± cos 6πt)/2.
 
     The link has 8/9 of the stiffness of the fast mode and none of the slow one's.
     """
-    run = simulate(exact.linked_masses(_LINK, 0.0, 1.0, macro_step=size, degree=degree))
-    masses = exact.linked(run.scene, _M, _K, np.ones(1), np.zeros(1), run["time"])
+    run = simulate(linked_masses(_LINK, 0.0, 1.0, macro_step=size, degree=degree))
+    masses = linked(run.scene, _M, _K, np.ones(1), np.zeros(1), run["time"])
     error = float(np.max(np.abs(np.column_stack([run["u_tip"], run["y"]]) - masses)))
     bound = 0.5 * 6.0 * pi * 8.0 / 9.0 * _phase(degree, 6.0 * pi * size) + ida_error(6.0 * pi)
     reason = f"largest error over 1 s. {_PROJECTED}; and {IDA}"
@@ -123,9 +229,9 @@ def linked_masses(degree: int, size: float) -> Iterator[Check]:
 
 @section("Law: two masses on a damped link, c = 3 N·s/m")
 def damped_link() -> Iterator[Check]:
-    """The masses of `linked_masses`, whose motion is a matrix exponential."""
-    scene = partial(exact.linked_masses, _LINK, 3.0, 1.0, degree=2)
-    u, y = exact.linked(scene(macro_step=0.025), _M, _K, np.ones(1), np.zeros(1), np.ones(1))[0]
+    """The masses of `link`, whose motion is a matrix exponential."""
+    scene = partial(linked_masses, _LINK, 3.0, 1.0, degree=2)
+    u, y = linked(scene(macro_step=0.025), _M, _K, np.ones(1), np.zeros(1), np.ones(1))[0]
     ends = (
         ("u_tip(1) [m]", float(u), lambda run: float(run["u_tip"][-1])),
         ("y(1) [m]", float(y), lambda run: float(run["y"][-1])),
@@ -134,13 +240,13 @@ def damped_link() -> Iterator[Check]:
 
 
 @section("Law: two masses tied")
-def tied_masses() -> Iterator[Check]:
+def tie() -> Iterator[Check]:
     """Unit masses held by 4π² and 12π² N/m, tied for good: one oscillator of ω² = 8π² from ẏ = −½ m/s, ¼ J lost.
 
     The tie pulls as much as it presses: C = (k₁ − k₂) y/2.
     """
     T, omega = 1.0, sqrt(8.0) * pi
-    scene = partial(exact.tied_masses, 4.0 * pi**2, 12.0 * pi**2, T, degree=2)
+    scene = partial(tied_masses, 4.0 * pi**2, 12.0 * pi**2, T, degree=2)
     quantities = (
         ("y(1) [m]", -0.5 / omega * sin(omega * T), lambda run: float(run["y"][-1])),
         ("lost in the impact [J]", 0.25, lambda run: float(run["e_impact_loss"][-1])),
