@@ -10,7 +10,7 @@ import pytest
 from commands import HANGS, printed
 from scenes import scene_from_dict
 
-from springbeam import RunStopped, SceneError, with_changes
+from springbeam import RunStopped, SceneError, load_scene, with_changes
 from springbeam.monolithic import event_driven
 from springbeam.results.files import load_trajectory
 from springbeam.results.recording import MemoryRecorder
@@ -304,3 +304,21 @@ def test_command(tmp_path):
     again = simulate(written.scene)  # the last pilot run is the result, and that of the scene which it was picked for
     assert written.steps.tobytes() == again.steps.tobytes()
     assert written.events == again.events
+
+
+def test_an_accuracy_that_is_not_reached_says_how_far_it_was(monkeypatch):
+    scene = load_scene("soft", ["time.t_end=0.05"], 1e-9)
+    for most, said in ((1, "a run that may do takes"), (30, "not reached with 30 steps, runs still differ by")):
+        monkeypatch.setattr(search, "_MOST", most)
+        with pytest.raises(SceneError, match=said):
+            search.pick(scene)
+
+    def stops(scene):
+        error = RunStopped("diverges", 0.1)
+        error.run = run
+        raise error
+
+    run = search.runner.simulate(with_changes(scene, accuracy=None))
+    monkeypatch.setattr(search.runner, "simulate", stops)
+    with pytest.raises(RunStopped, match="diverges"):
+        search.pick(scene)

@@ -2,14 +2,16 @@
 
 import json
 from collections import Counter
+from itertools import count
 
 import numpy as np
 import pytest
 from commands import command, printed, refused
 from scenes import scene_from_dict
 
-from springbeam import SceneError, load_scene, simulate, with_changes
+from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
 from springbeam.signals.measured import read_measured, residuals
+from springbeam.studies import fit
 from springbeam.studies.fit import Fit
 from springbeam.studies.study import record_all
 
@@ -141,6 +143,30 @@ def test_a_clock_is_held_where_the_user_says(tmp_path):
     path = written(tmp_path / "m.csv", "time,y", TIMES + 0.013, exact())
     (stiffness,) = fitted(path, ["spring.linear_stiffness=750"], shift=-0.013)["keys"]
     assert stiffness["value"] == pytest.approx(800.0, rel=1e-6)
+
+
+def test_a_trial_that_cannot_be_run_turns_the_search_back(tmp_path, monkeypatch):
+    """The sixth run: after that of the guesses, and five for the first derivatives."""
+    right, runs = fit.simulate, count()
+
+    def stops_once(scene):
+        if next(runs) == 6:
+            raise RunStopped("diverges", 0.1)
+        return right(scene)
+
+    monkeypatch.setattr(fit, "simulate", stops_once)
+    found = fitted(written(tmp_path / "m.csv", "time,y", TIMES, exact()), shift=0.0)
+    (error,) = [row["error"] for row in found["runs"] if row["error"]]
+    assert "diverges" in error
+    assert {row["key"]: row["value"] for row in found["keys"]} == pytest.approx(TRUE, rel=1e-6)
+
+
+def test_curves_weigh_by_what_is_left_of_them(tmp_path):
+    """A second curve of noise alone hardly moves what the first one tells; weighed by its spread, by 1 %."""
+    noise = np.random.default_rng(1).normal(0.0, 0.5, len(TIMES))
+    path = written(tmp_path / "m.csv", "time,y,z", TIMES, exact(), noise)
+    (stiffness,) = fitted(path, ["spring.linear_stiffness=790"], shift=0.0)["keys"]
+    assert stiffness["value"] == pytest.approx(800.0, rel=1e-3)
 
 
 def test_intervals_hold_what_is_right_in_most_cases(tmp_path):

@@ -93,7 +93,7 @@ OTHERS = {"DOP853", "LSODA", "Radau"}
 )
 def test_every_axis_is_swept_that_the_law_has(law, there, absent):
     study = Tradeoff(scene=small(contact={"law": law}, time={"t_end": 0.05}))
-    families = {case["family"] for case in study.configurations.values()}
+    families = {case["family"] for case in study.cases().values()}
     assert ENERGY | OTHERS | {"energy 2 adaptive"} | there <= families
     assert absent not in families
 
@@ -102,7 +102,7 @@ def test_command(tmp_path):
     arguments = ["tradeoff", "duffing", "--until", "0.2", "--repeats", "2", "--json", "--out", str(tmp_path / "out")]
     table = json.loads(printed(*arguments))
     assert [row["error"] for row in table["cheapest"]] == [1e-2, 1e-4, 1e-6, 1e-8]
-    assert table["cheapest"][3]["co_simulation"]["error"] <= 1e-8
+    assert worst(table["cheapest"][3]["co_simulation"]) <= 1e-8
     rows = list(csv.DictReader((tmp_path / "out" / "tradeoff.csv").open()))
     assert {row["family"] for row in rows} >= {"energy 0", "DOP853"}
     assert all(row["error_u_tip"] == "" for row in rows)
@@ -119,7 +119,7 @@ def test_what_takes_too_long_is_given_up_and_named(monkeypatch):
     assert len(begun) == len({row["family"] for row in rows}) < len(rows)
     assert all("takes more than 0 s" in row["error"] or "diverges" in row["error"] for row in begun)
     assert troubles(record_all(study)) == [
-        f"error     in {len(rows)} cases, first in energy 0, H = 0.004: takes more than 0 s at t = 0"
+        f"error     in {len(rows)} cases, first in energy 0, H = 0.004: stopped at t = 0.0005 s: takes more than 0 s"
     ]
     assert {row["status"] for row in rows} == {"stopped", "skipped"}
 
@@ -127,8 +127,8 @@ def test_what_takes_too_long_is_given_up_and_named(monkeypatch):
 def test_a_beam_without_inertia_is_no_problem_for_scipy():
     """It has no equation of motion."""
     study = Tradeoff.of(with_changes(load_scene("soft"), beam={"fidelity": "quasi_static"}), until=0.02)
-    assert study.configurations
-    assert not any("method" in case for case in study.configurations.values())
+    assert study.cases()
+    assert not any("method" in case for case in study.cases().values())
     assert study.remarks[0].startswith("scipy's solvers are left out")
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -23,7 +23,6 @@ from rich.text import Text
 from ..results.directory import ResultsExist, RunDirectory
 from ..scene import load_scene
 from .common import (
-    BAD_INPUT,
     STOPPED,
     ForceOption,
     JsonOption,
@@ -132,10 +131,8 @@ def _opened(study: Study, default: str, frame: Frame) -> Records:
     if frame.out is not None or frame.force:
         return Records(study, frame.out or Path("results") / default, replace=frame.force)
     for number in count(1):
-        try:
+        with suppress(ResultsExist):
             return Records(study, Path("results") / (default if number == 1 else f"{default}-{number}"))
-        except ResultsExist:
-            continue
     raise AssertionError("unreachable")
 
 
@@ -149,8 +146,6 @@ def _going_on(records: Records, total: int) -> Iterator[None]:
 
     try:
         yield
-    except ConnectionError as error:
-        fail(BAD_INPUT, str(error))
     except (KeyboardInterrupt, RunStopped, ReferenceFailure, OSError) as error:
         if isinstance(error, OSError) and not records.by_name:
             raise

@@ -69,8 +69,7 @@ class Crosscheck(Study):
         over = " over the run that was asked for" * (verdict == "not comparable")
         looks = {"agrees": "bold green", "differs": "bold red", "not comparable": "bold"}
         shown.append(Text(f"{verdict}{over}", style=looks[verdict]))
-        told = ("verdict", "horizon", "growth", "events", "notes", "scene", "quantities")
-        return Findings({name: record[name] for name in told}, shown, CODES[verdict])
+        return Findings({name: found for name, found in record.items() if name != "runs"}, shown, CODES[verdict])
 
     def draw(self, records: Mapping[str, Row]) -> Pictures:
         """Draw both motions, forces and impulses."""

@@ -64,8 +64,9 @@ class Fit(Study):
         return cls(scene=scene, file=str(path), digest=digest, vary=tuple(vary), **settings)
 
     def cases(self) -> dict[str, Row]:
-        """Return the one search. Raises SceneError for keys or guesses that are not there."""
+        """Return the one search. Raises SceneError for keys, guesses or columns that are not there."""
         self.at(self.guesses())
+        self.data()
         return {_CASE: {}}
 
     def guesses(self) -> dict[str, float]:
@@ -88,10 +89,7 @@ class Fit(Study):
         return read_measured(self.file, self.scene, mapping(self.names))
 
     def record(self, case: Row) -> Row:
-        """Return the values found, their intervals, and every run on the way.
-
-        Raises SceneError for columns that are not there, or too few points.
-        """
+        """Return the values found, their intervals, and every run on the way. Raises SceneError for too few points."""
         data, guesses, free = self.data(), self.guesses(), self.shift is None
         run = simulate(self.at(guesses))
         # While keys are wrong the curves may fit best a period too late: a few places are tried.

@@ -384,20 +384,20 @@ def _processes(workers: int) -> Iterator[Callable[..., Future[Row]]]:
 
 @contextmanager
 def dask_cluster(scheduler: str) -> Iterator[Executor]:
-    """Open the Dask cluster at ``scheduler``. Raises ConnectionError if it cannot be reached or its workers differ."""
+    """Open the Dask cluster at ``scheduler``. Raises SceneError if it cannot be reached or its workers differ."""
     try:
         from distributed import Client
 
         client = Client(scheduler, timeout=10.0)
     except ImportError as error:
-        raise ConnectionError(f"--scheduler: {error}; pip install distributed") from error
+        raise SceneError(f"--scheduler: {error}; pip install distributed") from error
     except (OSError, ValueError) as error:
-        raise ConnectionError(f"--scheduler {scheduler}: cannot be reached: {error}") from error
+        raise SceneError(f"--scheduler {scheduler}: cannot be reached: {error}") from error
     with client:
         own = metadata.version("springbeam")
         told: Any = client.get_versions(packages=["springbeam"])
         theirs = {address: worker["packages"]["springbeam"] for address, worker in told["workers"].items()}
         if set(theirs.values()) != {own}:
             others = ", ".join(f"{address} has {version}" for address, version in theirs.items()) or "there are none"
-            raise ConnectionError(f"the workers need springbeam {own}, as is here; {others}")
+            raise SceneError(f"the workers need springbeam {own}, as is here; {others}")
         yield client.get_executor(pure=False)

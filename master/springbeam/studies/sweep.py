@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -18,7 +19,7 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from ..scene import Load, Scene, SceneError
+from ..scene import Scene, SceneError
 from ..scene.messages import unit_of
 from .design import Axis, Sampling, design, parse_axis
 from .metrics import PRINCIPAL, USUAL, Metric, heading, metrics_of
@@ -66,11 +67,9 @@ class Sweep(Study):
 
     def cases(self) -> dict[str, Row]:
         """Return the values of the axes. Raises SceneError if a key or a metric is not there."""
-        _, axes = self.metrics, self.axes
-        if self.boundary:
-            self._pulse()
-        names = [axis.name for axis in axes]
-        values = design(axes, self.samples, self.seed, self.sampling)
+        _ = self.metrics, self.boundary and self._pulse  # both raise where something is not there
+        names = [axis.name for axis in self.axes]
+        values = design(self.axes, self.samples, self.seed, self.sampling)
         return {str(index): dict(zip(names, several, strict=True)) for index, several in enumerate(values)}
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
@@ -117,28 +116,22 @@ class Sweep(Study):
     def _limit(self) -> tuple[str, float]:
         """The metric of the boundary, and what it must not reach. Raises SceneError for anything else."""
         metric, _, value = self.boundary.rpartition("=")
-        try:
+        with suppress(ValueError):
             limit = float(value)
-        except ValueError:
-            limit = 0.0
-        if not limit > 0.0:
-            raise SceneError(
-                f"--boundary {self.boundary}: must be METRIC=LIMIT with a limit above 0, as in max_clamp_moment=0.3"
-            )
-        return metric.strip(), limit
+            if limit > 0.0:
+                return metric.strip(), limit
+        raise SceneError(
+            f"--boundary {self.boundary}: must be METRIC=LIMIT with a limit above 0, as in max_clamp_moment=0.3"
+        )
 
-    def _pulse(self) -> tuple[Load, str, str]:
-        """Return the pulse that varies, and the names of the axes of its amplitude and its duration.
-
-        Raises SceneError if the sweep is over anything else.
-        """
+    @property
+    def _pulse(self) -> str:
+        """The load whose amplitude and duration vary. Raises SceneError if the sweep is over anything else."""
         names = {axis.name for axis in self.axes}
-        table = next(iter(names), "").rpartition(".")[0]
-        amplitude, duration = f"{table}.amplitude", f"{table}.duration"
-        if names != {amplitude, duration} or not table.startswith("loads."):
+        pulse = min(names, default="").rpartition(".")[0]
+        if names != {f"{pulse}.amplitude", f"{pulse}.duration"} or not pulse.startswith("loads."):
             raise SceneError("--boundary: takes --vary loads.0.amplitude=… and --vary loads.0.duration=… of one pulse")
-        load = self.scene.loads[int(table.partition(".")[2])]
-        return load, amplitude, duration
+        return pulse
 
     def _critical(self, records: Mapping[str, Row]) -> list[dict[str, float]]:
         """Return the critical pulses by duration; none at durations whose runs stay below the limit.
@@ -146,15 +139,20 @@ class Sweep(Study):
         A critical pulse has its ``duration`` [s], its ``peak``, in the load's unit, and its ``velocity_change``, the
         integral of the load.
         """
-        (load, amplitude, duration), (metric, limit), found = self._pulse(), self._limit, []
+        pulse, (metric, limit), found = self._pulse, self._limit, []
+        amplitude, duration, load = (
+            f"{pulse}.amplitude",
+            f"{pulse}.duration",
+            self.scene.loads[int(pulse.partition(".")[2])],
+        )
         known = [row for row in self.rows(records) if row[metric] is not None]
         for length in sorted({row[duration] for row in known}):
             pairs = sorted((abs(row[amplitude]), abs(row[metric])) for row in known if row[duration] == length)
             peaks, values = np.array([(0.0, 0.0), *pairs]).T
             if k := int(np.argmax(values >= limit)):
                 peak = float(np.interp(limit, values[k - 1 : k + 1], peaks[k - 1 : k + 1]))
-                pulse = load.model_copy(update={"amplitude": 1.0, "duration": length, "start": 0.0})
-                mean = float(pulse.value((np.arange(_POINTS) + 0.5) * length / _POINTS).mean())
+                unit = load.model_copy(update={"amplitude": 1.0, "duration": length, "start": 0.0})
+                mean = float(unit.value((np.arange(_POINTS) + 0.5) * length / _POINTS).mean())
                 found.append({"duration": length, "velocity_change": peak * mean * length, "peak": peak})
         return found
 

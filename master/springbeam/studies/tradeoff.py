@@ -79,9 +79,8 @@ class Tradeoff(Study):
         scene = with_changes(scene, accuracy=None, time={"t_end": window})
         return cls(scene=scene, remarks=tuple(remarks), **settings)
 
-    @cached_property
-    def configurations(self) -> dict[str, Row]:
-        """The axes of all configurations that the scene can have, by label; if quick, of every third of a family.
+    def cases(self) -> dict[str, Row]:
+        """Return the axes of all configurations that the scene can have, by label; if quick, every third of each.
 
         They are family, setting, and keys or scipy's method and tolerance.
         """
@@ -92,15 +91,11 @@ class Tradeoff(Study):
                 families.setdefault(case["family"], []).append(case)
         return {_label(case): case for cases in families.values() for case in cases[:: 3 if self.quick else 1]}
 
-    def cases(self) -> dict[str, Row]:
-        """Return the configurations."""
-        return self.configurations
-
     def skipped(self, case: Row, records: Mapping[str, Row]) -> Row | None:
         """Leave out what a coarser one of the family was too slow for."""
         limit = 0.1 * _LIMIT if self.quick else _LIMIT
-        for name, other in self.configurations.items():
-            if other["family"] == case["family"] and records.get(name, {}).get("cost_wall_time", 0.0) > limit:
+        for name, record in records.items():
+            if name.rpartition(", ")[0] == case["family"] and record.get("cost_wall_time", 0.0) > limit:
                 return {"status": "skipped", "error": f"{name} took more than {limit:g} s"}
         return None
 
@@ -173,8 +168,7 @@ class Tradeoff(Study):
             table(("configuration", "error", "event [s]", "solve [ms]", "set-up [ms]", "doSteps"), on_front,
                   "Pareto front"),
         ]  # fmt: skip
-        told = [c | {side: _told(c[side]) for side in ("co_simulation", "scipy")} for c in best]
-        return Findings({"until": until, "cheapest": told, "front": list(map(_told, front))}, shown)
+        return Findings({"until": until, "cheapest": best, "front": front}, shown)
 
     def draw(self, records: Mapping[str, Row]) -> Pictures:
         """Draw the work–precision diagrams: error over time, and over doStep calls."""
@@ -234,13 +228,6 @@ def _label(case: Row) -> str:
 
 def _shown(row: Row | None) -> tuple[str, str]:
     return ("none gets there", "") if row is None else (_label(row), f"{1e3 * row['cost_wall_time']:.3g}")
-
-
-def _told(row: Row | None) -> Row | None:
-    """Return what is said of a row to programs."""
-    if row is None:
-        return None
-    return {"name": _label(row), "error": worst(row), "solve": row["cost_wall_time"], "setup": row["cost_setup"]}
 
 
 def _configurations(scene: Scene) -> Iterator[Row]:
