@@ -287,7 +287,7 @@ _OF_LOADS = Rule(
 _OF_CONTACT = (
     Rule(
         _law_missed,
-        "not resolved: what the forces of the steps miss of the contact law moves an end by {far} of its way. "
+        "not resolved: the forces of the steps differ from the contact law, which moves an end by {far} of its way. "
         "Velocities, forces and times of contact are samples of a faster motion; {remedy}",
     ),
     Rule(  # a force that does not see the contact end

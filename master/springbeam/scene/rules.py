@@ -44,7 +44,7 @@ def impossible(scene: Scene) -> list[str]:
             return []
     except ArithmeticError:
         found = []
-    return found or [f"no double holds what follows from these values; check their units: {_most_extreme(scene)}"]
+    return found or [f"too large or too small to compute with; check the units: {_most_extreme(scene)}"]
 
 
 def _is_finite(beam: Beam) -> bool:
@@ -184,8 +184,8 @@ FORBIDDEN: tuple[Rule, ...] = (
     *(
         Rule(
             lambda s, table=table: s.static and not isinstance(s.under(table), Beam | Spring | RigidWall | None),
-            f"{{time.initial_state}}: where the body in [{table}] rests is known of our own beam and spring and of a "
-            "rigid_wall only; leave initial_state out",
+            f"{{time.initial_state}}: only our own beam and spring and a rigid_wall can start at rest, not the body in "
+            f"[{table}]; leave initial_state out",
         )
         for table in ("beam", "spring")
     ),
@@ -542,7 +542,7 @@ FORBIDDEN_LOADS: tuple[Rule, ...] = (
     *(
         Rule(
             lambda s, load, table=table, end=end: load.on == end and isinstance(s.under(table), RigidWall),
-            f"{{load.on}}: {{{table}.element}} moves under no load; take the load out",
+            f"{{load.on}}: {{{table}.element}} stays where it is under any load; take the load out",
         )
         for table, end in (("beam", "tip"), ("spring", "spring"))
     ),
