@@ -90,17 +90,3 @@ def test_soft_laws_get_degree_2_which_is_never_worse(contact, coupling):
 
 def test_steps_from_tolerances_are_hermites():
     assert choice(with_changes(PAIR, coupling={"relative_tolerance": 1e-4}))[:2] == ("hermite", 2)
-
-
-def test_a_run_is_that_of_the_scheme_it_takes_and_says_so():
-    short = {"time": {"t_end": 0.1}}
-    found = simulate(auto(**short, coupling={"macro_step": 1e-3}))
-    named = simulate(with_changes(PAIR, **short, coupling={"scheme": "hermite", "degree": 2, "macro_step": 1e-3}))
-    np.testing.assert_array_equal(found.u_tip, named.u_tip)
-    assert found.summary["coupling"] == {
-        "scheme": "hermite",
-        "degree": 2,
-        "because": "the whole mesh's ω_max H = 1.73 <= 3",
-    }
-    assert found.scene.coupling.scheme == "auto"
-    assert "coupling" not in named.summary

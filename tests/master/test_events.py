@@ -10,8 +10,8 @@ from numpy.polynomial import Polynomial
 
 from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Motion, StepRefused
-from springbeam.contact.events import EventFunctions, Height, Holding, clearance, gap, locate
-from springbeam.contact.phases import Joint, Phase, common_velocity
+from springbeam.contact.events import Holding, clearance, locate
+from springbeam.contact.phases import Joint, Phase
 from springbeam.coupling.protocol import Step
 from springbeam.results.paths import Path
 from springbeam.run.detection import Detector
@@ -21,6 +21,8 @@ from springbeam.run.stepping import Pair
 from springbeam.scene import Beam, Spring, load_scene, with_changes
 
 SIZE = 0.02
+
+
 #: Coefficients in x = τ/H, ascending.
 CUBICS = [(1.0, -3.0, 0.5, 0.2), (0.2, -2.0, 3.0, -0.7), (0.3, 1.0, -4.0, 1.5), (0.1, -1.0, 1.0, 1.0), (1.0, 2.0)]
 
@@ -87,45 +89,11 @@ def test_locate_does_not_take_a_zero_that_the_function_rises_from():
     assert located(f, math.pi, 1e-14, 0.0) == pytest.approx(0.5 * math.pi, abs=1e-14)
 
 
-@pytest.mark.parametrize(
-    "function", [gap, Height(0, 0.3, 0.0), Height(1, 0.3, 1.0, -1.0)], ids=["gap", "above", "below"]
-)
-def test_means_of_event_functions_are_their_integrals(function):
-    """∫ f dτ/H and ∫∫ f dτ dτ/H² of ends that move as polynomials, f by itself along the step."""
-    motions = Polynomial((0.5, -2.0, 30.0, 7.0)), Polynomial((0.1, 1.0, -20.0))
-
-    def value(tau):
-        return function(tuple(Motion(w(tau), w.deriv()(tau), 0.0, 0.0) for w in motions))[0]
-
-    nodes, weights = np.polynomial.legendre.leggauss(4)
-    tau = 0.5 * SIZE * (nodes + 1.0)
-    f = np.array([value(t) for t in tau])
-    # ∫∫ f = ∫ (H − τ) f dτ
-    expected = 0.5 * weights @ f, 0.5 * weights @ ((1.0 - tau / SIZE) * f)
-    ends = tuple(Motion(w(SIZE), 0.0, w.integ()(SIZE), w.integ(2)(SIZE)) for w in motions)
-    assert function.means(ends, SIZE) == pytest.approx(expected, rel=1e-12)
-
-
 def test_the_force_that_holds_a_massless_tip_falls_as_the_spring_moves():
     """1/k = 4/3 m/N, α_b = 0.1 s, 2 kg, c = 0.5 N·s/m, k1 = 3 N/m: C/k = 0.2 − 0.1 m, and ż = −0.175/2 m/s²."""
     holding = Holding(Beam.with_ones(alpha_b=0.1), Spring.with_ones(mass=2.0, damping=0.5, linear_stiffness=3.0))
     ends = Motion(0.2, -1.0, 0.0, 0.0), Motion(0.2, -1.0, 0.0, 0.0)
     assert holding(ends) == pytest.approx((0.1, -1.0 - 0.1 * 0.0875), rel=1e-14)
-
-
-@pytest.mark.parametrize(("v", "z", "rate"), [(-0.4, 0.1, -0.3), (-0.1, 0.4, -0.0), (0.4, -0.1, 0.3)])
-def test_joined_ends_go_on_with_their_common_velocity(v, z, rate):
-    """A tip of 4 kg and a top of 1 kg: a release needs both to rise, whichever way the top alone would go."""
-    scene = load_scene("soft")
-    functions = EventFunctions(
-        scene, None, tip_share=common_velocity(1.0, 0.0, 4.0, 1.0), equilibrium=scene.spring.equilibrium
-    )
-    motions = (Motion(0.0, v, 0.0, 0.0), Motion(0.0, z, 0.0, 0.0))
-    joined = dict(functions.of(Phase(Joint.TIED)))
-    assert joined["stop_impact"](motions) == pytest.approx((-scene.stop.position, rate))
-    assert joined["release"](motions) == pytest.approx((0.0, -rate))
-    assert dict(functions.of(Phase(Joint.TOUCH)))["retie"](motions) == pytest.approx((0.0, rate))
-    assert dict(functions.of(Phase()))["stop_impact"](motions)[1] == z
 
 
 @pytest.mark.parametrize(("jump", "refused"), [(5e-10, True), (5e-11, False)])

@@ -12,8 +12,6 @@ from scenes import scene_from_dict
 from springbeam.bodies import force
 from springbeam.run.loads import Signal
 from springbeam.scene import Load, SceneError, load_scene, with_changes
-from springbeam.scene.linearised import contact_energy
-from springbeam.scene.statics import tip_compliance, tip_force_shape
 
 RECORD = np.column_stack([np.linspace(0.0, 0.05, 26), 3.0 * np.sin(200.0 * np.linspace(0.0, 0.05, 26))])
 #: One of each signal, on all places.
@@ -231,15 +229,3 @@ def test_a_bad_table_is_named_with_line_and_column(text, error):
     with pytest.raises(SceneError) as refused:
         soft("linear")
     assert str(refused.value) == f'scene: [loads.0] file = "record.csv": {error}'
-
-
-@pytest.mark.parametrize("at", [0.25, 0.6, 1.0, None])
-def test_a_load_on_the_beam_counts_by_how_far_it_moves_the_tip_of_a_slender_one(at):
-    """Begun at once it does 2 F²/k, with the force at the tip that moves it as far: a force at x by what one at the tip
-    moves x, a base of 10 m/s² by 3/8 of the weight."""
-    beam = {"shear_modulus": 1e12, "area": 0.5, "initial_velocity_slope": 0.0, "approach": "elastic"}
-    load = {"on": "base"} if at is None else {"on": "beam", "at": at}
-    scene = with_changes(load_scene("soft"), beam=beam).model_copy(update={"loads": (Load(**load, amplitude=10.0),)})
-    compliance = tip_compliance(scene.beam)
-    share = 0.5 * 3.0 / 8.0 if at is None else float(tip_force_shape(scene.beam, np.array([at]))[0]) / compliance
-    assert contact_energy(scene) == pytest.approx(2.0 * (10.0 * share) ** 2 * compliance, rel=1e-6)

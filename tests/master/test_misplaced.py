@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from bodies import DuffingBody, Upper
 
-from springbeam import PointMass, load_scene, simulate, with_changes
+from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.run.misplaced import misplaced, tip_modes
 from springbeam.run.stepping import Pair
-from springbeam.scene import scene_from_dict, shipped_scenes
+from springbeam.scene import scene_from_dict
 
 SOFT = with_changes(load_scene("soft"), time={"t_end": 0.3}, beam={"n_elements": 10})
 LINK = {"law": "link", "stiffness": 2000.0}
@@ -126,34 +126,6 @@ def test_an_end_that_the_foundation_holds_is_off_by_no_more_than_the_tip(spring)
     assert "seated" in [event.kind for event in run.events]
     said, off = both_ends(run, exact)
     assert off < 1.1 * said < 2.0 * off
-
-
-def test_masses_of_ones_own_are_free():
-    """Two of 1 and 2 kg that a link joins, one of them moving; degree 0 misses its frequency by (ωH)²/24."""
-    scene = with_changes(SOFT, contact={**LINK, "stiffness": 100.0}, stop=None, time={"t_end": 0.2})
-    scene = with_changes(scene, coupling={"degree": 0, "macro_step": 5e-3})
-    run = simulate(scene, upper=PointMass(1.0, velocity=-1.0), lower=PointMass(2.0))
-    own, pair = run.scene.model_copy(update={"upper": None, "lower": None}), Pair(scene, PointMass(1.0), PointMass(2.0))
-    said = misplaced(own, pair, run.steps, run.events)
-    omega, t = np.sqrt(150.0), run.time
-    p, both = np.sin(omega * t) / omega, -t / 3.0
-    exact = {"u_tip": both - 2.0 * p / 3.0, "y": both + p / 3.0}
-    off = max(np.abs(run[name] - exact[name]).max() / np.abs(run[name]).max() for name in exact)
-    assert said == pytest.approx(off, rel=0.1)
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [{}, {"n_elements": 6}, {"reduced_integration": False}, {"n_modes": 4}],
-    ids=str,
-)
-@pytest.mark.parametrize("name", [name for name in shipped_scenes() if load_scene(name).beam is not None])
-def test_modes_are_those_of_the_mesh(name, changes):
-    beam = load_scene(name).beam.model_copy(update=changes)
-    exact, (omega, tip) = modal_beam(beam), tip_modes(beam)
-    same = slice(0, 4)
-    assert omega[same] == pytest.approx(exact.omega[same], rel=2e-2)
-    assert np.abs(tip[same]) == pytest.approx(np.abs(exact.tip[same]), rel=2e-2)
 
 
 def test_a_mesh_with_the_averaged_mass_has_the_modes_of_a_fine_one():

@@ -86,9 +86,6 @@ def test_axes_have_quantities_and_units_and_the_key_names_phases_and_events(pict
         assert (NOT_RESOLVED in texts(marked)) is not resolved
 
 
-T = np.linspace(0.0, 0.6, 400)
-
-
 def test_panels_are_painted_with_all_that_they_say():
     run = a_trajectory(compliance_force=np.zeros(400))
     (forces,) = (ax for ax in figure_of(run, "velocities_and_forces").axes if ax.get_ylabel().startswith("force"))

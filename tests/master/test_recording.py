@@ -14,7 +14,7 @@ import pytest
 from pyarrow import parquet
 from runs import PAIR, SCENES, a_trajectory, block
 
-from springbeam.results import files, recording
+from springbeam.results import recording
 from springbeam.results.columns import columns, first_not_finite
 from springbeam.results.directory import (
     ANIMATIONS,
@@ -29,7 +29,7 @@ from springbeam.results.directory import (
 from springbeam.results.files import export, load_summary, load_trajectory, read_run
 from springbeam.results.recording import FileRecorder, MemoryRecorder
 from springbeam.results.steps import PHASE_NAMES, STEP_COLUMNS
-from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, TOLD, Event, columns_of
+from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, TOLD, Event
 from springbeam.run.log import Log
 from springbeam.run.outcome import RunStopped
 from springbeam.scene import SceneError, with_changes
@@ -45,29 +45,6 @@ def filed(path, *blocks, scene=PAIR):
 
 
 # -- columns ------------------------------------------------------------------------------------------------------
-
-
-OF_CONTACT = {
-    *("contact_force", "contact_force_smoothed", "compliance_force", "tie_reaction", "velocity_mismatch", "e_contact"),
-}
-
-
-@pytest.mark.parametrize(
-    ("has", "without"),
-    [
-        ("all", set()),
-        ("no stop", {"foundation_force"}),
-        ("no spring", {"y", "z", "e_spring", "a_y", *OF_CONTACT}),
-        ("beam", {"y", "z", "e_spring", "a_y", *OF_CONTACT, "gap", "foundation_force"}),
-        ("spring", {"u_tip", "v_tip", "e_beam", *TOLD.keys() - {"a_y"}, *OF_CONTACT, "gap", "foundation_force"}),
-    ],
-)
-def test_columns_of_absent_bodies_are_left_out_in_order(has, without):
-    scene, steps = SCENES[has], block(4)[0]
-    if scene.beam is not None:
-        scene = with_changes(scene, beam={"area": None, "second_moment_of_area": None, "width": 1.0, "height": 2.0})
-    assert list(columns_of(scene)) == [name for name in (*COLUMNS, *TOLD) if name not in without]
-    assert list(columns(scene, steps, steps[:1])) == list(columns_of(scene))
 
 
 LAWS = {
@@ -200,12 +177,6 @@ def test_files_are_plain_csv_and_json(tmp_path):
     assert summary["scene"]["spring"]["cubic_stiffness"] == -0.2
     assert sorted(p.name for p in (tmp_path / "run").iterdir()) == WRITTEN
     assert (tmp_path / "run" / "steps.bin").read_bytes() == steps.tobytes()
-
-
-def test_rows_in_blocks_have_one_header(tmp_path):
-    blocks = [{"time": np.array([0.0, 1.0])}, {"time": np.array([2.0])}]
-    files.write_rows(RunDirectory(tmp_path), blocks)
-    assert (tmp_path / "trajectory.csv").read_text() == "time\n0.0\n1.0\n2.0\n"
 
 
 def test_summaries_take_numpy_and_name_what_json_has_no_number_for(tmp_path):
@@ -474,22 +445,6 @@ def test_results_that_are_cut_are_not_continued_nor_touched(tmp_path, name, dama
     ):
         refused.restore(saved)
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
-
-
-def test_rows_of_a_run_that_goes_on_are_gone_until_it_ends(tmp_path):
-    recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path))
-    recorder.keep(*block(3))
-    saved = recorder.save()
-    recorder.keep(*block(2, begin=3))  # after the checkpoint
-    recorder.finish({"status": "interrupted"})
-    recorder.close()
-    rows = b"".join((tmp_path / "trajectory.csv").read_bytes().splitlines(keepends=True)[:4])
-    with FileRecorder(PAIR, RunDirectory(tmp_path)) as recorder:
-        recorder.restore(saved)
-        assert not (tmp_path / "trajectory.csv").exists()
-        assert load_summary(tmp_path)["status"] == "running"
-        recorder.finish({"status": "done"})
-    assert (tmp_path / "trajectory.csv").read_bytes() == rows
 
 
 # -- a full disk --------------------------------------------------------------------------------------------------

@@ -233,20 +233,6 @@ def test_each_phase_is_integrated_as_scipy_does(name, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("speed", "e", "kind"), [(1.0, 0.5, "stop_impact"), (1.0, 0.0, "seated"), (0.0, 0.5, "seated")]
-)
-def test_a_tip_that_starts_on_the_stop_acts_on_it_at_once(speed, e, kind):
-    """It arrives with −speed, or a load presses it down; the row of that time is of what follows."""
-    start = {"initial_deflection_slope": 0.0, "initial_velocity_slope": -speed, "distributed_load": -5.0}
-    beam = {"n_elements": 8, "approach": "elastic", **start}
-    scene = with_changes(load_scene("beam-on-stop"), beam=beam, stop={"position": 0.0, "restitution": e})
-    result = event_driven.simulate(scene, sample_times=[0.0], t_end=1e-4)
-    assert (result.events[0].kind, result.events[0].time) == (kind, 0.0)
-    assert result.v_tip[0] == pytest.approx(e * speed, abs=1e-14)
-    assert result.phase[0] == ("seated" if kind == "seated" else "free")
-
-
-@pytest.mark.parametrize(
     ("changes", "arguments", "message"),
     [
         ({"contact": {"impact": "rest"}}, {}, "rigid tie"),

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scenes import scene_from_dict
 
 import springbeam
-from springbeam.scene import Beam, Scene, SceneError, load_scene, shipped_scenes, suspicions, with_changes
+from springbeam.scene import Beam, Scene, SceneError, load_scene, suspicions, with_changes
 from springbeam.scene.rules import implausible
 
 
@@ -129,38 +129,6 @@ def test_locking_of_full_integration_is_suspected_with_its_size(degree, n, shear
     if factor is not None:
         assert f"{factor:.3g} times too stiff; use reduced_integration = true" in found[0]
     assert suspicions(scene_from_dict(changed(beam={**slender, "reduced_integration": True}))) == []
-
-
-def test_shipped_scenes_are_valid_and_titled():
-    scenes = shipped_scenes()
-    assert "soft" in scenes
-    for name in scenes:
-        scene = load_scene(name)
-        assert scene.title
-        assert suspicions(scene) == []
-
-
-@pytest.mark.parametrize(
-    ("override", "table", "key", "value"),
-    [
-        ("time.t_end=2", "time", "t_end", 2.0),
-        ("time.t_end = 0.25", "time", "t_end", 0.25),
-        ("spring.mass=.5", "spring", "mass", 0.5),
-        ("spring.mass=1.", "spring", "mass", 1.0),
-        ("coupling.macro_step=1e-4", "coupling", "macro_step", 1e-4),
-        ("beam.n_elements=12", "beam", "n_elements", 12),
-        ("beam.reduced_integration=true", "beam", "reduced_integration", True),
-        ("contact.law=compliance", "contact", "law", "compliance"),
-        ('contact.law="compliance"', "contact", "law", "compliance"),
-        ("contact.law='compliance'", "contact", "law", "compliance"),
-    ],
-)
-def test_overrides(override, table, key, value):
-    """The last of two counts."""
-    earlier = f"{override.partition('=')[0]}=0.125"
-    changed_value = getattr(getattr(load_scene("soft", [earlier, override]), table), key)
-    assert changed_value == value
-    assert type(changed_value) is type(value)
 
 
 def test_a_tolerance_takes_the_place_of_the_macro_step_and_back():

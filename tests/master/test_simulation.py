@@ -5,7 +5,6 @@ from itertools import count
 import numpy as np
 import pytest
 from bodies import DuffingBody, Upper, simulate, stopping
-from references import dips
 from scenes import kinds, scene_from_dict
 
 from springbeam.bodies.gate import admit
@@ -29,26 +28,6 @@ def soft(n=6, **tables):
 
 
 # -- against the reference ------------------------------------------------------------------------------------------
-
-
-def thrown_together(upper, lower, **tables):
-    """The run of two masses on a linear contact, instead of beam and spring."""
-    tables["contact"] = {"law": "compliance", "exponent": 1.0, **tables["contact"]}
-    scene = with_changes(load_scene("soft"), beam={"approach": "elastic"}, stop=None, **tables)
-    return simulate(scene, lambda *_: (upper, lower))
-
-
-@pytest.mark.parametrize(("degree", "share"), [(0, 0.4), (1, 5e-3), (2, 5e-3)])
-def test_a_mass_that_swings_through_a_contact_within_a_step_touches_it(degree, share):
-    """u = 0.01 cos 100 t dips 0.1 mm below a mass at rest, from 30.0 to 32.8 ms, in a step from 29.7 to 33 ms: as soft
-    as the contact is, its impulse is ∫ λ p dt of that motion, but for 0.3 %."""
-    half = np.arccos(0.99) / 100.0
-    impulse = 1e3 * 0.02 * (np.sin(100.0 * half) / 100.0 - 0.99 * half)
-    ends = Upper(1.0, 1e4, 0.0, y=0.01), DuffingBody(1.0, 0.0, 0.0, y=-0.0099)
-    coupling = {"degree": degree, "macro_step": 3.3e-3}
-    run = thrown_together(*ends, time={"t_end": 0.04}, contact={"stiffness": 1e3}, coupling=coupling)
-    assert kinds(run) == ["impact", "separation"]
-    assert run.z[-1] == pytest.approx(-impulse, rel=share)
 
 
 @pytest.mark.parametrize("degree", [0, 2])
@@ -88,29 +67,6 @@ def test_a_bouncing_mass_comes_to_rest_after_its_geometric_series(e, size):
     assert trajectory.events[-1].time == pytest.approx(rest, abs=(2e-8 * v / g + 1e-9 * size) / (1.0 - e))
     assert trajectory.e_impact_loss[-1] == pytest.approx(g * d, rel=1e-12)
     assert trajectory.z[-1] == 0.0
-
-
-@pytest.mark.parametrize(("scheme", "degree"), [("energy", 0), ("energy", 2)])
-def test_a_top_that_leaves_its_foundation_for_less_than_a_step_is_seen(scheme, degree):
-    """Without stiffness, under F₀ − s(t − t₁) from where it is seated: it leaves at once, is back 3 F₀/s later, and the
-    foundation gives it 3/2 F₀²/s. At the end of the step, 0.22 s later, it would be below."""
-    force, slope, since, speed = 0.05, 1.0, 1.03, 1.0
-    load = force + slope * since
-    scene = scene_from_dict({
-        "time": {"t_end": 2.0},
-        "spring": {
-            "linear_stiffness": 0.0, "equilibrium": speed * since - load * since**2 / 2 + slope * since**3 / 6,
-            "initial_velocity": -speed, "external_force": load,
-        },
-        "loads": [{"on": "spring", "signal": "ramp", "amplitude": -2.0 * slope, "duration": 2.0}],
-        "stop": {"position": 0.0, "restitution": 0.0},
-        "coupling": {"scheme": scheme, "degree": degree, "macro_step": 0.25},
-    })  # fmt: skip
-    events = simulate(scene).events
-    assert [event.kind for event in events] == ["seated", "unseated", "seated"]
-    back = since + 3.0 * force / slope
-    assert [event.time for event in events] == pytest.approx([since, since, back], abs=1e-9)
-    assert events[2].impulse_foundation == pytest.approx(1.5 * force**2 / slope, rel=1e-6)
 
 
 class Sinking(DuffingBody):
@@ -255,14 +211,6 @@ def test_energy_that_appears_is_named(scheme, degree, share, warns, stops):
     assert len(named) == warns
     assert (stopped is not None) is stops
     assert not stops or named[0] in str(stopped)
-
-
-@pytest.mark.parametrize("restitution", [0.5, 0.7, 0.9])
-@pytest.mark.parametrize("turn", [0.2, 1.0, 3.0])
-def test_no_shallow_dip_to_the_foundation_is_missed(restitution, turn):
-    scene, times = dips(restitution, turn)
-    found = [event.time for event in simulate(scene).events if event.kind == "stop_impact"]
-    assert found == pytest.approx(times, abs=1e-10)
 
 
 def test_a_contact_too_stiff_for_its_degree_is_said_and_keeps_the_energy():

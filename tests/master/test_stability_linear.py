@@ -123,19 +123,6 @@ def test_the_matrix_of_a_damped_link_is_that_of_the_solvers(scheme, degree, stif
 # -- scenes ---------------------------------------------------------------------------------------------------------
 
 
-def test_soft_is_predicted():
-    """m_tip = h√3/6 ρA for a long mesh, Z = √(KAG ρA) = 10, ω₁ = 1.27396492 √100 but for the mesh."""
-    p = predict(with_changes(load_scene("soft"), beam={"n_elements": 20}))
-    assert p["tip_mass"] == pytest.approx(3**0.5 / 6.0 / 20.0, rel=1e-6)
-    assert p["impedance"] == pytest.approx(10.0)
-    assert p["omega_1"] == pytest.approx(12.7396492, rel=3e-4)
-    assert p["spring_frequency"] == pytest.approx(3.0**0.5)
-    assert (p["resolved_modes"], p["modes"], p["static_shapes"]) == (40, 40, 0)
-    assert [(s["scheme"], s["degree"]) for s in p["schemes"]] == TIES
-    assert all(s["spectral_radius"] == pytest.approx(1.0, abs=1e-11) for s in p["schemes"])
-    assert p["auto"][:2] == ("hermite", 2)
-
-
 def test_compliance_is_predicted_where_it_is_stiffest():
     """p = 1: λ itself; p = 3 at the depth that takes the energy E = 1/6 J: λ δ⁴/4 = E, stiffness 3 λ δ²."""
     soft = with_changes(load_scene("soft"), beam={"n_elements": 5}, contact={"law": "compliance", "exponent": 1.0})

@@ -11,7 +11,6 @@ from runs import a_trajectory
 
 import springbeam
 from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
-from springbeam.results.totals import LOSS_NAMES
 from springbeam.scene.statics import SHAPE_POINTS
 
 SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2}, coupling={"macro_step": 1e-3, "degree": 2})
@@ -20,49 +19,6 @@ SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2}, coupling={"macro_st
 @pytest.fixture(scope="module")
 def run():
     return simulate(SOFT)
-
-
-# -- what a run amounts to ------------------------------------------------------------------------------------------
-
-
-def test_totals_are_those_of_the_motion(run):
-    """The spring's momentum: m Δz = −∫C dt + ∫N dt + J − ∫ (k1 y + k2 y³) dt, the last by Simpson's rule."""
-    spring, summary = SOFT.spring, run.summary
-    ends = run.steps["size"] > 0.0
-    size, end = run.steps["size"][ends], run.steps["time"][ends]
-    start = run.time[np.flatnonzero(ends) - 1]
-    force = [spring.linear_stiffness * y + spring.cubic_stiffness * y**3 for y in (
-        run.y[np.flatnonzero(ends) - 1], run.at(start + 0.5 * (end - start)).y, run.steps["y"][ends]
-    )]  # fmt: skip
-    held = float((size * (force[0] + 4.0 * force[1] + force[2]) / 6.0).sum())
-    gained = spring.mass * (run.z[-1] - spring.initial_velocity)
-    # Impulses on the tip that come from the stop are no part of what the spring feels of the stop: they go through it.
-    assert gained == pytest.approx(-summary["contact_impulse"] + summary["foundation_impulse"] - held, abs=1e-10)
-    assert summary["loss_impact"] + summary["loss_stop"] == pytest.approx(run.e_impact_loss[-1], rel=1e-12)
-    assert summary["stop_strokes"] == 1
-    assert summary["deepest_tip"] == pytest.approx(SOFT.stop.position, abs=1e-12)
-
-
-def test_losses_add_up_by_where():
-    scene = with_changes(
-        SOFT,
-        beam={"alpha_b": 1e-5},
-        spring={"damping": 0.1},
-        stop={"restitution": 0.5},
-        contact={"law": "compliance", "stiffness": 1e4, "exponent": 1.5, "damping": 0.5},
-    )
-    run = simulate(scene)
-    lost = {name: run.summary[name] for name in LOSS_NAMES}
-    assert min(lost[name] for name in ("loss_beam", "loss_spring", "loss_contact", "loss_stop")) > 1e-5
-    assert lost["loss_impact"] == 0.0
-    total = run.e_dissipated[-1] + run.e_impact_loss[-1]
-    assert sum(lost.values()) == pytest.approx(total, rel=1e-12)
-    # The contact force applied, summed up, is what the law's own rows come to.
-    rows = np.trapezoid(run.compliance_force, run.time)
-    assert run.summary["contact_impulse"] == pytest.approx(rows, rel=1e-3)
-
-
-# -- handed on ------------------------------------------------------------------------------------------------------
 
 
 def test_rows_at_an_interval_are_those_of_at(tmp_path, monkeypatch):
@@ -79,8 +35,11 @@ def test_rows_at_an_interval_are_those_of_at(tmp_path, monkeypatch):
     assert np.array_equal(springbeam.load("rows").time, every.time)
 
 
+# -- handed on ------------------------------------------------------------------------------------------------------
+
+
 def test_a_run_that_is_made_step_by_step_is_a_trajectory_on_the_way():
-    """test_resume.py compares it with one that is made at once."""
+    """test_checkpoint.py compares it with one that is made at once."""
     scene = with_changes(load_scene("soft"), time={"t_end": 0.1}, beam={"n_elements": 8})
     with springbeam.Simulation(scene) as sim:
         assert len(sim.run) == 0
@@ -144,20 +103,6 @@ def test_a_run_shows_itself(run):
 HITS = with_changes(
     load_scene("soft"), coupling={"scheme": "hermite", "degree": 2, "macro_step": 5e-4}, time={"t_end": 0.14}
 )
-
-
-@pytest.mark.parametrize("place", ["upper", "lower", "both"])
-def test_bodies_of_ones_own_move_like_the_fmus(place):
-    """The test doubles are exact: tie, impact on the stop and rebound come out as with the FMUs."""
-    own = {}
-    if place != "lower":
-        own["upper"] = beam_body(HITS.beam, 0.0)
-    if place != "upper":
-        own["lower"] = DuffingBody()
-    ours, theirs = simulate(HITS, **own), simulate(HITS)
-    assert [event.kind for event in ours.events] == [event.kind for event in theirs.events]
-    assert np.abs(ours.at(np.linspace(0.0, 0.14, 99)).y - theirs.at(np.linspace(0.0, 0.14, 99)).y).max() < 1e-9
-    assert ours.summary["contact_impulse"] == pytest.approx(theirs.summary["contact_impulse"], rel=1e-8)
 
 
 mass = partial(DuffingBody, 1.0, 0.0, 0.0)

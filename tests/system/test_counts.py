@@ -9,9 +9,7 @@ from faulty import installed
 
 from springbeam import Simulation, load_scene, simulate, with_changes
 from springbeam.bodies.fmu_bodies import release
-from springbeam.contact.events import EventFunctions
-from springbeam.contact.laws import law_of
-from springbeam.contact.phases import Joint, Phase
+from springbeam.contact.phases import Joint
 
 SET_SLOPES = "fmi2SetRealInputDerivatives"
 
@@ -90,31 +88,6 @@ def test_a_tied_step_costs_two_steps_of_each_body(counted, H, scheme, degree):
         assert summary[f"{body}_steps"] <= 2 * summary["macro_steps"] + 3 * (degree + 1)
     # Each correction of the force is a step of the spring; to measure its response takes d + 2.
     assert 0 <= summary["spring_steps"] - summary["macro_steps"] - summary["iterations"] <= degree + 2
-
-
-PHASES = [Phase(joint, seated) for joint in Joint for seated in (False, True)]
-PAIR_EVENTS = {"impact", "release", "retie"}
-EVENTS = {
-    "all": ({}, {*PAIR_EVENTS, "stop_impact"}),
-    "no stop": ({"stop": None}, PAIR_EVENTS),
-    "no spring": ({"spring": None}, {"stop_impact"}),
-    "no beam": ({"beam": None}, {"stop_impact"}),
-    "spring alone": ({"beam": None, "stop": None}, set()),
-    "beam alone": ({"spring": None, "stop": None}, set()),
-    "compliance": ({"contact": {"law": "compliance"}}, {"stop_impact"}),
-    "compliance, no stop": ({"contact": {"law": "compliance"}, "stop": None}, set()),
-}
-
-
-@pytest.mark.parametrize("what", EVENTS)
-def test_event_functions_are_those_of_the_bodies_that_are_there(what):
-    changes, expected = EVENTS[what]
-    scene = with_changes(load_scene("soft"), **changes)
-    functions = EventFunctions(scene, law_of(scene), tip_share=0.5, equilibrium=0.0)
-    assert {kind for phase in PHASES for kind, _ in functions.of(phase)} == expected
-    # A phase has only what can end it, and on the foundation only what can leave it.
-    assert all(len(functions.of(phase)) <= 2 for phase in PHASES)
-    assert all(kind != "stop_impact" for phase in PHASES if phase.seated for kind, _ in functions.of(phase))
 
 
 def test_a_tied_step_passes_at_most_40_functions_in_12_files():

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import tomli_w
 from commands import command, printed
-from rich.console import Console
 from scenes import kinds
 
 from springbeam import load_scene, simulate, with_changes
@@ -150,18 +149,6 @@ def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
         monkeypatch.setattr(event_driven, "simulate", lambda scene, **more: right(with_changes(scene, **wrong), **more))  # noqa: B023
         assert command(*arguments, *options).exit_code == code
     assert (out / "crosscheck.png").stat().st_size > 10_000
-
-
-def test_a_change_of_contact_that_the_run_lacks_is_shown_as_none():
-    quantity = dict.fromkeys(("error", "at", "l2", "bound"), 0.0) | {"quantity": "y", "passed": True}
-    missing = {"kind": "opens", "time": None, "reference": 0.5, "bound": 0.0, "passed": False}
-    record = {"quantities": [quantity], "events": [missing], "notes": [], "scene": {}, "verdict": "differs"}
-    study = Crosscheck(scene=SOFT)
-    found = study.findings({"comparison": {**record, "from": 0.0, "horizon": 1.0, "t_end": 1.0, "growth": 1.0}})
-    console = Console(record=True, width=80)
-    console.print(*found.shown)
-    assert found.code == 1
-    assert ["opens", "none", "0.5000000000", "0.0e+00", "DIFFERS"] in map(str.split, console.export_text().splitlines())
 
 
 def resolved(**tables):

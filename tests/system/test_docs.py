@@ -52,7 +52,7 @@ NOT_RUN = {
     "springbeam run duffing --set spring.linear_stiffness=3.1": "is what the next line fits",
     "springbeam fit duffing": "takes a quarter of a minute; the command is in test_fit.py",
     "springbeam sweep soft": "starts a process for each core; the command is in test_command_line.py",
-    "springbeam stability": "takes minutes; parts of it are run in test_stability_grid.py, test_critical_steps.py",
+    "springbeam stability": "takes minutes; parts of it are run in test_stability.py",
     "springbeam sweep bumper.toml": "takes half a minute; the command is in test_sweep.py",
     "springbeam crosscheck bumper.toml": "takes some seconds; the command is in test_command_line.py",
     "springbeam tradeoff soft --until 0.0712": "takes minutes; the command is in test_tradeoff.py",

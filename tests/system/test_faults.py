@@ -44,6 +44,7 @@ def run(tmp_path, monkeypatch):
         with monkeypatch.context() as patch:
             script = installed(patch, *faults)
             result = command("run", tmp_path / "scene.toml", "--out", tmp_path / name, "--no-plots", "-q")
+        print(result.exit_code, result.output)  # what pytest shows of a run in which the fault did not happen
         assert "Traceback" not in result.output
         assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
         return result.exit_code, tmp_path / name, script

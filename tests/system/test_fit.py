@@ -139,12 +139,6 @@ def test_a_clock_that_the_data_does_not_tell_is_held(tmp_path):
     assert speed["value"] == pytest.approx(0.4, rel=1e-6)
 
 
-def test_a_clock_is_held_where_the_user_says(tmp_path):
-    path = written(tmp_path / "m.csv", "time,y", TIMES + 0.013, exact())
-    (stiffness,) = fitted(path, ["spring.linear_stiffness=750"], shift=-0.013)["keys"]
-    assert stiffness["value"] == pytest.approx(800.0, rel=1e-6)
-
-
 def test_a_trial_that_cannot_be_run_turns_the_search_back(tmp_path, monkeypatch):
     """The sixth run: after that of the guesses, and five for the first derivatives."""
     right, runs = fit.simulate, count()

@@ -37,9 +37,6 @@ def driven():
     return simulate(oscillator())
 
 
-# -- metrics ------------------------------------------------------------------------------------------------------
-
-
 def test_the_settled_amplitude_is_that_of_the_frequency_response(driven):
     rate = 2.0 * pi * DRIVE
     exact = FORCE / sqrt((STIFFNESS - MASS * rate**2) ** 2 + (DAMPING * rate) ** 2)
@@ -51,6 +48,9 @@ def test_the_settled_amplitude_is_that_of_the_frequency_response(driven):
     assert METRICS["settled_y"](driven) == pytest.approx(exact, rel=1e-3)
     assert METRICS["settled_a_y"](driven) == pytest.approx(exact * rate**2, rel=1e-3)
     assert METRICS["max_y"](driven) > 1.05 * exact
+
+
+# -- metrics ------------------------------------------------------------------------------------------------------
 
 
 def test_what_is_not_driven_or_too_short_has_not_settled():
