@@ -90,23 +90,19 @@ def simulate(scene: Scene, *, y_temp: YTemp = "equation") -> Trajectory:
     AlgorithmFailure
         With the time and the trajectory so far, where an iteration fails or the solution overflows.
     """
-    if scene.beam is None or scene.spring is None:
-        raise ValueError("Algorithm 1 needs [beam] and [spring]")
-    if scene.loads or scene.massless:
-        raise ValueError("Algorithm 1 knows no [[loads]] and needs a dynamic [beam]")
-    algorithm, began = _Algorithm(scene, y_temp), clock.perf_counter()
+    algorithm = _Algorithm(scene, y_temp)
     try:
         algorithm.run()
     except AlgorithmFailure as failure:
-        failure.trajectory = algorithm.trajectory(clock.perf_counter() - began)
+        failure.trajectory = algorithm.trajectory()
         raise
-    return algorithm.trajectory(clock.perf_counter() - began)
+    return algorithm.trajectory()
 
 
 class _Algorithm:
     def __init__(self, scene: Scene, y_temp: YTemp) -> None:
-        assert scene.beam is not None
-        assert scene.spring is not None
+        if scene.beam is None or scene.spring is None or scene.loads or scene.massless:
+            raise ValueError("Algorithm 1 needs [spring] and a [beam] that is dynamic, and knows no [[loads]]")
         self.scene, self.beam, self.spring = scene, scene.beam, scene.spring
         self.y_temp = y_temp
         self.discrete = d = assemble(scene.beam)
@@ -115,7 +111,7 @@ class _Algorithm:
         self.phi = -np.inf if scene.stop is None else scene.stop.position
         self.stiffness = 0.0  #: λ_nc as the last step has left it
         self.iterations: dict[str, list[int]] = {"beam": [], "predicted": [], "joined": []}
-        self.time = 0.0  #: [s]
+        self.time = scene.contact_time or 0.0  #: [s]
         self.events: list[Event] = []
         self.rows: list[_Row] = []
 
@@ -168,6 +164,7 @@ class _Algorithm:
 
     def run(self) -> None:
         """Make all steps; `trajectory` has them, also where one fails."""
+        self.began = clock.perf_counter()
         row, psi = self._start(), self.spring.equilibrium
         touched = self.beam.approach == "undeformed" or row.q[-1] <= psi  # else lines 1–4 come first
         self.rows.append(self._first_contact(row) if touched else row)
@@ -182,15 +179,9 @@ class _Algorithm:
             self.rows.append(row)
 
     def _start(self) -> _Row:
-        slope, rate, psi = self.beam.initial_deflection_slope, self.beam.initial_velocity_slope, self.spring.equilibrium
-        gap = slope * self.beam.length - psi
-        if gap < 0.0 or (gap > 0.0 and rate >= 0.0 and self.beam.approach == "undeformed"):
-            raise ValueError("Algorithm 1 needs a tip above the spring that moves down")
-        if self.beam.approach == "undeformed":
-            self.time = -gap / (rate * self.beam.length) if gap > 0.0 else 0.0
-            slope = psi / self.beam.length
-        shape = self.discrete.slope_shape
-        return _Row(self.time, slope * shape, rate * shape, psi, self.spring.initial_velocity)
+        beam, shape, psi = self.beam, self.discrete.slope_shape, self.spring.equilibrium
+        slope = psi / beam.length if beam.approach == "undeformed" else beam.initial_deflection_slope
+        return _Row(self.time, slope * shape, beam.initial_velocity_slope * shape, psi, self.spring.initial_velocity)
 
     def _first_contact(self, row: _Row) -> _Row:
         """Make lines 5 and 6."""
@@ -257,11 +248,12 @@ class _Algorithm:
 
     # Result ---------------------------------------------------------------------------------------------------------
 
-    def trajectory(self, seconds: float) -> Trajectory:
-        """Return the rows, made in so many seconds, as a result with energies, and the work that no force does.
+    def trajectory(self) -> Trajectory:
+        """Return the rows as a result with energies, and the work that no force does.
 
         That is the work of the overwritten tip on the beam, and of yˡ's exchange on the spring.
         """
+        seconds = clock.perf_counter() - self.began
         d, p, alpha = self.discrete, self.spring, self.beam.alpha_b
         found = {
             name: np.array(values) for name, values in zip(_Row._fields, zip(*self.rows, strict=True), strict=True)

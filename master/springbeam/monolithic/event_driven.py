@@ -202,12 +202,8 @@ def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
     x_dot[s.r :] = s.root_mass * (s.spring.initial_velocity + (0.0 if inertia else perturbation))
     if scene.beam is not None and s.beam is not None:
         slope, rate = scene.beam.initial_deflection_slope, scene.beam.initial_velocity_slope
-        if scene.tip_target is not None and scene.beam.approach == "undeformed":
-            obstacle = scene.tip_target.value
-            gap = slope * scene.beam.length - obstacle
-            if gap > 0.0:
-                time = -gap / (rate * scene.beam.length)
-                slope = obstacle / scene.beam.length
+        if scene.contact_time and scene.tip_target is not None:
+            time, slope = scene.contact_time, scene.tip_target.value / scene.beam.length
         x[: s.r] = slope * s.beam.slope_shape
         x_dot[: s.r] = (rate + perturbation * inertia) * s.beam.slope_shape
         if scene.beam.approach == "elastic":

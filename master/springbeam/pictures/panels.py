@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -99,7 +99,7 @@ def panels(trajectory: Trajectory) -> list[Panel]:
         return []
     found = [
         positions(trajectory),
-        velocities(trajectory, VELOCITIES),
+        velocities(trajectory),
         forces(trajectory),
         impulses(trajectory),
         *loads(trajectory),
@@ -117,13 +117,12 @@ def positions(trajectory: Trajectory) -> Panel:
     near = near_levels(trajectory.scene, [trajectory[name] for name in present(trajectory, POSITIONS)])
     ends = trajectory["time"][[0, -1]]
     curves += [Curve(symbol, LEVELS[symbol], ends, np.full(2, height)) for symbol, height in near.items()]
-    return Panel("positions", "Positions", "position", "m", curves, 2.4)
+    return Panel("positions", "Positions", "position", "m", curves, 3.0)
 
 
-def velocities(trajectory: Trajectory, names: Iterable[str]) -> Panel:
-    """Return those of `VELOCITIES` that are named."""
-    curves = _curves(trajectory, {name: VELOCITIES[name] for name in names})
-    return Panel("velocities", "Velocities", "velocity", "m/s", curves)
+def velocities(trajectory: Trajectory) -> Panel:
+    """Return the velocities of tip and spring top."""
+    return Panel("velocities", "Velocities", "velocity", "m/s", _curves(trajectory, VELOCITIES))
 
 
 def forces(trajectory: Trajectory) -> Panel:

@@ -19,20 +19,17 @@ from matplotlib.figure import Figure
 from ..results.directory import PICTURES
 from ..results.trajectory import Trajectory
 from ..scene.statics import SHAPE_POINTS
-from . import panels
 from .drawing import (
     BLACK,
     GREY,
     LEVELS,
-    POSITIONS,
-    VELOCITIES,
     drawable,
     length_along,
     level_side,
     near_levels,
-    present,
     readable_unit,
 )
+from .panels import panels
 from .timeline import DPI, REMARK, STYLE, figure_for, line_style, timeline
 
 _SHAPES_EARLY, _SHAPES_LATER = 20, 24
@@ -56,7 +53,7 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
         The files written.
     """
     written = []
-    for name, file in zip(_DRAWINGS, PICTURES, strict=True):
+    for name, file in zip(_NAMES, PICTURES, strict=True):
         with matplotlib.rc_context(STYLE):
             if (figure := _drawn(trajectory, name)) is not None:
                 written.append(Path(directory) / file)
@@ -66,8 +63,8 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
 
 def figure_of(trajectory: Trajectory, picture: str) -> Figure:
     """Return the picture of that name; see `springbeam.Trajectory.plot`."""
-    if picture not in _DRAWINGS:
-        raise ValueError(f"no picture {picture!r}; there are {', '.join(_DRAWINGS)}")
+    if picture not in _NAMES:
+        raise ValueError(f"no picture {picture!r}; there are {', '.join(_NAMES)}")
     with matplotlib.rc_context(STYLE):
         figure = _drawn(trajectory, picture)
     if figure is None:
@@ -76,10 +73,11 @@ def figure_of(trajectory: Trajectory, picture: str) -> Figure:
 
 
 def _drawn(trajectory: Trajectory, picture: str) -> Figure | None:
-    return _DRAWINGS[picture](trajectory) if drawable(trajectory) else None
-
-
-# -- (A), (B), (G): along the beam ---------------------------------------------------------------------------------
+    if picture in _ALONG:
+        return _ALONG[picture](trajectory) if drawable(trajectory) else None
+    title, names = _OVER_TIME[picture]
+    shown = [panel for panel in panels(trajectory) if panel.name.startswith(names)]
+    return timeline(trajectory, title, shown) if shown else None
 
 
 def _since_contact(trajectory: Trajectory) -> tuple[np.ndarray, slice]:
@@ -167,42 +165,19 @@ def _key(ax: Axes, lines: LineCollection) -> None:
     ax.figure.colorbar(lines, ax=ax, label=lines.get_label(), pad=0.05, aspect=30)
 
 
-# -- (C), (D), (E): over time -------------------------------------------------------------------------------------
-
-
-def _positions(trajectory: Trajectory) -> Figure | None:
-    positions, speeds = present(trajectory, POSITIONS), present(trajectory, VELOCITIES)[:1]
-    whose = "beam's tip" if "v_tip" in speeds else "spring's top"
-    title = "(C) Positions, and velocity" if len(positions) > 1 else "(C) Position and velocity"
-    shown = [panels.positions(trajectory), panels.velocities(trajectory, speeds)]
-    return timeline(trajectory, f"{title} of the {whose}", shown)
-
-
-def _velocities_and_forces(trajectory: Trajectory) -> Figure | None:
-    speed = panels.velocities(trajectory, ["z"])
-    acting = [panel for panel in (panels.forces(trajectory), panels.impulses(trajectory)) if panel.curves]
-    title = "(D) Velocity of the spring's top, and forces" if speed.curves else "(D) Forces"
-    return timeline(trajectory, title, [speed, *acting]) if acting else None
-
-
-def _gap_and_energy(trajectory: Trajectory) -> Figure | None:
-    gap = panels.gap(trajectory)
-    title = "(E) Gap and energy" if gap.curves else "(E) Energy"
-    return timeline(trajectory, title, [gap, panels.energies(trajectory), panels.residual(trajectory)])
-
-
-def _loads_and_clamp(trajectory: Trajectory) -> Figure | None:
-    shown = [panel for panel in (*panels.loads(trajectory), *panels.inside(trajectory)) if panel.curves]
-    return timeline(trajectory, "(F) Loads, accelerations, and the clamp", shown) if shown else None
-
-
-#: What draws each picture, in the order of `PICTURES`.
-_DRAWINGS: dict[str, Callable[[Trajectory], Figure | None]] = {
+#: What draws the pictures along the beam, (A), (B) and (G), and titles and panels of those over time.
+_ALONG: dict[str, Callable[[Trajectory], Figure | None]] = {
     "shapes_after_contact": _shapes_after_contact,
     "shapes_later": _shapes_later,
-    "positions": _positions,
-    "velocities_and_forces": _velocities_and_forces,
-    "gap_and_energy": _gap_and_energy,
-    "loads_and_clamp": _loads_and_clamp,
     "moments": _moments,
 }
+_OVER_TIME = {
+    "positions": ("(C) Positions", ("positions",)),
+    "velocities_and_forces": ("(D) Velocities and forces", ("velocities", "forces", "impulses")),
+    "gap_and_energy": ("(E) Gap and energy", ("gap", "energies", "residual")),
+    "loads_and_clamp": (
+        "(F) Loads, accelerations, and the clamp", ("loads", "accelerations", "clamp", "bending")
+    ),
+}  # fmt: skip
+#: The letters of `PICTURES` say which is which.
+_NAMES = [Path(file).stem[2:] for file in PICTURES]

@@ -53,11 +53,7 @@ _KEY_COLUMNS = 4
 
 
 def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Figure:
-    """Return the figure of ``panels``, those that have a curve, one below the other over a common time axis.
-
-    Phases are shaded and events marked.
-    """
-    panels = [panel for panel in panels if panel.curves]
+    """Return the figure of ``panels``, one below the other over a common time axis; phases shaded, events marked."""
     figure = figure_for(trajectory, title, 1.0 + sum(panel.height for panel in panels))
     axes = _painted(figure, panels, time_unit(trajectory))
     for ax in axes:
