@@ -174,7 +174,7 @@ def _beside_measured(
         moved = time_shift(run, measured) if shift is None else shift
         found = residuals(run, measured, moved)
         if out is not None:
-            from ..pictures.spectra import draw_measured
+            from ..pictures.plots import draw_measured
 
             out.parent.mkdir(parents=True, exist_ok=True)
             covered, curves = model(run, measured, moved)
@@ -287,7 +287,7 @@ def spectrum(
             rows = [dict(zip(columns, row, strict=True)) for row in np.transpose(list(columns.values())).tolist()]
             files.append(write_csv(directory / f"{name}.csv", rows))
         if not no_plots:
-            from ..pictures.spectra import draw
+            from ..pictures.plots import draw_spectra
 
             files.append(directory / "spectrum.png")
             shocks = {f"shock at the {end}": (s.frequency, s.maximax) for end, s in found.shock.items()}
@@ -296,7 +296,7 @@ def spectrum(
                 f"{what} to load {load}, {c.way}": (c.frequency, c.amplitude) for (what, load), c in swept.items()
             }
             once = None if found.points is None else found.points[1]
-            draw(shocks, powers, answers, once, trajectory.scene.title or str(run), files[-1])
+            draw_spectra(shocks, powers, answers, once, trajectory.scene.title or str(run), files[-1])
     settled = None if found.settled is None else {**found.settled._asdict(), "period": found.settled.period}
     document = {
         "directory": directory,

@@ -22,10 +22,9 @@ from scipy.optimize import brentq, newton
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError
 from .exponential import ExponentialPropagator, LinearForm, Segment
-from .hybrid_system import NOISE, HybridSystem, ReferenceFailure
+from .hybrid_system import NOISE, HybridSystem, QuasiStaticSystem, ReferenceFailure
 from .laws import Phase, Watch, law_of
 from .oscillators import GAUSS, STAGES
-from .quasi_static import QuasiStaticSystem
 from .rows import Rows
 from .transitions import HybridState
 
@@ -149,7 +148,7 @@ class _Run:
         end = min(s.loads.smooth_from(begin), self.t_end)
         if state.phase not in self._forms:
             self._forms[state.phase] = LinearForm(s, state.phase)
-        propagator = ExponentialPropagator(s, state.phase, self._forms[state.phase], state.X)
+        propagator = ExponentialPropagator(self._forms[state.phase], state.X)
         while state.time < end:
             if self._limit is not None and clock.process_time() - self._began > self._limit:
                 raise ReferenceFailure(f"takes more than {self._limit:g} s; it is at t = {state.time:.6g} s")

@@ -192,8 +192,8 @@ def _modes(omega2: np.ndarray, space: np.ndarray) -> tuple[np.ndarray, np.ndarra
 class ExponentialPropagator:
     """Integrates a phase from X on: exact in the linear part, ``form``, by Gauss collocation in the rest."""
 
-    def __init__(self, system: HybridSystem, phase: Phase, form: LinearForm, X: np.ndarray, speed: float = 0.0) -> None:
-        self.system, self.phase, self.form, self.X = system, phase, form, X
+    def __init__(self, form: LinearForm, X: np.ndarray, speed: float = 0.0) -> None:
+        self.system, self.phase, self.form, self.X = form.system, form.phase, form, X
         self._speed = speed  #: largest interface velocity so far × √mass, the scale of `_TAIL`
         self._force_limit = np.inf  #: what resolving r allows [s]
         self.elapsed = 0.0  #: since the start [s]
@@ -209,7 +209,7 @@ class ExponentialPropagator:
             size = remaining if remaining <= size else 2.0 ** float(np.floor(np.log2(size)))
             segment = self._step(size, xi, xi_dot, r)
             if segment is not None:
-                self._force_limit = min(2.0 * self._force_limit, 1e300)
+                self._force_limit *= 2.0
                 self.X = segment.states[-1]
                 self.elapsed += size
                 return segment
@@ -245,7 +245,7 @@ class ExponentialPropagator:
 
         def inside(tau: float) -> np.ndarray:
             # Stepped anew, because the forces of the whole segment may hold a kink that lies after τ.
-            inner = ExponentialPropagator(s, phase, form, states[0], speed)
+            inner = ExponentialPropagator(form, states[0], speed)
             while tau - inner.elapsed > 1e-15 * tau:
                 inner.advance(tau - inner.elapsed)
             return inner.X

@@ -74,8 +74,7 @@ class HybridState:
             if m.v <= m.z:
                 self._meet()
         elif s.alone and s.scene.stop is not None and m.u - s.stop.position <= noise:
-            onto_it = m.v < 0.0 or (m.v == 0.0 and m.z_dot < 0.0)
-            if onto_it:
+            if (float(m.v), float(m.z_dot)) < (0.0, 0.0):
                 self._hit_stop()
 
     # Contact --------------------------------------------------------------------------------------------------------

@@ -16,6 +16,8 @@ from ..scene import Scene
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 GREY, STONE = "#777777", "#B8B8B8"
+#: Of curves of one kind, in turn.
+COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 
 
 class Line(NamedTuple):

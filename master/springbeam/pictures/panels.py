@@ -15,15 +15,12 @@ from .drawing import (
     ACCELERATIONS,
     BLACK,
     BLUE,
+    COLOURS,
     ENERGIES,
     FORCES,
-    GREEN,
     IMPULSES,
     LEVELS,
-    ORANGE,
     POSITIONS,
-    PURPLE,
-    SKY,
     VELOCITIES,
     VERMILLION,
     Line,
@@ -43,7 +40,6 @@ _OF_THE_BEAM = {
     "clamp_moment": ("Moment of the clamp", "moment", "N·m", "of the clamp, counter-clockwise"),
     "bending_stress": ("Bending stress", "stress", "Pa", "largest along the beam"),
 }
-_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 #: Quantity, unit, and columns or fields of events of the panels in which runs are compared.
 _COMPARED = (
     ("position", "m", ("u_tip", "y")),
@@ -146,7 +142,7 @@ def loads(trajectory: Trajectory) -> list[Panel]:
     for i, load in enumerate(trajectory.scene.loads):
         line = Line(1.1, dashed=i % 2 == 1)
         of_unit = looks.setdefault(load.unit, {})
-        of_unit[f"load_{i}"] = Look(_COLOURS[i % len(_COLOURS)], f"load {i}, on the {load.on}", line)
+        of_unit[f"load_{i}"] = Look(COLOURS[i % len(COLOURS)], f"load {i}, on the {load.on}", line)
     return [
         Panel(f"loads-{k}", "Loads" if unit != "m/s²" else "Acceleration of the base", "load", unit,
               _curves(trajectory, of_unit), 1.2)
@@ -220,7 +216,7 @@ def compared(runs: Mapping[str, Trajectory]) -> list[Panel]:
     for quantity, unit, columns in _COMPARED:
         panel = Panel(quantity, quantity, quantity, unit, [])
         for number, (name, run) in enumerate(runs.items()):
-            colour, size = _COLOURS[number % len(_COLOURS)], max(7.0 - 1.5 * number, 2.5)
+            colour, size = COLOURS[number % len(COLOURS)], max(7.0 - 1.5 * number, 2.5)
             for column, line in zip(columns, _COMPARED_LINES, strict=False):
                 words = f"{name}: {(POSITIONS | VELOCITIES)[column].words}" if len(columns) > 1 else name
                 look, marker = Look(colour, words, line), Marker("○", "o", "circle-open", size)

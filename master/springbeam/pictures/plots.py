@@ -1,4 +1,5 @@
-"""Pictures of a run: the sub-figures (A)–(E) of Ahn & Tate's Figures 2–5; loads, accelerations and what the beam feels.
+"""Pictures of a run: the sub-figures (A)–(E) of Ahn & Tate's Figures 2–5; loads, accelerations and what the beam feels;
+its spectra, and the run beside what was measured.
 
 Besides colours, lines differ in width or dashes and events in shape, so that the pictures survive a black-and-white
 printer.
@@ -6,8 +7,10 @@ printer.
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -21,6 +24,8 @@ from ..results.trajectory import Trajectory
 from ..scene.statics import SHAPE_POINTS
 from .drawing import (
     BLACK,
+    BLUE,
+    COLOURS,
     GREY,
     LEVELS,
     drawable,
@@ -30,9 +35,11 @@ from .drawing import (
     readable_unit,
 )
 from .panels import panels
-from .timeline import DPI, REMARK, STYLE, figure_for, line_style, timeline
+from .timeline import DPI, REMARK, STYLE, TITLE_WIDTH, WIDTH, figure_for, line_style, timeline
 
 _SHAPES_EARLY, _SHAPES_LATER = 20, 24
+#: Power below this share of the highest line is not drawn.
+_FLOOR = 1e-12
 #: Early to late, dark to light, but not so light that a line is lost on paper.
 _CLOCK = ListedColormap(matplotlib.colormaps["cividis"](np.linspace(0.0, 0.9, 256)), "clock")
 
@@ -181,3 +188,59 @@ _OVER_TIME = {
 }  # fmt: skip
 #: The letters of `PICTURES` say which is which.
 _NAMES = [Path(file).stem[2:] for file in PICTURES]
+
+
+def draw_spectra(
+    shock: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    power: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    responses: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    points: np.ndarray | None,
+    title: str,
+    path: Path,
+) -> None:
+    """Draw spectra to ``path``: shock, power, responses to a chirp, and the points of a driven motion.
+
+    Parameters
+    ----------
+    shock, power, responses
+        Frequencies [Hz] and values by name, shapes (n,): accelerations [m/s²], power densities, half ranges.
+    points
+        Position [m] and velocity [m/s] once a period, shape (n, 2).
+    """
+    dots = {"linestyle": "none", "marker": ".", "markersize": 3.0}
+    position, velocity = "position once a period of the drive [m]", "velocity [m/s]"
+    groups: list[tuple[Mapping[str, Any], str, str, bool, dict[str, Any]]] = [
+        (shock, "frequency [Hz]", "largest acceleration [m/s²]", True, {}),
+        (power, "frequency [Hz]", "power density [unit²/Hz]", True, {}),
+        (responses, "frequency of the chirp [Hz]", "half the range [unit]", False, {}),
+        ({} if points is None else {"points": points.T}, position, velocity, False, dots),
+    ]
+    groups = [group for group in groups if group[0]]
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, 0.6 + 2.4 * len(groups)), layout="constrained")
+        axes = figure.subplots(len(groups), 1, squeeze=False)[:, 0]
+        for ax, (curves, across, up, logarithmic, look) in zip(axes, groups, strict=True):
+            for k, (name, (x, y)) in enumerate(curves.items()):
+                seen = y > _FLOOR * y.max(initial=0.0) if logarithmic else slice(None)
+                dashes = {"dashes": (4, k)} if logarithmic and k else {}
+                ax.plot(x[seen], y[seen], color=COLOURS[k % len(COLOURS)], label=name, **look, **dashes)
+            scale = "log" if logarithmic else "linear"
+            ax.set(xlabel=across, ylabel=up, xscale=scale, yscale=scale)
+            ax.legend()
+            ax.grid(alpha=0.3)
+        figure.suptitle(textwrap.fill(title, TITLE_WIDTH), fontsize=10.0, x=0.01, ha="left")
+        figure.savefig(path, dpi=DPI)
+
+
+def draw_measured(time: np.ndarray, curves: Mapping[str, tuple[np.ndarray, np.ndarray]], path: Path) -> None:
+    """Draw what a run gives beside what was measured, by name, at ``time`` [s]; shapes (n,)."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, 0.6 + 2.0 * len(curves)), layout="constrained")
+        axes = figure.subplots(len(curves), 1, sharex=True, squeeze=False)[:, 0]
+        for ax, (name, (ours, theirs)) in zip(axes, curves.items(), strict=True):
+            ax.plot(time, theirs, ".", color=BLACK, markersize=2.5, label="measured")
+            ax.plot(time, ours, color=BLUE, label="run")
+            ax.set_ylabel(name)
+            ax.legend()
+        axes[-1].set_xlabel("time t [s]")
+        figure.savefig(path, dpi=DPI)
