@@ -73,9 +73,13 @@ class HybridState:
         elif s.scene.coupled and float(m.u - m.y) <= noise:
             if m.v <= m.z:
                 self._meet()
-        elif s.alone and s.scene.stop is not None and m.u - s.stop.position <= noise:
-            if (float(m.v), float(m.z_dot)) < (0.0, 0.0):
-                self._hit_stop()
+        elif (
+            s.alone
+            and s.scene.stop is not None
+            and m.u - s.stop.position <= noise
+            and (float(m.v), float(m.z_dot)) < (0.0, 0.0)  # onto it
+        ):
+            self._hit_stop()
 
     # Contact --------------------------------------------------------------------------------------------------------
 
