@@ -1,5 +1,7 @@
 """Formulas, shock spectra, power spectra and settled motion, beside closed forms and integrals."""
 
+import sys
+
 import numpy as np
 import pytest
 from runs import a_trajectory
@@ -8,7 +10,7 @@ from scipy.integrate import quad
 from springbeam.scene import Load, SceneError
 from springbeam.signals.driven import repeating, response
 from springbeam.signals.expressions import Expression, function_of, signal
-from springbeam.signals.spectra import shock_spectrum
+from springbeam.signals.spectra import power_spectrum, shock_spectrum, spectra
 
 # -- formulas -----------------------------------------------------------------------------------------------------
 
@@ -26,6 +28,7 @@ def test_a_formula_takes_columns_row_by_row():
         ("speed * 2", "speed is unknown; there are time, u_tip"),
         ("phase", "phase is unknown"),
         ("max(u_tip)", "gives no number for each of the 400 rows"),
+        ("1j*u_tip", "gives no number for each of the 400 rows"),
         ("1/(time-time)", "is not finite at t = 0.0 s"),
         ("sqrt(0*u_tip - 1)", "is not finite"),
         ("u_tip.__class__", "no safe attribute"),
@@ -50,6 +53,13 @@ def test_a_function_that_is_not_there_is_refused(text):
         function_of(text)
 
 
+def test_a_function_is_found_in_the_directory_of_the_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "metrics_of_mine.py").write_text("def twice(run): return 2 * run")
+    assert function_of("metrics_of_mine:twice")(3.0) == 6.0
+
+
 @pytest.mark.parametrize(("count", "found"), [(31, (6, 3)), (30, None)])
 def test_a_motion_repeats_itself_after_three_periods_if_it_does_so_eight_times(count, found):
     """24 periods of the drive after the first point that is within 1 % of the last ones in turn."""
@@ -66,6 +76,7 @@ def test_the_response_to_a_chirp_is_that_of_whole_pairs_of_its_turns():
     found = response(0, chirp, time, values)
     assert found.frequency == pytest.approx([10.0])
     assert found.amplitude == pytest.approx([3.0])
+    assert len(response(0, chirp, time[:900], values[:900]).frequency) == 0  # a run that ends before it
 
 
 @pytest.mark.parametrize("rows", [2, 4, 4001])
@@ -74,6 +85,13 @@ def test_turns_of_a_chirp_between_two_rows_have_no_response(rows):
     time = np.append(np.linspace(0.0, 0.3, rows), 1.0)  # from 0.3 s on it turns 33 times
     found = response(0, chirp, time, np.sin(time))
     assert len(found.frequency) == len(found.amplitude) == (13 if rows == 4001 else 0)
+
+
+def test_spectra_that_cannot_be_are_refused():
+    with pytest.raises(SceneError, match="the run left no steps"):
+        spectra(a_trajectory())
+    with pytest.raises(SceneError, match=r"u_tip: 1 samples; there must be from 2"):
+        power_spectrum(run := a_trajectory(), "u_tip", since=run.time[-2] + 1e-9)
 
 
 # -- shock response spectra ---------------------------------------------------------------------------------------

@@ -54,6 +54,11 @@ def test_units_and_names_of_a_file(tmp_path):
     assert found.time == pytest.approx(TIMES, rel=1e-15)
     assert found.values["a_y"] == pytest.approx(9.80665 * TIMES, rel=1e-15)
     assert list(read_measured(path, OSCILLATOR).values) == ["y"]
+    of_sum = read_measured(path, OSCILLATOR, {"CH1": "y + y"})
+    assert of_sum.values["y + y"] == pytest.approx(exact(), rel=1e-12)
+    for formula, why in (("y + z", "is no sum of columns of one unit"), ("y + w", "w is unknown; there are time, y")):
+        with pytest.raises(SceneError, match=why):
+            read_measured(path, OSCILLATOR, {"CH1": formula})
 
 
 def test_residuals_are_those_of_each_curve(tmp_path):
@@ -63,6 +68,8 @@ def test_residuals_are_those_of_each_curve(tmp_path):
     assert of_y.rms == pytest.approx(0.25e-3, rel=1e-6)
     assert of_y.largest == pytest.approx(0.25e-3, rel=1e-6)
     assert of_z.largest == pytest.approx(np.abs(run.at(TIMES)["z"]).max(), rel=1e-12)
+    with pytest.raises(SceneError, match="they have no times in common"):
+        residuals(run, read_measured(path, OSCILLATOR), 9.0)
 
 
 BAD = {

@@ -232,6 +232,7 @@ def test_up_and_down_are_different_motions_of_a_hardening_spring():
     high = np.interp(12.0, up.frequency, up.amplitude)
     low = np.interp(12.0, down.frequency[::-1], down.amplitude[::-1])
     assert high > 2.0 * low
+    assert (up.way, down.way) == ("up", "down")
 
 
 def test_the_command_writes_tables_and_says_what_they_show(tmp_path, monkeypatch):

@@ -143,8 +143,6 @@ class Prescribed(Body):
     def __init__(self, motion: Motion) -> None:
         self.state = motion
 
-    def mark(self) -> None: ...
-
     def rewind(self) -> None: ...
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:

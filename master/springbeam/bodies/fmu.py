@@ -151,7 +151,6 @@ class Fmu:
         with self._asked("cannot be reset"):
             self._slave.reset()
         self.initialise(time)
-        self.moved = True
 
     @property
     def faultless(self) -> bool:

@@ -195,10 +195,7 @@ def nearest(name: str, candidates: Iterable[str]) -> str:
 
 def toml_of(value: Any) -> str:
     """Return a value as it may stand in a file, in one line of at most 60 characters."""
-    try:
-        return one_line(json.dumps(value, ensure_ascii=False, default=str))
-    except (ValueError, RecursionError):
-        return "…"  # an integer of more digits than Python converts, or lists nested too deeply
+    return one_line(json.dumps(value, ensure_ascii=False, default=str))
 
 
 def one_line(text: str, longest: int = 60) -> str:

@@ -397,11 +397,6 @@ class Choice(NamedTuple):
     because: str
 
 
-def _tells_integrals(scene: Scene) -> bool:
-    """Return whether all foreign FMUs of the scene tell both integrals of their motion."""
-    return all(body.integral and body.integral_2 for body in scene.foreign.values())
-
-
 def _turns(scene: Scene) -> dict[str, float]:
     """Return what the fastest and the slowest oscillation turn in a macro step [rad]."""
     beam, H = scene.beam, scene.coupling.H
@@ -412,8 +407,15 @@ def _turns(scene: Scene) -> dict[str, float]:
 
 #: What decides, the first rule that holds: the reason, and the scheme and degree for it.
 _DECIDED: tuple[tuple[Rule, str, int], ...] = (
-    (Rule(lambda s: s.partners and _tells_integrals(s), "a body that is not our own"), "energy", 2),
-    (Rule(lambda s: s.partners, "a body that is not our own"), "energy", 0),
+    (
+        Rule(
+            lambda s: any(not body.integral or not body.integral_2 for body in s.foreign.values()),
+            "a body that is not our own",
+        ),
+        "energy",
+        0,
+    ),
+    (Rule(lambda s: s.partners, "a body that is not our own"), "energy", 2),
     (Rule(lambda s: s.contact.algorithm, "{contact.law}"), "energy", 0),
     (Rule(lambda s: s.beam is None, "one body"), "energy", 0),
     (Rule(lambda s: s.beam.integrator != "modal", "{beam.integrator}"), "energy", 0),
