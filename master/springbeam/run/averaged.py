@@ -15,6 +15,10 @@ from .misplaced import tip_modes
 
 #: Radians of a mode, and lines of a table, to a point of the quadrature over a step; its points at least, at most.
 _DENSE, _POINTS = 1.0, (8, 96)
+#: Steps that are looked at together: what is held of them is small.
+_TOGETHER = 1024
+#: Share of an end's way that is not worth computing.
+_NEGLIGIBLE = 1e-3
 #: ∫ φ of the beam's modes over length and tip value is at most this, that of the lowest.
 _MEAN = 0.4
 
@@ -24,22 +28,35 @@ def left_out(scene: Scene, steps: np.ndarray) -> float:
 
     To first order, of bodies that are free, without their damping: at most.
     """
-    made, found = steps[steps["size"] > 0.0], 0.0
+    made, shares = steps[steps["size"] > 0.0], [0.0]
     tables = [load for load in scene.loads if load.signal == "table"]
-    if not tables or not len(made):
-        return found
-    if scene.beam is not None and not scene.massless:
+    if tables and len(made) and scene.beam is not None and not scene.massless:
         omega, tip = tip_modes(scene.beam)
-        way = float(np.abs(steps["u_tip_after"] - steps["u_tip_after"][0]).max())
-        moved = sum(_on_beam(scene, load) * _swing(load, made, omega, tip**2) for load in tables)
-        found = moved / way if way > 0.0 else 0.0
-    if scene.spring is not None:
-        omega, mass = np.array([max(spring_frequency(scene), 1.0 / scene.duration)]), scene.spring.mass
-        way = float(np.abs(steps["y_after"] - steps["y_after"][0]).max())
-        on_top = {"spring": 1.0 / mass, "base": 1.0}
-        moved = sum(on_top.get(load.on, 0.0) * _swing(load, made, omega, np.ones(1)) for load in tables)
-        found = max(found, moved / way if way > 0.0 else 0.0)
-    return found
+        forces = [_on_beam(scene, load) for load in tables]
+        shares.append(_share(tables, forces, made, omega, tip**2, steps["u_tip_after"]))
+    if tables and len(made) and scene.spring is not None:
+        omega = np.array([max(spring_frequency(scene), 1.0 / scene.duration)])
+        on_top = {"spring": 1.0 / scene.spring.mass, "base": 1.0}
+        forces = [on_top.get(load.on, 0.0) for load in tables]
+        shares.append(_share(tables, forces, made, omega, np.ones(1), steps["y_after"]))
+    return max(shares)
+
+
+def _share(
+    tables: list[Load],
+    forces: list[float],
+    made: np.ndarray,
+    omega: np.ndarray,
+    weights: np.ndarray,
+    places: np.ndarray,
+) -> float:
+    """Return how far an end is moved that was at ``places`` [m], over its way; ``forces`` are those of loads of 1."""
+    way = float(np.abs(places - places[0]).max())
+    acting = [(load, force) for load, force in zip(tables, forces, strict=True) if force > 0.0]
+    if way == 0.0 or not acting:
+        return 0.0
+    moved = [f * _swing(load, made, omega, weights, _NEGLIGIBLE * way / f) for load, f in acting]
+    return sum(moved) / way
 
 
 def _on_beam(scene: Scene, load: Load) -> float:
@@ -53,15 +70,30 @@ def _on_beam(scene: Scene, load: Load) -> float:
     return 0.0 if load.on == "spring" else 1.0
 
 
-def _swing(load: Load, made: np.ndarray, omega: np.ndarray, weights: np.ndarray) -> float:
-    """Return Σ w |∫ δF exp(−iωt) dt|/ω at its largest, δF being what the steps ``made`` leave out of ``load``."""
+def _swing(load: Load, made: np.ndarray, omega: np.ndarray, weights: np.ndarray, negligible: float) -> float:
+    """Return Σ w |∫ δF exp(−iωt) dt|/ω at its largest, δF being what the steps ``made`` leave out of ``load``.
+
+    What may be ``negligible`` in all is bounded, not computed.
+    """
     size = made["size"]
     lines = len(load.record.x) * float(size.max()) / float(np.ptp(load.record.x))
     points = int(np.clip(_DENSE * (float(omega.max() * size.max()) + lines), *_POINTS))
     nodes, shares = np.polynomial.legendre.leggauss(points)
-    times = (made["time"] - 0.5 * size)[:, None] + 0.5 * size[:, None] * nodes
-    force = load.value(times)
     P = np.polynomial.legendre.legvander(nodes, 2)
-    missing = (force - (force * shares) @ P * [0.5, 1.5, 2.5] @ P.T) * shares * 0.5 * size[:, None]
-    swings = (np.abs(np.cumsum((missing * np.exp(-1j * w * times)).sum(axis=1))) / w for w in omega)
-    return float(np.max(sum(w * swing for w, swing in zip(weights, swings, strict=True))))
+    share, at, most, bounded = negligible / len(made), np.zeros(len(omega), complex), 0.0, 0.0
+    for first in range(0, len(made), _TOGETHER):
+        half = 0.5 * size[first : first + _TOGETHER, None]
+        times = made["time"][first : first + _TOGETHER, None] - half + half * nodes
+        force = load.value(times)
+        missing = (force - (force * shares) @ P * [0.5, 1.5, 2.5] @ P.T) * shares * half
+        bound = float(np.abs(missing).sum() * (weights / omega).sum())
+        if bound <= share * len(half):
+            bounded += bound
+            continue
+        total = np.zeros(len(half))
+        for k, w in enumerate(omega):
+            swing = at[k] + np.cumsum((missing * np.exp(-1j * w * times)).sum(axis=1))
+            at[k] = swing[-1]
+            total += weights[k] / w * np.abs(swing)
+        most = max(most, float(total.max()))
+    return most + bounded
