@@ -20,7 +20,7 @@ from springbeam.coupling.protocol import NotConverged, Scales, Step
 from springbeam.coupling.soft import SoftSolver
 from springbeam.coupling.tie import Tie
 from springbeam.results.steps import STEP
-from springbeam.run.neglect import Neglect
+from springbeam.run.ledger import Neglect
 
 # -- the tie by itself, on bodies exact to rounding: conditions, energy, orders, cost, stability, failures ------------
 

@@ -6,6 +6,7 @@ from bodies import DuffingBody, Upper
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
+from springbeam.results.steps import STEP
 from springbeam.run.misplaced import misplaced, tip_modes
 from springbeam.run.stepping import Pair
 from springbeam.scene import scene_from_dict
@@ -131,3 +132,12 @@ def test_an_end_that_the_foundation_holds_is_off_by_no_more_than_the_tip(spring)
 def test_a_mesh_with_the_averaged_mass_has_the_modes_of_a_fine_one():
     beam = SOFT.beam.model_copy(update={"mass_matrix": "averaged", "n_elements": 8})
     assert tip_modes(beam)[0][:4] == pytest.approx(modal_beam(beam).omega[:4], rel=2e-3)
+
+
+@pytest.mark.parametrize("law", ["link", "tie"])
+def test_a_run_that_has_made_no_step_misplaces_nothing(law):
+    """Its two records are those of the start and of an event there."""
+    scene = with_changes(SOFT, contact={"law": law})
+    steps = np.zeros(2, STEP)
+    steps["y_after"] = 0.0, 1.0
+    assert misplaced(scene, Pair(scene, Upper(1.0), DuffingBody(1.0)), steps, []) == 0.0

@@ -26,7 +26,7 @@ from .soft import SoftSolver
 
 
 class OneWay(SoftSolver):
-    """Coupling that one end does not feel; `springbeam.run.neglect` bounds what is left out.
+    """Coupling that one end does not feel; `springbeam.run.ledger` bounds what is left out.
 
     Parameters
     ----------

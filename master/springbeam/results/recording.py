@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from io import FileIO
 from pathlib import Path
 from typing import Any
@@ -81,7 +80,7 @@ class FileRecorder:
     and ``summary.json`` says from the start which scene they belong to. Rows are made from the records at the end.
     Results of an earlier run stay until this one has something to record; then they are removed.
 
-    As a context it ends a run that has not ended itself when an error leaves it, and closes the files.
+    As a context it closes the files.
 
     Parameters
     ----------
@@ -95,7 +94,6 @@ class FileRecorder:
 
     def __init__(self, scene: Scene, directory: RunDirectory, interval: float | None = None) -> None:
         self.scene, self.directory, self.interval = scene, directory, interval
-        self._finished = False
         #: The first line of each file that grows, in the order in which they do.
         self._headers = {directory.events: lines([EVENT_COLUMNS]), directory.steps: b""}
         if scene.beam is not None:
@@ -106,11 +104,7 @@ class FileRecorder:
     def __enter__(self) -> FileRecorder:
         return self
 
-    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
-        if self.begun and not self._finished and error is not None:
-            status = "stopped" if isinstance(error, Exception) else "interrupted"
-            with suppress(OSError):  # on a full disk: the rows that fit are there
-                self.finish({"status": status, "cause": f"{type(error).__name__}: {error}", "time": self.time})
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     @property
@@ -163,7 +157,6 @@ class FileRecorder:
 
     def _end(self, summary: Mapping[str, Any], rows: Iterable[Mapping[str, np.ndarray]]) -> None:
         self._close_files()
-        self._finished = True
         try:
             write_rows(self.directory, rows)
         finally:  # also where the disk has no room for them

@@ -94,28 +94,19 @@ class AdaptiveSteps(Stateful):
         Raises RunStopped if there is no shorter one.
         """
         error, order = self._estimate(state, step)
-        if self.judge(step.size, error, order, to_kink=to_kink):
-            return True
-        if self.state.number > _SHORTEST * _PER_OCTAVE:
-            short = f"the error stays above the tolerance, down to a macro step of {step.size:.3g} s, where it is"
-            raise RunStopped(refused or f"{short} {error:.3g} of it", step.time)
-        return False
-
-    def judge(self, size: float, error: float, order: int, *, to_kink: bool = False) -> bool:
-        """Whether a step of ``size`` [s] with ``error`` (1 is the tolerance) holds; `size` is then that of the next.
-
-        ``to_kink`` says whether it was to end on a kink.
-        """
-        state, factor = self.state, _SAFETY * error ** (-1.0 / order) if error > 0.0 else _GROW
+        own, size, factor = self.state, step.size, _SAFETY * error ** (-1.0 / order) if error > 0.0 else _GROW
         if error <= 1.0:
             # A step that ended on a kink tells of whole ones by the order, unless it was much shorter.
-            wanted = min(size * factor, self.size * (1.0 if state.just_rejected else _GROW))
+            wanted = min(size * factor, self.size * (1.0 if own.just_rejected else _GROW))
             if not (to_kink and (wanted < self.size or size < SHORT_REMAINDER * self.size)):
-                state.number = self._rung_below(wanted)
-            state.just_rejected = False
+                own.number = self._rung_below(wanted)
+            own.just_rejected = False
             return True
-        state.just_rejected = True
-        state.number = max(state.number + 1, self._rung_below(size * max(factor, _SHRINK)))
+        own.just_rejected = True
+        own.number = max(own.number + 1, self._rung_below(size * max(factor, _SHRINK)))
+        if own.number > _SHORTEST * _PER_OCTAVE:
+            short = f"the error stays above the tolerance, down to a macro step of {size:.3g} s, where it is"
+            raise RunStopped(refused or f"{short} {error:.3g} of it", step.time)
         return False
 
     def _rung_below(self, size: float) -> int:
@@ -145,7 +136,7 @@ class AdaptiveSteps(Stateful):
         scales = Scales(span, fastest, self.state.energy, pair.reduced_mass(Phase()))
         tolerance = self._relative + self._absolute / span
         told = pair.coupling(state.phase).local_errors(step, scales)
-        return max((curve, _CUBIC), *((error / tolerance, order) for error, order in told)) if told else (curve, _CUBIC)
+        return max([(curve, _CUBIC), *((error / tolerance, order) for error, order in told)])
 
     def _ways(self, step: Step) -> list[tuple[float, float]]:
         """Return the lowest and the highest position of each end [m], with ``step``."""

@@ -46,16 +46,10 @@ class Detector:
         self._separation = Separation(pair, _NO_TIME)
         self._functions = EventFunctions(scene, pair.law, tip_share, pair.equilibrium)
         self._level = pair.stop or 0.0
-        #: The tolerance last asked for, and where: a step starts where the one before has ended.
-        self._tolerance_of: tuple[Ends, float] | None = None
-        self._tolerance = 0.0
 
     def tolerance(self, ends: Ends) -> float:
         """What positions can be told apart to [m]."""
-        known = (ends, self._steps.size)
-        if known != self._tolerance_of:
-            self._tolerance_of, self._tolerance = known, position_tolerance(ends, self._level, self._steps.size)
-        return self._tolerance
+        return position_tolerance(ends, self._level, self._steps.size)
 
     def simultaneity_tolerance(self, ends: Ends) -> float:
         """Position tolerance plus the distance covered in `_NO_TIME`·H [m]; events within it are simultaneous."""

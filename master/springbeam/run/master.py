@@ -29,10 +29,9 @@ from ..scene import Scene
 from ..scene.resolution import force_window, peak_force_doubt, with_scheme_chosen
 from .adaptive import AdaptiveSteps
 from .detection import Detector
-from .ledger import Balance
+from .ledger import Balance, Neglect
 from .log import TOGETHER, Log
 from .macro_steps import MacroGrid
-from .neglect import Neglect
 from .observed import NOT_SHOWN, observed, why_not_resolved
 from .outcome import RunStopped, cause_of
 from .stepping import SIMULTANEOUS, Pair, State

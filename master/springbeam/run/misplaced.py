@@ -42,7 +42,7 @@ def misplaced(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Even
 
     It is that of the worse end at its worst; 0 where a tie holds an end that nothing moves, or one without mass.
     """
-    if len(steps) < 2 or (pair.law is None and not 0.0 < pair.upper.mass < inf):
+    if not steps["size"].any() or (pair.law is None and not 0.0 < pair.upper.mass < inf):
         return 0.0
     ways = [float(np.abs(steps[name] - steps[name][0]).max()) or inf for name in ("u_tip_after", "y_after")]
     ends, stiffness = _Errors(scene, pair), np.zeros(len(steps))
@@ -123,8 +123,7 @@ def _along_soft_law(
     parts = 1 if degree == 0 else 2  # a force of a higher degree has the law's mean over a step
     defect = _defect(law, before, step, parts)
     at_end = np.ones((3, len(step), parts)) * [[[1.0]], [[0.0]], [[0.0]]]
-    if len(made):
-        at_end[..., -1] = np.multiply.reduceat(after[0], made), *np.add.reduceat(after[1:], made, axis=1)
+    at_end[..., -1] = np.multiply.reduceat(after[0], made), *np.add.reduceat(after[1:], made, axis=1)
     of_steps = [*np.repeat([step["size"] / parts, stiffness[made]], parts, axis=1), *at_end.reshape(3, -1), *defect]
     first = int(np.argmax(defect[0] != 0.0))  # up to there nothing is off
     for H, k, stays, turns, most, missed, early, stiffer, rate in zip(
