@@ -131,3 +131,25 @@ def test_results_of_another_springbeam_are_not_gone_on_with(tmp_path):
     text = (tmp_path / FILE).read_text()
     (tmp_path / FILE).write_text(text.replace('"springbeam":"', '"springbeam":"9.', 1))
     assert "another springbeam or other FMUs" in refused("resume", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('{"study": "sweep"\n', "not a file of records"),
+        ('{"study": "sweep"}\n{"record": {}}\n', "not a file of records"),
+        ('{"study": "thesis", "settings": {}}\n', "another springbeam"),
+        ('{"study": "sweep", "settings": {"scene": 1}}\n', "another springbeam"),
+    ],
+)
+def test_a_file_of_records_that_cannot_be_read_is_named(tmp_path, text, said):
+    (tmp_path / FILE).write_text(text)
+    assert said in refused("resume", tmp_path)
+
+
+def test_a_run_that_stops_early_is_a_row_with_its_cause():
+    wild = ["contact.law=compliance", "coupling.scheme=jacobi", "contact.stiffness=1e9", "coupling.macro_step=1e-2"]
+    study = sweep.Sweep(scene=load_scene("soft", wild), vary=("spring.mass=1,2",), metric=("y_min",))
+    for row in record_all(study).values():
+        assert (row["status"], row["y_min"]) == ("stopped", None)
+        assert row["error"].startswith("stopped at t = ")

@@ -15,7 +15,7 @@ from springbeam.cli.checks import report
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.tie import SCHEMES
 from springbeam.studies import verify
-from springbeam.studies.verify.check import Check, section
+from springbeam.studies.verify.alone import Check, section
 from springbeam.studies.verify.coupled import _airy_overshoot
 
 

@@ -139,7 +139,7 @@ def _examine(scene: Scene, as_json: bool) -> None:
 
 if TYPE_CHECKING:
     from ..bodies.fmu_bodies import OwnBody
-    from ..studies.verify.check import Check, Section
+    from ..studies.verify.alone import Check, Section
 
 
 _COLUMNS = ("quantity", "exact", "computed", "error", "bound", "")

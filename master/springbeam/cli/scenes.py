@@ -13,7 +13,7 @@ import typer
 from rich.text import Text
 
 from ..scene import load_scene, shipped_scenes
-from ..scene.messages import MODELS, nearest
+from ..scene.messages import MODELS
 from ..studies.tables import number, table
 from .common import (
     BAD_INPUT,
@@ -87,10 +87,7 @@ def keys(
         wanted = re.sub(r"\.\d+", "", what)  # loads.0.frequency is a key of loads
         found = [key for key in found if wanted in (key.table, f"{key.table}.{key.name}".lstrip("."))]
         if not found:
-            table, _, name = wanted.partition(".")
-            there = [key.name for key in messages.listed(table)] if table in MODELS else [*filter(None, MODELS)]
-            kind, hint = ("key", nearest(name, there)) if table in MODELS else ("table", nearest(table, there))
-            fail(BAD_INPUT, f"{what}: unknown {kind}; {hint}allowed: {', '.join(there)}")
+            fail(BAD_INPUT, f"{what}: no table and no key; springbeam keys lists all")
     shown: list[Any] = []
     for name, group in groupby(found, lambda key: key.table):
         title = f"\n{messages.heading(name)}  {messages.about(name)}" if name else messages.heading(name)

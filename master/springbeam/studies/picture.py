@@ -41,7 +41,7 @@ class Scale(NamedTuple):
             return np.array([levels.index(value) for value in values], dtype=float), levels
         return np.array(values, dtype=float), sorted(set(values))
 
-    def mark(self, axis: XAxis | YAxis, levels: Sequence[Any], *, all_of_them: bool) -> None:
+    def mark(self, axis: XAxis | YAxis, levels: Sequence[Any]) -> None:
         """Label an axis and its values."""
         axis.set_label_text(self.label)
         if self.words:
@@ -49,7 +49,7 @@ class Scale(NamedTuple):
             axis.set_ticks([levels.index(value) for value in some], [_short(value) for value in some])
         elif self.log:
             logarithmic(axis, np.array(levels, dtype=float))
-        elif all_of_them and np.ptp(levels) < _APART * np.diff(np.array(levels, float)).min(initial=np.inf):
+        elif np.ptp(levels) < _APART * np.diff(np.array(levels, float)).min(initial=np.inf):
             axis.set_ticks(levels)
 
 
@@ -90,8 +90,8 @@ def panels(count: int, wide: int, size: tuple[float, float], title: str) -> tupl
 def multiples(rows: Rows, scales: Sequence[Scale], values: Mapping[str, str], title: str) -> Figure:
     """Return a figure of columns of ``rows``, given with their titles, over the axes of the table.
 
-    Over two axes and no more a panel a column, else a row of panels a column: of a full grid maps over the first two
-    axes, one for each pick of the others; of samples a panel over each axis.
+    Of a full grid a curve over one axis, or maps over the first two, one for each pick of the others; of samples a
+    panel over each axis.
     """
     levels = [list(dict.fromkeys(row[scale.name] for row in rows)) for scale in scales]
     of_grid = len(scales) == 1 or len(rows) == np.prod([len(level) for level in levels])
@@ -130,7 +130,7 @@ def _panel(
     order = np.argsort(places, kind="stable")
     joined = "-" if alone and not scale.words and len(set(places)) == len(places) else "none"
     ax.plot(places[order], values[order], marker=".", linestyle=joined, color=BLUE, linewidth=1.0)
-    scale.mark(ax.xaxis, levels, all_of_them=False)
+    scale.mark(ax.xaxis, levels)
     ax.grid(alpha=0.3)
     return ax.yaxis
 
@@ -140,8 +140,8 @@ def cells(ax: Axes, rows: Rows, x: Scale, y: Scale, values: np.ndarray, **look: 
     (across, columns), (up, lines) = (scale.places([row[scale.name] for row in rows]) for scale in (x, y))
     found = values[np.lexsort((across, up))].reshape(len(lines), len(columns))
     borders = (_borders(np.unique(places), scale.log) for places, scale in ((across, x), (up, y)))
-    x.mark(ax.xaxis, columns, all_of_them=True)
-    y.mark(ax.yaxis, lines, all_of_them=True)
+    x.mark(ax.xaxis, columns)
+    y.mark(ax.yaxis, lines)
     return ax.pcolormesh(*borders, found, **look)
 
 

@@ -1,4 +1,4 @@
-"""Each FMU alone: statics, frequencies, mesh, energy of the beam; Duffing's period and escape of the spring.
+"""What a check is, and each FMU alone: statics, frequencies, mesh, energy of the beam; Duffing and escape of a spring.
 
 The beam has ρA = ρI = L = 1, EI = KAG = κ, unless a function says otherwise; SI units.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise, product
 from math import cos, pi, sqrt
@@ -19,9 +20,71 @@ from scipy.special import ellipk
 
 from ...bodies.fmu_bodies import FmuBeam, FmuSpring
 from ...bodies.protocol import NO_FORCE, FmuError, StepRefused
+from ...run.outcome import RunStopped
 from ...run.runner import simulate
 from ...scene import Beam, Scene, Spring, scene_from_dict
-from .check import EPS, UNIT_FORCE, Check, section
+
+EPS = float(np.finfo(float).eps)
+UNIT_FORCE = (1.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Check:
+    """One number that is known exactly, and its value by the FMUs.
+
+    Parameters
+    ----------
+    quantity
+        What is compared, with its unit.
+    exact, computed
+        The two values; ``computed`` is ``None`` where the FMUs gave none.
+    bound
+        Largest \\|computed − exact\\| that passes.
+    reason
+        Where the bound comes from.
+    """
+
+    quantity: str
+    exact: float | None
+    computed: float | None
+    bound: float
+    reason: str
+
+    @property
+    def error(self) -> float | None:
+        """computed − exact."""
+        return None if self.exact is None or self.computed is None else self.computed - self.exact
+
+    @property
+    def passed(self) -> bool:
+        """Whether the error is within the bound; NaN is not."""
+        return self.error is not None and abs(self.error) <= self.bound
+
+
+@dataclass(frozen=True)
+class Section:
+    """An exact solution, and the cases in which the FMUs compute it, each by itself."""
+
+    title: str
+    solution: Callable[..., Iterator[Check]]
+    cases: tuple[tuple[Any, ...], ...]  #: what the solution is called with
+
+    def __call__(self) -> Iterator[Check]:
+        """Yield the checks of all cases; a case that cannot be computed is a failed check."""
+        for case in self.cases:
+            try:
+                yield from self.solution(*case)
+            except (StepRefused, RunStopped) as error:
+                given = f"{', '.join(map(str, case))}: " * bool(case)
+                yield Check("not computed", None, None, 0.0, f"{given}{error}")
+
+
+def section(title: str, *cases: tuple[Any, ...]) -> Callable[[Callable[..., Iterator[Check]]], Section]:
+    """Return what makes a `Section` of an exact solution; without ``cases`` it is called once."""
+    return lambda solution: Section(title, solution, cases or ((),))
+
+
+# -- each FMU alone --------------------------------------------------------------------------------------------------
 
 #: Half the rows in which frequencies are looked for, and what of them is rounding.
 _SAMPLES, _ROUNDING = 300, 1e-11

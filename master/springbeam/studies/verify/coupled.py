@@ -16,8 +16,18 @@ from ...bodies.fmu_bodies import FmuBeam, FmuSpring, Reals
 from ...bodies.protocol import NO_FORCE
 from ...run.runner import simulate
 from ...scene import Beam, Coupling, Scene, Spring, Time, load_scene, with_changes
-from .alone import IDA, clamped_free_frequencies, free_end, ida_error, scene_of, transfer_rate
-from .check import EPS, UNIT_FORCE, Check, section
+from .alone import (
+    EPS,
+    IDA,
+    UNIT_FORCE,
+    Check,
+    clamped_free_frequencies,
+    free_end,
+    ida_error,
+    scene_of,
+    section,
+    transfer_rate,
+)
 
 
 @section("Coupling: two masses, held exchange, ρ ≈ 1 + cπ²H²")

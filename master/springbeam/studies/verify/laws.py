@@ -23,8 +23,7 @@ from scipy.special import beta, lambertw, spherical_jn
 from ...results.trajectory import Trajectory
 from ...run.runner import simulate
 from ...scene import Beam, Scene, scene_from_dict
-from .alone import IDA, ida_error
-from .check import Check, section
+from .alone import IDA, Check, ida_error, section
 
 #: Stiffness [N, N·m²] that leaves the tip of a beam a free mass for a second, and rotary inertia that keeps θ at rest.
 _LIMP, _RIGID = 1e-13, 1e14
