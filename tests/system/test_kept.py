@@ -1,2 +1,132 @@
 """FMUs of both versions give the same bits; bodies that are kept for the next run step as new ones, are few, and are
 freed."""
+
+from math import nan
+
+import numpy as np
+import pytest
+
+from springbeam import PointMass, RunStopped, SceneError, load_scene, simulate, with_changes
+from springbeam.bodies import fmu, fmu_bodies
+from springbeam.bodies.factory import load_bodies
+from springbeam.bodies.fmu_bodies import release
+from springbeam.bodies.protocol import StepRefused
+
+SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 1e-3}, time={"t_end": 0.25})
+PULSE = {"on": "tip", "signal": "half_sine", "start": 0.01, "duration": 0.05, "amplitude": 3.0}
+SCENES = {
+    "transmission": SOFT,
+    "degree 2": with_changes(SOFT, coupling={"degree": 2}),
+    "generalized-alpha": with_changes(SOFT, beam={"integrator": "generalized_alpha"}),
+    "compliance": with_changes(SOFT, contact={"law": "compliance"}),
+    "loads": with_changes(SOFT, loads=[PULSE, {"on": "beam", "at": 0.5}, {"on": "spring", "amplitude": -2.0}]),
+    "spring alone": with_changes(load_scene("duffing"), time={"t_end": 1.0}),
+    "bouncing": with_changes(load_scene("beam-on-stop"), time={"t_end": 0.1}),
+    "Algorithm 1": with_changes(
+        load_scene("paper-fig2"), contact={"law": "paper", "impact": "rest"}, beam={"n_elements": 40}
+    ),
+}
+
+
+pytestmark = pytest.mark.usefixtures("none_kept")
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """The names of the instances that are made from now on."""
+    names = []
+    make = fmu.Fmu.__init__
+
+    def noted(self, name, *rest):
+        names.append(name)
+        make(self, name, *rest)
+
+    monkeypatch.setattr(fmu.Fmu, "__init__", noted)
+    return names
+
+
+def numbers(scene):
+    """Return all that a run leaves and that is no time of the clock."""
+    run = simulate(scene)
+    assert run.steps is not None or scene.contact.law == "paper"
+    counts = {name: value for name, value in run.summary.items() if name not in ("wall_time", "setup_time")}
+    shapes = [np.asarray(part).tobytes() for part in run.shapes or ()]
+    return {**{name: np.asarray(column).tobytes() for name, column in run.columns.items()}, "": shapes, **counts}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_kept_body_steps_to_the_bits_of_a_new_one(name, made):
+    first = numbers(SCENES[name])
+    new = len(made)
+    assert numbers(SCENES[name]) == first
+    assert (new, len(made)) == (len(SCENES[name].fmus), new)
+
+
+def test_a_force_that_is_no_number_makes_no_step():
+    for body in load_bodies(load_scene("soft"), 0.0):
+        body.mark()
+        with pytest.raises(StepRefused, match="the force it should step under is not finite"):
+            body.advance(0.0, 1e-3, (nan, 0.0, 0.0))
+        body.close()
+
+
+def test_few_are_kept_and_the_oldest_is_freed(monkeypatch):
+    closed = []
+    close = fmu.Fmu.close
+    monkeypatch.setattr(fmu.Fmu, "close", lambda self: (closed.append(self), close(self)))
+    springs = [with_changes(load_scene("duffing"), spring={"mass": m}, time={"t_end": 0.1}) for m in range(1, 7)]
+    for scene in springs:
+        simulate(scene)
+    assert len(closed) == len(springs) - fmu_bodies._MOST_KEPT
+    release()
+    assert len(closed) == len(springs)
+    assert not any(one.faultless for one in closed)
+
+
+def test_a_simulation_that_is_refused_gives_its_bodies_back(made):
+    for _ in range(2):
+        with pytest.raises(SceneError, match="must start there or above"):
+            simulate(SOFT, lower=PointMass(1.0, displacement=1.0))
+    assert made == ["beam"]
+
+
+def test_a_body_whose_calls_fail_is_not_kept(made, monkeypatch):
+    def failing(self):
+        raise self.fmu.failed(3, "cannot save the state")
+
+    with monkeypatch.context() as during:
+        during.setattr(fmu_bodies.FmuBody, "mark", failing)
+        with pytest.raises(RunStopped, match=r"beam\.fmu: cannot save the state"):
+            simulate(SOFT)
+    simulate(SOFT)
+    assert made == ["beam", "spring", "beam"]  # the spring had not been called
+
+
+# -- either version of FMI
+
+LOADS = [
+    {"on": "beam", "at": 0.5, "signal": "harmonic", "amplitude": 0.3, "frequency": 4.0},
+    {"on": "spring", "signal": "harmonic", "amplitude": 0.2, "frequency": 7.0},
+]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"contact": {"law": "compliance"}},
+        {"coupling": {"scheme": "hermite", "degree": 2}, "loads": LOADS},
+    ],
+)
+def test_either_version_of_fmi_gives_the_same_bits(changes, monkeypatch):
+    scene = with_changes(load_scene("soft"), time={"t_end": 0.3}, **changes)
+    runs = []
+    for version in ("2.0", "3.0"):
+        monkeypatch.setenv("SPRINGBEAM_FMI", version)
+        runs.append(simulate(scene))
+    old, new = runs
+    assert len(old.events) > 1
+    assert old.events == new.events
+    pairs = [(old[name], new[name]) for name in old.columns]
+    for one, other in (*pairs, (old.steps, new.steps), *zip(old.shapes, new.shapes, strict=True)):
+        assert one.tobytes() == other.tobytes()
