@@ -84,7 +84,7 @@ def not_resolved(
     H
         Steps of one length that make waves as late as those of the run [s]; needed if these follow from tolerances.
     """
-    # Steps that follow from tolerances are judged by their error, which does not tell of waves inside a beam.
+    # Steps that follow from tolerances are judged by what they add up to: by their own error they follow the ends.
     of_steps = _OF_STEPS[-1:] if scene.coupling.adaptive else _OF_STEPS
     return next(
         told(scene, (*of_steps, _OF_LOADS, *_OF_CONTACT), _Seen(misplaced, shortest_contact, left_out, H)), None
@@ -120,7 +120,7 @@ def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
     """
     limits, coupling = MISPLACED_TIED if scene.contact.rigid else MISPLACED, scene.coupling
     excess = seen.misplaced / limits[_force_degree(scene)]
-    if excess <= 1.0 or (coupling.adaptive and not scene.contact.rigid):
+    if excess <= 1.0:
         return {}
     raises = coupling.scheme == "energy" and coupling.degree < 2
     raises &= scene.beam is None or scene.beam.integrator == "modal"
