@@ -265,6 +265,13 @@ def test_a_spring_that_runs_away_is_a_failure_of_the_reference():
         event_driven.simulate(unchecked, sample_times=[0.0])
 
 
+@pytest.mark.parametrize(("speed", "kinds_then"), [(1.0, ["stop_impact"]), (-1.0, [])])
+def test_a_tip_that_starts_on_the_stop_strikes_it_only_downward(speed, kinds_then):
+    beam = {"n_elements": 8, "initial_deflection_slope": 0.0, "initial_velocity_slope": -speed, "approach": "elastic"}
+    scene = with_changes(load_scene("beam-on-stop"), beam=beam, stop={"position": 0.0})
+    assert kinds(event_driven.simulate(scene, sample_times=[0.0], t_end=1e-6)) == kinds_then
+
+
 def wave(tau, bottom):
     """Zero at ``bottom``, where the polynomial through the nodes of a step is 2e-8 (0.5) or −3e-9 (0.43)."""
     return 1.0 - np.cos(6.0 * (tau - bottom))
