@@ -81,7 +81,7 @@ class _Errors:
         together; ``shift`` [N·s²] moves free masses besides. ``stiffness`` is the spring's over its mass [1/s²],
         ``per_mass`` that of the lower end [1/kg], 0 while the foundation holds it.
         """
-        free, pushed, flexible, _, shifted = self._moves(H)
+        free, pushed, flexible, shifted = self._moves(H)
         half = 0.5 * H
         slow = 1.0 / (1.0 + half * (self._resists + half * stiffness))
         self.x = free @ self.x + shift * shifted
@@ -95,16 +95,6 @@ class _Errors:
     def strike(self, stays: float, turns: float, most: float) -> None:
         """Do to the lower end what `_after_events` says."""
         self.y, self.z = stays * self.y, stays * self.z + max(-most, min(turns * self.y, most))
-
-    def join(self, H: float, per_mass: float) -> None:
-        """Bring the ends together, as if contact began earlier or later; the next step of ``H`` [s] follows that.
-
-        ``per_mass`` as of `advance`.
-        """
-        moved = self._moves(H)[3]
-        shift = (self.y - self.u) / (float(self.tip @ moved) + per_mass)
-        self.x[: self.n] += shift * moved
-        self.y -= shift * per_mass
 
     def meet(self, apart: float, per_mass: float) -> None:
         """Let v − z be ``apart`` [m/s] by an impulse; ``per_mass`` as of `advance`."""
@@ -171,8 +161,6 @@ def _along_tie(
     shares = (np.arange(parts) + 1.0) / parts
     inside = np.array([[path.at(s), path.slope(s) / size] for s in shares]).transpose(2, 0, 1)
     tied, seated = joined(steps), steps["phase"] >= 3.0
-    following = np.append(steps["size"][1:], 0.0)
-    following[following == 0.0] = steps["size"].max()
     for i in range(1, len(steps)):
         H, k, stays, turns, most = map(float, (steps["size"][i], stiffness[i], *after[:, i]))
         per_mass = 0.0 if seated[i - 1] else ends.per_mass
@@ -184,8 +172,6 @@ def _along_tie(
         ends.strike(stays, turns, most)
         if tied[i - 1 : i + 1].any() and (most > 0.0 or tied[i] != tied[i - 1]):
             per_mass = 0.0 if seated[i] or most > 0.0 else ends.per_mass  # the foundation strikes each end by itself
-            if tied[i]:
-                ends.join(float(following[i]), per_mass)
             # Below degree 2 the velocities of tied ends go up and down about those of a tie, and ends that part keep
             # them: taken for an error, they tell five times too much (`soft` in steps of 4 ms).
             kept = not tied[i] and degree < 2
@@ -231,11 +217,11 @@ def _modes(scene: Scene, pair: Pair) -> Modes:
     return omega**2, scene.beam.alpha_b * omega**2, tip
 
 
-def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, float, np.ndarray, np.ndarray]:
+def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
     """Return what a step of ``H`` [s] makes of displacements and velocities of modes, (2n, 2n).
 
-    Further what a constant force of 1 N adds to them, (2n,), and how far that moves the tip [m/N]; how far 1 N·s² that
-    moves a free mass moves the modes that the step follows, (n,), and what the step makes of that, (2n,).
+    Further what a constant force of 1 N adds to them, (2n,), and how far that moves the tip [m/N]; and what the step
+    makes of where 1 N·s², which moves a free mass, puts the modes that it follows, (2n,).
     """
     # A free mass is a mode so soft that it does not turn; 1 − cos would leave nothing of a softer one.
     stiffness, decay, tip = np.maximum(modes[0], 1e-8 / H**2), 0.5 * modes[1], modes[2]
@@ -246,7 +232,7 @@ def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, float, np.nd
     free = np.block([[np.diag(kept), np.diag(sine)], [np.diag(-stiffness * sine), np.diag(cosine - decay * sine)]])
     pushed = np.concatenate([(1.0 - kept) / stiffness * tip, sine * tip])
     moved = tip / (1.0 + H * (decay + 0.25 * H * stiffness))
-    return free, pushed, float(tip @ pushed[: len(tip)]), moved, free[:, : len(tip)] @ moved
+    return free, pushed, float(tip @ pushed[: len(tip)]), free[:, : len(tip)] @ moved
 
 
 @lru_cache(maxsize=16)
