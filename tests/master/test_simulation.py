@@ -7,8 +7,9 @@ import pytest
 from bodies import DuffingBody, Upper, simulate, stopping
 from scenes import kinds, scene_from_dict
 
+from springbeam import SpringDamper
 from springbeam.bodies.gate import admit
-from springbeam.bodies.protocol import NO_FORCE, Abilities, StepRefused
+from springbeam.bodies.protocol import NO_FORCE, Abilities, Body, StepRefused
 from springbeam.contact.phases import Joint, Phase
 from springbeam.monolithic import event_driven
 from springbeam.results.recording import MemoryRecorder
@@ -246,3 +247,10 @@ def test_a_force_is_continued_over_four_times_its_step_and_held_beyond(times, co
     monkeypatch.setattr(pair.joined, "solve", lambda *given: guesses.append(given[-1]))
     pair.attempt(state, times * 1e-3, state.ends)
     assert guesses == [(2.0, 3.0, 5.0) if continued else (2.0, 0.0, 0.0)]
+
+
+def test_a_body_of_ones_own_that_cannot_be_is_refused():
+    with pytest.raises(ValueError, match="a mass is positive and finite"):
+        SpringDamper(0.0)
+    with pytest.raises(NotImplementedError, match="Body has neither mark nor state"):
+        Body().mark()

@@ -36,11 +36,6 @@ def _exchanges(scene: Scene) -> bool:
     return scene.coupling.scheme in ORDINARY_SCHEMES
 
 
-def _integrals(scene: Scene) -> int:
-    """Return how many integrals of the gap the scheme sets to 0."""
-    return 0 if _exchanges(scene) else scene.coupling.degree - (scene.coupling.scheme == "hermite")
-
-
 def _falls_between(scene: Scene) -> bool:
     """Return whether a load jumps or bends between equal macro steps."""
     H, start = scene.coupling.H, scene.contact_time or 0.0
@@ -97,8 +92,10 @@ LACKING: tuple[Rule, ...] = (
         "most (canInterpolateInputs; FMI 3.0 has none); use degree = {followed}",
         _followed,
     ),
-    Rule(
-        lambda s, body, table: _integrals(s) > body.integrals,
+    Rule(  # of so many integrals of the gap that the scheme sets to 0
+        lambda s, body, table: (
+            not _exchanges(s) and s.coupling.degree - (s.coupling.scheme == "hermite") > body.integrals
+        ),
         f"{{coupling.degree}}: the body in [{{table}}] cannot do that, {_LACKS['integrals']}; "
         "use degree = {followed}",
         _followed,
