@@ -4,11 +4,8 @@ import numpy as np
 import pytest
 
 from springbeam import load_scene, simulate, with_changes
-from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.scene import Beam
 from springbeam.scene.linearised import spring_frequency
 from springbeam.scene.resolution import STABLE, choice, mesh_frequency, slowest_frequency, with_scheme_chosen
-from springbeam.studies.stability.predict import LinearBody, LinearPair, spectral_radius
 
 PAIR = load_scene("soft")
 
@@ -39,28 +36,6 @@ def test_the_bound_is_on_the_fastest_frequency(share, expected):
 @pytest.mark.parametrize(("turn", "expected"), [(0.99, ("energy", 2)), (1.01, ("energy", 0))])
 def test_unresolved_motion_gets_degree_0(turn, expected):
     assert choice(auto(coupling={"macro_step": turn / slowest_frequency(PAIR.beam)}))[:2] == expected
-
-
-def test_below_the_bound_no_pair_amplifies():
-    """Random linear pairs: beams slender and stocky, full and truncated, springs light and heavy, or none."""
-    rng = np.random.default_rng(5)
-    for _ in range(60):
-        n, degree = int(rng.integers(1, 9)), int(rng.choice([1, 2, 4]))
-        inertia = 10 ** rng.uniform(-4, 0)
-        beam = Beam.with_ones(
-            young_modulus=10 ** rng.uniform(-2, 2) / inertia, second_moment_of_area=inertia,
-            shear_modulus=10 ** rng.uniform(-2, 3), n_elements=n, element_degree=degree,
-            n_modes=int(rng.choice([0, rng.integers(1, 2 * n * degree + 1)])),
-        )  # fmt: skip
-        modal, fastest = modal_beam(beam), mesh_frequency(beam)
-        omega2 = modal.omega**2
-        own = fastest * 10 ** rng.uniform(-6, 0)
-        spring = [np.array([own**2]), np.zeros(1), np.array([10 ** rng.uniform(-2, 3)])]
-        if rng.random() < 0.2:
-            spring = [np.zeros(0)] * 3
-        pair = LinearPair(LinearBody(omega2, np.zeros_like(omega2), modal.tip), LinearBody(*spring))
-        for x in (0.3, 0.6, 1.0):
-            assert max(spectral_radius(pair, "hermite", d, x * STABLE / fastest) for d in (1, 2)) < 1.0 + 1e-6
 
 
 def test_where_hermite_is_not_defined_it_is_not_taken():

@@ -10,7 +10,7 @@ from numpy.polynomial import Polynomial
 
 from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Motion, StepRefused
-from springbeam.contact.events import Holding, clearance, locate
+from springbeam.contact.events import clearance, locate
 from springbeam.contact.phases import Joint, Phase
 from springbeam.coupling.protocol import Step
 from springbeam.results.paths import Path
@@ -18,7 +18,7 @@ from springbeam.run.detection import Detector
 from springbeam.run.macro_steps import MacroGrid
 from springbeam.run.separation import Separation
 from springbeam.run.stepping import Pair
-from springbeam.scene import Beam, Spring, load_scene, with_changes
+from springbeam.scene import load_scene, with_changes
 
 SIZE = 0.02
 
@@ -87,13 +87,6 @@ def test_locate_does_not_take_a_zero_that_the_function_rises_from():
     assert Path.through(f(0.0), f(math.pi), math.pi).falls_through_zero() < 1e-12
     # ḟ(π/2) = −(π/2)²
     assert located(f, math.pi, 1e-14, 0.0) == pytest.approx(0.5 * math.pi, abs=1e-14)
-
-
-def test_the_force_that_holds_a_massless_tip_falls_as_the_spring_moves():
-    """1/k = 4/3 m/N, α_b = 0.1 s, 2 kg, c = 0.5 N·s/m, k1 = 3 N/m: C/k = 0.2 − 0.1 m, and ż = −0.175/2 m/s²."""
-    holding = Holding(Beam.with_ones(alpha_b=0.1), Spring.with_ones(mass=2.0, damping=0.5, linear_stiffness=3.0))
-    ends = Motion(0.2, -1.0, 0.0, 0.0), Motion(0.2, -1.0, 0.0, 0.0)
-    assert holding(ends) == pytest.approx((0.1, -1.0 - 0.1 * 0.0875), rel=1e-14)
 
 
 @pytest.mark.parametrize(("jump", "refused"), [(5e-10, True), (5e-11, False)])

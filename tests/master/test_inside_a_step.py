@@ -12,13 +12,6 @@ from springbeam.results.paths import Path, sign_changes
 
 
 SIZE = 0.02
-#: Coefficients in s = τ/H, ascending: minima inside, at neither end, two of them, none.
-QUINTICS = [
-    (0.3, 1.0, -4.0, 1.5, 2.0, 1.0),
-    (1.0, -1.0, 1.0),
-    (0.1, -1.0, 9.0, -27.0, 31.0, -12.0),
-    (1.0, 2.0, 0.5, 0.1),
-]
 
 
 def through(p, size=SIZE):
@@ -26,19 +19,6 @@ def through(p, size=SIZE):
     q, q0 = p.integ(), p.integ(2)
     samples = [(float(p(s)), float(p.deriv()(s)) / size) for s in (0.0, 1.0)]
     return Path.through(*samples, size, (float(q(1.0)), float(q0(1.0))))
-
-
-@pytest.mark.parametrize("coefficients", QUINTICS)
-def test_the_lowest_minimum_is_found(coefficients):
-    p = Polynomial(coefficients)
-    inside = [
-        r.real for r in p.deriv().roots() if abs(r.imag) < 1e-9 and 0.0 < r.real < 1.0 and p.deriv(2)(r.real) > 0.0
-    ]
-    found = through(p).lowest_inside()
-    if inside:
-        assert found == pytest.approx(min(inside, key=p), abs=1e-9)
-    else:
-        assert found is None
 
 
 @pytest.mark.parametrize(("even", "odd"), [(1.0, 0.0), (0.0, -1.0), (0.7, 0.4)])
@@ -65,15 +45,6 @@ def test_it_falls_through_zero_at_its_root(x, bend):
     """(x* − s)(1 + bend s²) falls through zero once in (0, 1); 40 bisections find it to 1e-12."""
     path = through(Polynomial((x, -1.0)) * Polynomial((1.0, 0.0, bend)))
     assert path.falls_through_zero() == pytest.approx(x, abs=1e-12)
-
-
-def test_a_dip_falls_and_rises_through_zero():
-    """(s − 0.3)(s − 0.8) is lowest at 0.55."""
-    path = through(Polynomial((0.24, -1.1, 1.0)))
-    bottom = path.lowest_inside()
-    assert bottom == pytest.approx(0.55, abs=1e-11)
-    assert path.falls_through_zero(bottom) == pytest.approx(0.3, abs=1e-12)
-    assert path.rises_through_zero(bottom) == pytest.approx(0.8, abs=1e-12)
 
 
 def test_of_two_falls_the_last_one_counts_and_a_dip_before_it_is_asked_for():

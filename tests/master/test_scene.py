@@ -245,16 +245,6 @@ def test_what_can_hardly_be_meant_is_told(changes, said):
     assert all(fragment in line for fragment, line in zip(said, lines, strict=True))
 
 
-def test_bodies_without_any_scale_are_dimensionless():
-    """All scales are 1, as in the paper's section 6, where κ1 and κ2 say all; the scene stays as it was given."""
-    given = {"young_modulus": 3.6e10, "shear_modulus": 3.6e10}
-    scene = springbeam.scene.scene_from_dict({"time": {"t_end": 1.0}, "beam": given, "spring": {}})
-    beam, spring = scene.beam, scene.spring
-    units = (beam.density, beam.length, beam.area, beam.second_moment_of_area, beam.shear_coefficient)
-    assert {*units, spring.mass, spring.linear_stiffness} == {1.0}
-    assert scene.model_dump(exclude_unset=True)["beam"] == given
-
-
 def test_a_scene_with_all_lengths_in_mm_is_named():
     """A beam of 500 x 20 x 5 mm beside 0.2 g: as metres it has 3.9e8 kg. In metres nothing is said."""
     mm = {"length": 500.0, "width": 20.0, "height": 5.0}

@@ -184,20 +184,6 @@ def test_rows_reach_the_disk_before_the_checkpoint_that_counts_them(tmp_path, mo
     ]
 
 
-# -- runs that ended early ------------------------------------------------------------------------------------------
-
-
-def test_an_interrupted_run_goes_on(interrupted, whole):
-    assert load_trajectory(interrupted).summary["status"] == "interrupted"
-    before = Checkpoint.read(interrupted / "run.checkpoint").wall_time
-    trajectory = springbeam.resume(interrupted)
-    assert trajectory.summary["wall_time"] > before > 0.0
-    assert written(interrupted) == written(whole)
-    assert trajectory.summary["status"] == "done"
-    assert np.array_equal(trajectory.e_total, springbeam.simulate(SCENE).e_total)
-    assert not (interrupted / "run.checkpoint").exists()
-
-
 # -- the command, as a process --------------------------------------------------------------------------------------
 
 

@@ -163,24 +163,6 @@ def test_the_seated_force_is_the_body_s(fmu, heavy, stop):
     assert run.summary["max_energy_residual"] < 1e-9
 
 
-@pytest.mark.parametrize(
-    ("spring", "version", "degree", "order"),
-    [(ELEMENT, "2.0", 2, 6.0), ({}, "2.0", 2, 6.0), ({}, "3.0", 0, 2.0)],
-    ids=["elements", "an FMU", "an FMU without derivatives"],
-)
-def test_loads_act_on_the_ends_of_partners(fmu, spring, version, degree, order):
-    """A force on each end; of degree 2, and of order 2 where only its mean over a step can be followed."""
-    signal, errors = {"signal": "harmonic", "frequency": 1.3}, []
-    loads = [{"on": "tip", "amplitude": 3.0, **signal}, {"on": "spring", "amplitude": -5.0, **signal}]
-    for size in (0.02, 0.01):
-        coupling = {"macro_step": size, "degree": degree}
-        run = simulate(pair(fmu(f"of {version}", version=version), loads=loads, coupling=coupling, spring=spring))
-        errors.append(error(run, linked, 3.0, -5.0, 2.0 * np.pi * 1.3))
-        assert np.abs(run.e_load).max() > 0.1
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.05 * order)
-    assert degree == 0 or errors[1] < 1e-10
-
-
 @pytest.mark.parametrize(("scheme", "version"), [("jacobi", "2.0"), ("gauss_seidel", "2.0"), ("jacobi", "3.0")])
 def test_without_state_saving_values_are_exchanged(fmu, scheme, version):
     path, spring = fmu(f"plain{version}", version=version, state=False, slopes=False), dict.fromkeys(ENERGIES)

@@ -108,12 +108,6 @@ def test_a_beam_without_inertia_starts_where_it_rests():
     np.testing.assert_allclose(run.shear_force[0], C - 5.0 * arm, atol=1e-10)
 
 
-def test_a_spring_rests_in_the_well_nearest_to_where_it_is_put():
-    bistable = {"mass": 1.0, "linear_stiffness": -4.0, "cubic_stiffness": 1.0, "equilibrium": -1.5}
-    columns = simulate(scene(beam=None, spring=bistable, loads=None)).columns
-    np.testing.assert_allclose(columns["y"], -2.0, rtol=1e-12)
-
-
 def test_a_spring_under_a_wall_is_pressed_down_to_it():
     upper = {"element": "rigid_wall", "position": -0.01}
     columns = simulate(scene(beam=upper, spring=SPRING, loads=None)).columns
