@@ -86,6 +86,12 @@ def test_axes_have_quantities_and_units_and_the_key_names_phases_and_events(pict
         assert (NOT_RESOLVED in texts(marked)) is not resolved
 
 
+def test_every_panel_is_in_one_picture():
+    run = a_trajectory(events=EVERY_EVENT)
+    drawn = [ax.get_ylabel() for picture in plots._OVER_TIME for ax in figure_of(run, picture).axes]
+    assert sorted(drawn) == sorted(panel.axis for panel in panels(run))
+
+
 def test_panels_are_painted_with_all_that_they_say():
     run = a_trajectory(compliance_force=np.zeros(400))
     (forces,) = (ax for ax in figure_of(run, "velocities_and_forces").axes if ax.get_ylabel().startswith("force"))
