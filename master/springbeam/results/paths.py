@@ -50,6 +50,11 @@ class Path(NamedTuple):
         return _EVEN * abs(self.even) + _ODD * abs(self.odd)
 
     @property
+    def unsure(self) -> float:
+        """By how much the last of the moments moves the path at most: about its error, where that is not small."""
+        return _ODD * abs(self.odd)
+
+    @property
     def moments_beside_cubic(self) -> float:
         """By how much path and cubic differ in ∫ f ds or in 2 ∫∫ f ds ds, whichever is more."""
         mean = self.even / 30.0

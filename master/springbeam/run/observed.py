@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..results.columns import MOST_SHOWN, normal_compliance
+from ..results.dense import between_rows
 from ..results.steps import joined
 from ..results.totals import shortest_contact
 from ..results.trajectory import Event
@@ -58,7 +59,14 @@ def why_not_resolved(
     lasted = shortest_contact(steps, events, SHORT * H, least, free_at_end=free_at_end)
     sizes = steps["size"][steps["size"] > 0.0]
     late = float(np.sqrt(np.mean(sizes**3) / np.mean(sizes))) if scene.coupling.adaptive and len(sizes) else None
-    return not_resolved(scene, seen.misplaced, shortest_contact=lasted, left_out=left_out(scene, steps), H=late)
+    return not_resolved(
+        scene,
+        seen.misplaced,
+        shortest_contact=lasted,
+        left_out=left_out(scene, steps),
+        between_rows=between_rows(scene, steps),
+        H=late,
+    )
 
 
 def _momenta(scene: Scene, pair: Pair, steps: np.ndarray) -> tuple[float, float]:

@@ -30,6 +30,8 @@ LAG = 0.12
 MISPLACED, MISPLACED_TIED = (0.006, 0.002, 0.001), (0.0025, 0.002, 0.001)
 #: Share of its way by which what the steps leave out of measured loads may move an end; that is known to a factor of 3.
 LEFT_OUT = 0.01
+#: Share of its way by which an end may be off between the rows, as `springbeam.results.dense.between_rows` tells it.
+BETWEEN_ROWS = 0.01
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
 #: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
 STABLE = 3.0
@@ -57,6 +59,7 @@ class _Seen(NamedTuple):
     misplaced: float
     shortest_contact: float
     left_out: float
+    between_rows: float
     H: float | None
 
 
@@ -66,6 +69,7 @@ def not_resolved(
     *,
     shortest_contact: float = inf,
     left_out: float = 0.0,
+    between_rows: float = 0.0,
     H: float | None = None,
 ) -> str | None:
     """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
@@ -81,14 +85,15 @@ def not_resolved(
         force is exchanged once per macro step.
     left_out
         How far what the steps leave out of tables moves an end, over its way.
+    between_rows
+        How far an end may be from its curve between the rows, over its way.
     H
         Steps of one length that make waves as late as those of the run [s]; needed if these follow from tolerances.
     """
     # Steps that follow from tolerances are judged by what they add up to: by their own error they follow the ends.
     of_steps = _OF_STEPS[-1:] if scene.coupling.adaptive else _OF_STEPS
-    return next(
-        told(scene, (*of_steps, _OF_LOADS, *_OF_CONTACT), _Seen(misplaced, shortest_contact, left_out, H)), None
-    )
+    seen = _Seen(misplaced, shortest_contact, left_out, between_rows, H)
+    return next(told(scene, (*of_steps, _OF_LOADS, *_OF_CONTACT, _OF_CURVES), seen), None)
 
 
 def lateness(scene: Scene, turn: float) -> float:
@@ -303,6 +308,14 @@ _OF_CONTACT = (
             "size": _rounded_down(seen.shortest_contact / SHORT),
         },
     ),
+)
+#: How rows that are right may hide what the ends do between them. It falls no slower than with H where twice as many
+#: steps follow what turned by π.
+_OF_CURVES = Rule(
+    lambda s, seen: seen.between_rows > BETWEEN_ROWS,
+    "not resolved: between the rows an end may be off by {far:.2g} % of its way, since it moves to and fro within a "
+    "step; {remedy}",
+    lambda s, seen: {"far": 100.0 * seen.between_rows, "remedy": _shorter(s, 2.0 * seen.between_rows / BETWEEN_ROWS)},
 )
 _MESH_DECIDES = Rule(
     _settling,
