@@ -117,7 +117,7 @@ def test_impulses_are_part_of_the_promise(seed, number):
     assert verdict.factor <= 1.0
 
 
-MISSED = "miss of the contact law moves an end by about"
+MISSED = "differ from the contact law, which moves an end by about"
 
 
 @pytest.mark.parametrize(
