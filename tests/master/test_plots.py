@@ -137,7 +137,12 @@ def words_in(found):
     return {curve.look.words for curve in found.curves}
 
 
-def test_levels_far_outside_are_left_out():
+def test_a_motion_lost_in_the_other_is_enlarged_and_levels_far_outside_are_left_out():
+    t = a_trajectory().time
+    run = a_trajectory(u_tip=2e-6 * np.sin(9.0 * t), y=-1e-2 * np.sin(5.0 * t))
+    assert [p.axis for p in panels(run)][:3] == ["position [mm]", "position [µm]", "velocity [mm/s]"]
+    assert len(figure_of(run, "positions").axes) == 2
+    assert [p.axis for p in panels(a_trajectory())][:2] == ["position [mm]", "velocity [mm/s]"]
     assert levels_in(a_trajectory()) == {"Ψ": 0.0, "φ": -0.015}
     assert levels_in(a_trajectory(with_changes(PAIR, stop={"position": -100.0}))) == {"Ψ": 0.0}
 

@@ -29,6 +29,7 @@ from .drawing import (
     Unit,
     decimated,
     drawable,
+    much_smaller,
     near_levels,
     present,
     readable_unit,
@@ -95,6 +96,7 @@ def panels(trajectory: Trajectory) -> list[Panel]:
         return []
     found = [
         positions(trajectory),
+        enlarged(trajectory),
         velocities(trajectory),
         forces(trajectory),
         impulses(trajectory),
@@ -114,6 +116,14 @@ def positions(trajectory: Trajectory) -> Panel:
     ends = trajectory["time"][[0, -1]]
     curves += [Curve(symbol, LEVELS[symbol], ends, np.full(2, height)) for symbol, height in near.items()]
     return Panel("positions", "Positions", "position", "m", curves, 3.0)
+
+
+def enlarged(trajectory: Trajectory) -> Panel:
+    """Return a panel of its own for the one of two positions whose motion is lost beside the other's."""
+    looks = {
+        name: Look(POSITIONS[name].colour, f"{POSITIONS[name].words}, enlarged") for name in much_smaller(trajectory)
+    }
+    return Panel("positions-enlarged", "The smaller one, enlarged", "position", "m", _curves(trajectory, looks), 1.2)
 
 
 def velocities(trajectory: Trajectory) -> Panel:
