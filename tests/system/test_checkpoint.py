@@ -95,7 +95,12 @@ def test_a_damaged_checkpoint_is_refused_and_nothing_is_touched(interrupted):
     for said in refused_untouched(interrupted, damaged):
         assert "not a checkpoint of springbeam, or damaged" in said
     forged = [b"\x90", b"\x91" * 100_000, b"nonsense", b"\xc1"]
-    for old, new in ((b"version", b"visions"), (b"macro_steps", b"micro_steps"), (b"touch", b"couch")):
+    for old, new in (
+        (b"version", b"visions"),
+        (b"macro_steps", b"micro_steps"),
+        (b"touch", b"couch"),
+        (b"transitions", b"transistors"),
+    ):
         forged.append(good.partition(b"\n")[2].replace(old, new, 1))
     for said in refused_untouched(interrupted, map(checksummed, forged)):
         assert said.startswith("error: ")

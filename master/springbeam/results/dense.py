@@ -254,10 +254,9 @@ def _lowest(powers: np.ndarray, below: float) -> tuple[float, int, float]:
         if floors[i] >= best - tolerance:
             break
         path = powers[:, i].tolist()
-        for s in (
-            *sign_changes(derivative(path), 0.0, 1.0),
-            1.0,
-        ):  # where it begins another one ends, or there is a row
-            if value(path, s) < best - tolerance:
-                best, step, share = value(path, s), i, s
+        # Not at 0: where it begins another one ends, or there is a row.
+        for s in (*sign_changes(derivative(path), 0.0, 1.0), 1.0):
+            there = value(path, s)
+            if there < best - tolerance:
+                best, step, share = there, i, s
     return best, step, share

@@ -5,6 +5,8 @@ Positions tell of meeting, release and the foundation (`springbeam.contact.event
 
 from __future__ import annotations
 
+from math import isfinite
+
 from ..bodies.protocol import Ends, Motion, StepRefused
 from ..contact.events import (
     EventFunction,
@@ -217,7 +219,8 @@ class Detector:
             touching = not touching
             joint, kind = (Joint.TOUCH, EventKind.IMPACT) if touching else (Joint.FREE, EventKind.SEPARATION)
             (u, v), (y, z) = (_inside(*motions, step.size, at) for motions in zip(step.start, step.end, strict=True))
-            found.append((joint, Event(step.time + at * step.size, kind, y, z, u, v)))
+            if all(map(isfinite, (u, v, y, z))):  # else the energies of the row are out of range too and stop the run
+                found.append((joint, Event(step.time + at * step.size, kind, y, z, u, v)))
         return found
 
 

@@ -138,7 +138,10 @@ class Master(Stateful):
 
     def go_on(self, saved: RunState) -> None:
         """Continue where an equal run has returned `run_state`. Raises ValueError if it was another."""
-        for name, part in self._parts().items():
+        parts = self._parts()
+        if saved.keys() != parts.keys():
+            raise ValueError(f"a state of {', '.join(saved)}, not of {', '.join(parts)}")
+        for name, part in parts.items():
             part.restore(saved[name])
 
     def _parts(self) -> dict[str, Stateful]:
