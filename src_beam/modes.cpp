@@ -1,6 +1,7 @@
 #include "modes.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
@@ -34,13 +35,16 @@ MatrixXd modes_among(const Timoshenko& mesh, const MatrixXd& Z) {
   for (Index k = 0; k < Z.cols(); ++k) X.col(k) = mesh.weighted_strains(Z.col(k));
   // Eigen leaves singular values of what is not finite uninitialised.
   if (!X.allFinite()) throw std::runtime_error("beam: the parameters leave the range of floating-point numbers");
-  if (X.rows() > X.cols()) {
-    const Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> in_place(X);
-    X = MatrixXd(X.topRows(Z.cols()).triangularView<Eigen::Upper>());
-  }
-  const Eigen::BDCSVD<MatrixXd> svd(X, Eigen::ComputeThinV);
-  if (svd.info() != Eigen::Success) throw std::runtime_error("beam: the modes cannot be computed");
-  return Z * svd.matrixV().rowwise().reverse();
+  X /= X.cwiseAbs().maxCoeff();
+  // The squares give all but the lowest, in little time; rotations by Jacobi then find these to ε of the highest.
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> squares(X.transpose() * X);
+  if (squares.info() != Eigen::Success) throw std::runtime_error("beam: the modes cannot be computed");
+  const MatrixXd V = squares.eigenvectors().rowwise().reverse();
+  X *= V;
+  const Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> in_place(X);
+  const MatrixXd R = X.topRows(Z.cols()).triangularView<Eigen::Upper>();
+  const Eigen::JacobiSVD<MatrixXd, Eigen::NoQRPreconditioner> svd(R, Eigen::ComputeThinV);
+  return Z * (V * svd.matrixV()).rowwise().reverse();
 }
 
 /// All modes of the mesh.
