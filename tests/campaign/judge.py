@@ -9,7 +9,7 @@ from springbeam import RunStopped, SceneError, Trajectory, simulate, with_change
 from springbeam.monolithic import event_driven
 from springbeam.results.contact_times import contact_time_difference
 from springbeam.scene.resolution import peak_force_doubt
-from springbeam.scene.rules import suspicions
+from springbeam.scene.suspicions import suspicions
 from springbeam.studies.metrics import errors
 
 #: Ways to run a scene: an accuracy, or [coupling] at the scene's own macro step, or that over ``finer``.

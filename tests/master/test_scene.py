@@ -11,7 +11,7 @@ from scenes import scene_from_dict
 
 import springbeam
 from springbeam.scene import Beam, Scene, SceneError, load_scene, suspicions, with_changes
-from springbeam.scene.rules import implausible
+from springbeam.scene.suspicions import implausible
 
 
 def changed(**tables):

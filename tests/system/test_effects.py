@@ -5,7 +5,7 @@ import pytest
 
 from springbeam import SceneError, load_scene, simulate, with_changes
 from springbeam.scene import suspicions
-from springbeam.scene.rules import EFFECTS
+from springbeam.scene.suspicions import EFFECTS
 
 #: The tip meets the spring at once, and the spring strikes the stop after some ms.
 SOFT = with_changes(

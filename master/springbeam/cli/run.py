@@ -25,7 +25,7 @@ from ..results.trajectory import Event, Trajectory, rounded
 from ..run.checkpoint import Checkpoint
 from ..run.outcome import Progress
 from ..scene import Scene, load_scene
-from ..scene.rules import implausible
+from ..scene.suspicions import implausible
 from ..studies.tables import table
 from .common import (
     BAD_INPUT,

@@ -10,8 +10,8 @@ come with the package.
 from .loads import Load
 from .messages import key_kind, scene_keys
 from .reading import load_scene, parse_value, scene_from_dict, shipped_scenes, with_changes
-from .rules import suspicions
 from .scene import Scene
+from .suspicions import suspicions
 from .tables import Beam, Contact, Coupling, SceneError, Spring, Stop, Time
 
 __all__ = [

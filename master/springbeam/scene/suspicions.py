@@ -1,0 +1,287 @@
+"""Warnings about scenes that can be run: what is probably a mistake, and keys that play no part."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from .laws import laws_that
+from .linearised import beam_energy, spring_energy, well_depth
+from .messages import Rule, told, told_of_loads
+from .scene import TABLES, Scene
+from .statics import initial_kinetic_energy, locking, tip_compliance, tip_inertia
+from .tables import (
+    ORDINARY_SCHEMES,
+)
+
+#: E/G: 2 to 3 of isotropic solids, up to some 100 of laminates.
+_YOUNG_OVER_SHEAR = (0.5, 200.0)
+#: Length over radius of gyration: below, no beam theory holds; above, it is a thread.
+_SLENDERNESS = (3.0, 3e4)
+#: Lowest frequency [Hz] of anything that a macroscopic beam is.
+_FREQUENCIES = (1e-2, 1e7)
+#: Mass of the beam over that of the spring, or the other way round.
+_MASS_RATIO = (1e-6, 1e6)
+#: Speed of the tip over that of sound in the beam, about its largest strain: no solid stays elastic beyond.
+_MOST_STRAIN = 0.05
+
+
+def suspicions(scene: Scene) -> list[str]:
+    """Return warnings about values that can be run but are probably mistaken, or play no part."""
+    return [
+        *implausible(scene),
+        *told(scene, (*SUSPICIOUS, *EFFECTS)),
+        *told_of_loads(scene, SUSPICIOUS_LOADS),
+    ]
+
+
+def implausible(scene: Scene) -> Iterator[str]:
+    """Yield what can hardly be meant of our beam, as lines ``[table] key = value: why, and what may be meant``.
+
+    A beam with area = 1 or density = 1 is taken to be in units of its own: nothing is said about it.
+    """
+    beam = scene.beam
+    return told(scene, IMPLAUSIBLE if beam is not None and 1.0 not in (beam.area, beam.density) else ())
+
+
+# -- what can hardly be meant ---------------------------------------------------------------------------------------
+
+
+def _beyond(value: float, bounds: tuple[float, float]) -> bool:
+    return not bounds[0] <= value <= bounds[1]
+
+
+def _material(key: str, unit: str, bounds: tuple[float, float], known: str, other: str, factor: float) -> Rule:
+    """Return the rule for a property that no solid has; ``factor`` is that of the unit that may be meant."""
+
+    def meant(scene: Scene) -> Mapping[str, str]:
+        value = factor * getattr(scene.beam, key)
+        return {"meant": "" if _beyond(value, bounds) else f"; in {other} it would be {value:.3g} {unit}"}
+
+    text = f"{{beam.{key}}}: in {unit}, no solid has it ({known}){{meant}}"
+    return Rule(lambda s: _beyond(getattr(s.beam, key), bounds), text, meant)
+
+
+def _of_beam(scene: Scene) -> dict[str, Any]:
+    """Return what follows from our beam, for the texts of rules."""
+    beam, spring = scene.beam, scene.spring
+    assert beam is not None
+    mass = beam.density * beam.area * beam.length
+    slenderness = beam.length / math.sqrt(beam.second_moment_of_area / beam.area)
+    milli = f"; in mm it would be {1e-3 * beam.length:g} m long, of {1e-9 * mass:.3g} kg"
+    return {
+        "ratio": beam.young_modulus / beam.shear_modulus,
+        "slenderness": slenderness,
+        "looks": "thicker than long" if slenderness < _SLENDERNESS[0] else "a thread",
+        # Rayleigh's quotient for the static shape of a tip force: within 2 % if slender, 10 % if not.
+        "frequency": 0.5 / math.pi / math.sqrt(tip_compliance(beam) * tip_inertia(beam)),
+        "mass": mass,
+        "masses": 1.0 if spring is None else mass / spring.mass,
+        "milli": milli if beam.length >= 10.0 else "",
+        "speed": (speed := abs(beam.initial_velocity_slope) * beam.length),
+        "sound": (sound := math.sqrt(beam.young_modulus / beam.density)),
+        "strain": speed / sound,
+    }
+
+
+#: What our beam can hardly be.
+IMPLAUSIBLE = (
+    _material(
+        "young_modulus", "Pa", (1e4, 2e12), "rubber about 1e6, aluminium 7e10, steel 2.1e11", "GPa", 1e9
+    ),  # from gels to diamond
+    _material("density", "kg/m³", (10.0, 25e3), "aluminium 2700, steel 7850", "g/cm³", 1e3),  # foam to heavy metals
+    Rule(
+        lambda s: s.beam.poisson_ratio is None and _beyond(_of_beam(s)["ratio"], _YOUNG_OVER_SHEAR),
+        "{beam.shear_modulus}: young_modulus is {ratio:.3g} times as large; for an isotropic solid it is 2 to 3 times, "
+        "and poisson_ratio gives it",
+        _of_beam,
+    ),
+    Rule(
+        lambda s: _beyond(_of_beam(s)["slenderness"], _SLENDERNESS),
+        "{beam.length}: with this section the beam is {looks} (length over radius of gyration {slenderness:.2g}); is a "
+        "length in mm?",
+        _of_beam,
+    ),
+    Rule(
+        lambda s: s.beam.fidelity == "dynamic" and _beyond(_of_beam(s)["frequency"], _FREQUENCIES),
+        "[beam]: its lowest frequency is {frequency:.2g} Hz; check length, section, density and young_modulus",
+        _of_beam,
+    ),
+    Rule(
+        lambda s: _beyond(_of_beam(s)["masses"], _MASS_RATIO),
+        "{beam.length}: the beam has {mass:.3g} kg, beside {spring.mass}{milli}; lengths are in m",
+        _of_beam,
+    ),
+    Rule(
+        lambda s: _of_beam(s)["strain"] > _MOST_STRAIN,
+        "[beam] the tip starts with {speed:.3g} m/s, {strain:.2g} times the speed of sound in the beam ({sound:.3g} "
+        "m/s): bending would strain it as much, which no solid does elastically",
+        _of_beam,
+    ),
+)
+
+
+# -- what is probably a mistake -------------------------------------------------------------------------------------
+
+
+def _well(scene: Scene) -> dict[str, Any]:
+    """Return the energy at the start and the depth of a softening spring's well, for the texts of rules."""
+    assert scene.spring is not None
+    depth = well_depth(scene)
+    return {
+        "energy": spring_energy(scene.spring) + (0.0 if scene.massless else beam_energy(scene)),
+        "depth": depth,
+        "well": f"well is {depth:.3g} J deep" if depth > -math.inf else "well is gone under external_force",
+    }
+
+
+def _pull(scene: Scene) -> float:
+    """Return the force on the spring's top at the start [N], 0 where it is next to nothing."""
+    spring = scene.spring
+    assert spring is not None
+    pull = spring.linear_stiffness * spring.equilibrium + spring.cubic_stiffness * spring.equilibrium**3
+    return 0.0 if math.isclose(pull, spring.external_force, rel_tol=1e-9) else spring.external_force - pull
+
+
+def _share(scene: Scene) -> float:
+    """Return the inertia at the tip that a quasi-static beam neglects, over the mass of our spring."""
+    return tip_inertia(scene.beam) / scene.spring.mass if scene.massless and scene.beam and scene.spring else 0.0
+
+
+SUSPICIOUS: tuple[Rule, ...] = (
+    Rule(
+        lambda s: s.spring and 0.0 < (s.contact_time or 0.0) <= s.time.t_end and _pull(s) != 0.0,
+        "{spring.equilibrium}: {pull:.3g} N act on it there, and the top is held until the tip arrives at "
+        't = {t_c:.3g} s; [beam] approach = "elastic" lets it move',
+        lambda s: {"pull": _pull(s), "t_c": s.contact_time},
+    ),
+    Rule(
+        lambda s: s.spring and s.spring.softens and not s.static and _well(s)["energy"] > _well(s)["depth"],
+        "{spring.cubic_stiffness}: the motion starts with {energy:.3g} J, the softening spring's {well}; the run stops "
+        "if it escapes",
+        _well,
+    ),
+    Rule(
+        lambda s: s.beam and locking(s.beam) > 1.05,
+        "{beam.n_elements}: full integration locks, the beam is {factor:.3g} times too stiff; use "
+        "reduced_integration = true, element_degree = 3, or more elements",
+        lambda s: {"factor": locking(s.beam)},
+    ),
+    Rule(
+        lambda s: _share(s) > 0.05 and s.contact.rigid,
+        "{beam.fidelity}: neglects an inertia that at the tip is {share:.2g} of the spring's mass; the joined motion "
+        "is about {faster:.0%} too fast",
+        lambda s: {"share": _share(s), "faster": math.sqrt(1.0 + _share(s)) - 1.0},
+    ),
+    Rule(
+        lambda s: s.massless and s.spring and s.beam.approach == "undeformed" and s.beam.initial_velocity_slope != 0.0,
+        "{beam.fidelity}: the beam arrives without its kinetic energy, {energy:.3g} J; the result lacks its impact and "
+        "the vibration that follows",
+        lambda s: {"energy": initial_kinetic_energy(s.beam)},
+    ),
+)
+SUSPICIOUS_LOADS = (
+    Rule(
+        lambda s, load: load.is_finer_than(s.coupling.macro_step),
+        "{load.file}: its lines are closer than a quarter of {coupling.macro_step}, so steps do not end on them and "
+        'errors fall slowly with the step; take a smaller macro_step, or interpolation = "cubic"',
+    ),
+    Rule(
+        lambda s, load: load.begins >= s.time.t_end,
+        "{load.start}: plays no part here; the run ends at {time.t_end}",
+    ),
+)
+
+
+# -- keys that play no part -----------------------------------------------------------------------------------------
+
+
+def _counts(
+    places: str,
+    counts: Callable[[Any], bool],
+    where: str,
+    numbers: Callable[[Scene], Mapping[str, Any]] = lambda s: {},
+) -> list[Rule]:
+    """Return rules for keys that are given, and not as their default, in scenes where they do not count."""
+
+    def rule(table: str, key: str) -> Rule:
+        default = TABLES[table].model_fields[key].default
+
+        def idle(scene: Scene) -> bool:
+            content = scene.under(table)
+            return type(content) is TABLES[table] and getattr(content, key) != default and not counts(scene)
+
+        return Rule(idle, f"{{{table}.{key}}}: plays no part here; {where}", numbers)
+
+    return [rule(*place.split(".")) for place in places.split()]
+
+
+def _of_law(key: str) -> list[Rule]:
+    """Return the rule for ``key`` of ``[contact]``, which counts, or shows in a column, with some laws."""
+    return _counts(
+        f"contact.{key}",
+        lambda s: s.coupled and s.contact.facts.has(key) and (s.joins or s.contact.soft),
+        "it counts between two bodies with law = {laws}",
+        lambda s: {"laws": laws_that(lambda law: law.has(key))},
+    )
+
+
+def _dynamic(scene: Scene) -> bool:
+    return scene.beam is not None and not scene.massless
+
+
+#: Where the keys count that do not always. ``[[loads]]`` refuses such keys itself; here they are told, so that a key
+#: can be changed with ``--set`` although another one then counts no more.
+EFFECTS: tuple[Rule, ...] = (
+    *_counts(
+        "beam.element_degree beam.reduced_integration beam.mass_matrix",
+        _dynamic,
+        'it counts with fidelity = "dynamic"',
+    ),
+    *_counts(
+        "beam.n_elements",
+        lambda s: _dynamic(s) or (s.beam is not None and s.beam.tip_load_coefficient != 0.0),
+        'it counts with fidelity = "dynamic", or for a tip_load_coefficient',
+    ),
+    *_counts(
+        "beam.integrator",
+        lambda s: _dynamic(s) and not s.contact.algorithm,
+        'it counts with fidelity = "dynamic"; Algorithm 1 is the midpoint rule',
+    ),
+    *_counts(
+        "beam.n_modes",
+        lambda s: _dynamic(s) and s.beam.integrator == "modal" and not s.contact.algorithm,
+        'it counts with fidelity = "dynamic" and integrator = "modal", other integrators keep all modes',
+    ),
+    *_counts(
+        "beam.rho_inf",
+        lambda s: _dynamic(s) and s.beam.integrator == "generalized_alpha",
+        'it counts with fidelity = "dynamic" and integrator = "generalized_alpha"',
+    ),
+    *_counts("stop.restitution", lambda s: not s.contact.algorithm, "Algorithm 1 has no loss on the foundation"),
+    *_counts("contact.law", lambda s: s.coupled, "it counts between two bodies, or a beam and a stop"),
+    *_of_law("impact"),
+    *_of_law("stiffness"),
+    *_of_law("exponent"),
+    *_counts(
+        "contact.force_window",
+        lambda s: not s.contact.algorithm and (s.coupled or (s.upper is not None and s.stop is not None)),
+        "it counts where the run tells a peak contact force",
+    ),
+    *_counts(
+        "coupling.scheme coupling.degree coupling.tolerance",
+        lambda s: not s.contact.algorithm,
+        "Algorithm 1 is a scheme of its own",
+    ),
+    *_counts(
+        "coupling.tolerance",
+        lambda s: s.coupling.scheme not in ORDINARY_SCHEMES,
+        "it counts with schemes that solve for the force of a step",
+    ),
+    *_counts(
+        "coupling.feedback_tolerance",
+        lambda s: s.coupling.feedback != "two_way",
+        'it counts with feedback = "beam_drives" or "spring_drives"',
+    ),
+)
