@@ -41,8 +41,8 @@ MatrixXd modes_among(const Timoshenko& mesh, const MatrixXd& Z) {
   if (squares.info() != Eigen::Success) throw std::runtime_error("beam: the modes cannot be computed");
   const MatrixXd V = squares.eigenvectors().rowwise().reverse();
   X *= V;
-  const Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> in_place(X);
-  const MatrixXd R = X.topRows(Z.cols()).triangularView<Eigen::Upper>();
+  const Eigen::HouseholderQR<MatrixXd> qr(X);
+  const MatrixXd R = qr.matrixQR().topRows(Z.cols()).triangularView<Eigen::Upper>();
   const Eigen::JacobiSVD<MatrixXd, Eigen::NoQRPreconditioner> svd(R, Eigen::ComputeThinV);
   return Z * (V * svd.matrixV()).rowwise().reverse();
 }

@@ -1,7 +1,5 @@
 #include "timoshenko.hpp"
 
-#include <Eigen/LU>
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -139,7 +137,8 @@ Timoshenko::Timoshenko(const Parameters& p)
   mass_ = T_.transpose() * squares.asDiagonal() * T_;
 
   // Its unknowns by the strains, first θ̃, then u, and the forces that these strains take, likewise.
-  const MatrixXd from_slope = S_.rightCols(p_).inverse().transpose();
+  // Without its first column S is a permutation times factors: the inverse, transposed, has theirs in the same places.
+  const MatrixXd from_slope = S_.rightCols(p_).unaryExpr([](double s) { return s == 0.0 ? 0.0 : 1.0 / s; });
   for (Index i = 0; i < 2 * p_; ++i) {
     MatrixXd strain = MatrixXd::Zero(2, p_);
     strain(i % 2, i / 2) = 1.0;
