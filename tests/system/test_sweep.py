@@ -69,6 +69,13 @@ def test_the_largest_speed_may_be_downward():
     assert METRICS_THERE_ARE["z_max"](a_trajectory(z=np.linspace(-2.0, 1.0, 400))) == 2.0
 
 
+@pytest.mark.parametrize(("masses", "code"), [("-1,-2", 2), ("-1,1", 0)])
+def test_a_sweep_whose_every_run_is_refused_is_bad_input(masses, code, tmp_path):
+    given = ("--vary", f"spring.mass={masses}", "--set", "time.t_end=0.01", "--workers", "1", "--out", tmp_path)
+    assert command("sweep", "duffing", *given).exit_code == code
+    assert swept(tmp_path)["status"].count("refused") == (2 if code else 1)
+
+
 @pytest.mark.filterwarnings("error:The input coordinates to pcolormesh")  # of values that do not ascend
 def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
     plan = planned("spring.mass=0.5,1,-1", "spring.linear_stiffness=1:100:3:log")

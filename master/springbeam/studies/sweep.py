@@ -80,7 +80,8 @@ class Sweep(Study):
         if self.boundary:
             document["boundary"] = self._critical(records)
             lines += _told(document["boundary"], self.boundary)
-        return Findings(document, [Text(line) for line in lines] + ([self._first(records)] if self.metric else []))
+        shown = [Text(line) for line in lines] + ([self._first(records)] if self.metric else [])
+        return Findings(document, shown, code=2 if counts.keys() == {"refused"} else 0)
 
     def _first(self, records: Mapping[str, Row]) -> Table:
         names = [*(axis.name for axis in self.axes), *self._shown]
