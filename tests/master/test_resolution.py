@@ -168,8 +168,8 @@ def test_a_step_makes_a_contact_late_as_gauss_collocation_does(degree):
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
 def test_steps_of_the_midpoint_rule_may_lag_behind_what_an_impact_sets_off(share, resolved):
     """n steps that turn it by x lag by n x³/12: 1 rad of the fastest waves is the limit, those that die out left out;
-    where nothing strikes 0.01 rad of what is as fast as a load; or 0.015 rad of a beam without inertia together with the
-    spring. The modal integrator and degree 2 do not lag."""
+    where nothing strikes 0.01 rad of what is as fast as a load; or 0.015 rad of a beam without inertia together with
+    the spring. The modal integrator and degree 2 do not lag."""
 
     def said(omega, limit, other, **tables):
         turn = share * (12.0 * limit / (omega * PAIR.duration)) ** 0.5

@@ -22,7 +22,7 @@ TURN = 1.0
 #: By degree d of the force: a step that turns spring and massless beam by x rad makes them late by x^(2d + 2) over this
 #: of itself, as a Gauss collocation of d + 1 stages would (for d = 0 the midpoint rule).
 COLLOCATION = (12.0, 720.0, 100800.0)
-#: By which angle all of them together may lag [rad]: positions are off by up to 0.75 of it, and a hundredth is told.
+#: By which angle all of them together may lag [rad]. Positions are off by up to 0.75 of it, so by about 1 %.
 LAG = 0.015
 #: Share of its way that an end may be from where the law of the contact would have it, by degree of the force: a soft
 #: law, a tie. At degree 0 of a soft law that is known to some tenths of itself. Else it leaves out what the force feels

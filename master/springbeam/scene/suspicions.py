@@ -11,9 +11,7 @@ from .linearised import beam_energy, spring_energy, well_depth
 from .messages import Rule, told, told_of_loads
 from .scene import TABLES, Scene
 from .statics import initial_kinetic_energy, locking, tip_compliance, tip_inertia
-from .tables import (
-    ORDINARY_SCHEMES,
-)
+from .tables import ORDINARY_SCHEMES
 
 #: E/G: 2 to 3 of isotropic solids, up to some 100 of laminates.
 _YOUNG_OVER_SHEAR = (0.5, 200.0)
