@@ -8,7 +8,7 @@ usage() {
 ./build.sh run [SCENE] [OPTION]…   set up, build, and simulate a scene (default: soft)
 ./build.sh test [PYTEST OPTION]…   set up, build, and run all tests (C++, then Python)
 ./build.sh kernels [OPTION]…        run the numeric tests as on other processors: with the linear algebra of three of them
-./build.sh fmus                    set up and build fmus/beam.fmu, spring.fmu, beam3.fmu, spring3.fmu and spring_beam.ssp
+./build.sh fmus                    set up and build all that is compiled: the FMUs and systems in fmus/, and what the master calls them by
 ./build.sh win64                   also cross-compile for 64-bit Windows; the FMUs then carry both
 ./build.sh interop                 install importers that others wrote into a cache folder and run the FMUs in them
 ./build.sh bench [GROUP]…          measure the speed and write the tables of docs/performance.md (minutes)
@@ -277,9 +277,9 @@ print(*(name for name in extra if has[name]))')
     run $venv/bin/ruff check .
     run $venv/bin/ruff format --check .
     run $venv/bin/mypy
-    mapfile -t sources < <(find src_beam src_spring fmus tests/cpp tests/fuzz -name '*.cpp' -o -name '*.hpp')
+    mapfile -t sources < <(find src_beam src_spring fmus master tests/cpp tests/fuzz -name '*.cpp' -o -name '*.hpp')
     run $venv/bin/clang-format --dry-run -Werror "${sources[@]}"
-    mapfile -t units < <(find src_beam src_spring fmus -name '*.cpp')
+    mapfile -t units < <(find src_beam src_spring fmus master -name '*.cpp')
     run $venv/bin/clang-tidy --quiet -p build "${units[@]}"
     [ -z "$failed" ] || die "lint found something"
     ;;

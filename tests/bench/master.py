@@ -17,39 +17,41 @@ from springbeam.monolithic import algorithm1
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
 
-#: The calls of a macro step; those before the first one are set-up.
-STEPPING = ("DoStep", "GetReal", "SetReal", "SetRealInputDerivatives", "GetFMUstate", "SetFMUstate")
+#: The calls of a macro step beside its advances; those before the first one are set-up.
+STEPPING = ("GetReal", "GetFMUstate", "SetFMUstate")
 
 
 class Inside:
-    """Time spent in `STEPPING` calls while it is in force; what ctypes needs for a call is not part of it."""
+    """Time spent in advances and `STEPPING` calls while it is in force; what ctypes needs is not part of it."""
 
     def __init__(self):
         self.seconds, self.calls = 0.0, 0
-        self._bound = Slave.bound
+        self._bound, self._advancing = Slave.bound, Slave.advancing
+
+    def _timed(self, function):
+        def call():
+            began = thread_time()
+            status = function()
+            self.seconds += thread_time() - began
+            self.calls += 1
+            return status
+
+        return call
 
     def __enter__(self):
-        inside, bound = self, self._bound
+        def bound(slave, name, *arguments):
+            function = self._bound(slave, name, *arguments)
+            return self._timed(function) if name in STEPPING else function
 
-        def timed_call(self, name, *arguments):
-            function = bound(self, name, *arguments)
-            if name not in STEPPING:
-                return function
+        def advancing(slave, *arguments):
+            advance, *arrays = self._advancing(slave, *arguments)
+            return self._timed(advance), *arrays
 
-            def call():
-                began = thread_time()
-                status = function()
-                inside.seconds += thread_time() - began
-                inside.calls += 1
-                return status
-
-            return call
-
-        Slave.bound = timed_call
+        Slave.bound, Slave.advancing = bound, advancing
         return self
 
     def __exit__(self, *_):
-        Slave.bound = self._bound
+        Slave.bound, Slave.advancing = self._bound, self._advancing
 
 
 def nothing(times=20_000):

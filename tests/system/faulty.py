@@ -63,6 +63,7 @@ class Script:
     faults: tuple[Fault, ...] = ()
     calls: list[tuple[str, str, int]] = field(default_factory=list)
     where: str = "start"
+    given_to_c: list = field(default_factory=list)  #: functions that must outlive the pointers to them
 
     @contextmanager
     def at(self, where):
@@ -112,34 +113,56 @@ def hang():
     raise AssertionError("returned")
 
 
+#: Arguments of what an advance calls, from C: an exception would not come through.
+_ACCESS = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
+FROM_C = {
+    "fmi2SetReal": _ACCESS,
+    "fmi2GetReal": _ACCESS,
+    "fmi2SetRealInputDerivatives": (*_ACCESS, ctypes.c_void_p),
+    "fmi2DoStep": (ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int),
+}
+
+
 class Library(functions.Library):
     """A shared library with the script between it and its callers."""
 
     _script = None
 
     def __getitem__(self, name):
-        fmu, function = Path(self._name).stem, super().__getitem__(name)
+        function = super().__getitem__(name)
 
         def call(*arguments):
-            script = self._script
             function.restype, function.argtypes = call.restype, getattr(call, "argtypes", None)
-            fault = next((f for f in script.faults if f.after(fmu, name, script.where)), None)
-            if fault is None:
-                result = function(*arguments)
-            elif fault.kind == "raise":
-                raise ZeroDivisionError("nobody expected this")
-            elif fault.kind == "hang":
-                hang()
-            elif fault.kind in NAMES:
-                result = NAMES[fault.kind]
-            else:
-                result = function(*arguments)
-                values = getattr(arguments[3], "_obj", arguments[3])  # an array, or `byref` of one
-                values[0 if fault.skip % 2 else len(values) - 1] = float(fault.kind)
-            script.calls.append((fmu, name, result if isinstance(result, int) else OK))
-            return result
+            return self._called(name, function, arguments)
 
+        call.restype = ctypes.c_int
+        if name in FROM_C:
+            type_ = ctypes.CFUNCTYPE(ctypes.c_int, *FROM_C[name])
+            typed = ctypes.cast(function, type_)
+            call._as_parameter_ = type_(lambda *arguments: self._called(name, typed, arguments))
+            self._script.given_to_c.append(call)
         return call
+
+    def _called(self, name, function, arguments):
+        fmu, script = Path(self._name).stem, self._script
+        fault = next((f for f in script.faults if f.after(fmu, name, script.where)), None)
+        if fault is None:
+            result = function(*arguments)
+        elif fault.kind == "raise":
+            raise ZeroDivisionError("nobody expected this")
+        elif fault.kind == "hang":
+            hang()
+        elif fault.kind in NAMES:
+            result = NAMES[fault.kind]
+        else:
+            result = function(*arguments)
+            values = arguments[3]
+            if isinstance(values, int):
+                values = (ctypes.c_double * arguments[2]).from_address(values)
+            values = getattr(values, "_obj", values)  # an array, or `byref` of one
+            values[0 if fault.skip % 2 else len(values) - 1] = float(fault.kind)
+        script.calls.append((fmu, name, result if isinstance(result, int) else OK))
+        return result
 
 
 def installed(monkeypatch, *faults):

@@ -8,7 +8,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from ctypes import byref, c_double, c_int, c_size_t, c_uint, c_void_p
+from ctypes import byref, c_int, c_uint, c_void_p
 from functools import lru_cache
 from math import prod
 from pathlib import Path
@@ -67,8 +67,6 @@ class Fmu:
     """
 
     _slave: Any  #: FMPy's FMU
-    clock: Any  #: an array of C: time and size [s] of the step that `do_step` makes
-    do_step: Call
 
     def __init__(self, name: str | None, path: Path, parameters: Mapping[str, Value], start_time: float) -> None:
         self.path, self._own = path, name is not None
@@ -85,7 +83,6 @@ class Fmu:
         self._slave = slave = self._load()
         self.real, self.version = slave.REAL, slave.VERSION  #: the type of real variables, and the version of FMI
         try:
-            self.stepping((c_double * 2)())
             if self.says.canGetAndSetFMUstate:
                 self.get_state = self.bound(f"Get{slave.STATE}", byref(self._state))
                 self.set_state = self.bound(f"Set{slave.STATE}", self._state)
@@ -167,8 +164,24 @@ class Fmu:
         """Return what gets or sets (``verb``) variables of ``size`` real numbers each by ``values``, an array of C."""
         references = self.references(names, self.real, size)
         with self._asked("cannot be used"):
-            accessor: Call = self._slave.accessor(verb, references, values, len(names) * size)
+            accessor: Call = self._slave.accessor(verb, references, values)
         return accessor
+
+    def advancing(self, inputs: Sequence[str], slopes: int, outputs: Sequence[str], always: bool) -> Any:
+        """Return what makes an advance, and the arrays of C that it takes and leaves numbers in: see `Slave.advancing`.
+
+        Derivatives 1 … ``slopes`` of each input follow the inputs, those of one after another.
+        """
+        each = [(name, order) for name in inputs for order in range(1, slopes + 1)]
+        if self.version == FMU3.VERSION:
+            sloped = [f"der({name}{f',{order}' if order > 1 else ''})" for name, order in each]
+        else:
+            sloped = [name for name, _ in each]
+        orders = (c_int * len(each))(*[order for _, order in each])
+        references = (self.references(names, self.real) for names in (inputs, sloped, outputs))
+        set_, derivatives, read = references
+        with self._asked("cannot be used"):
+            return self._slave.advancing(set_, derivatives, orders, read, always)
 
     def variable(self, name: str) -> Any:
         """Return what the FMU says of a variable. Raises FmuError if it has none of this name."""
@@ -188,43 +201,24 @@ class Fmu:
                 raise FmuError(f"{self.path}: variable {name!r} is an array; only single numbers can be used")
         return (c_uint * len(names))(*[int(self.variable(name).valueReference) for name in names])
 
-    def input_derivatives(self, names: Sequence[str], orders: int, values: Any) -> Call:
-        """Return what sets derivatives 1 … ``orders`` of inputs over the next step, those of one after another."""
-        each = [(name, order) for name in names for order in range(1, orders + 1)]
-        if self.version == FMU3.VERSION:
-            inputs = [f"der({name}{f',{order}' if order > 1 else ''})" for name, order in each]
-            return self.accessor("Set", inputs, values)
-        references, number = self.references([name for name, _ in each], self.real), c_size_t.from_param(len(each))
-        in_order = (c_int * len(each))(*[order for _, order in each])
-        return self.bound("SetRealInputDerivatives", byref(references), number, byref(in_order), values)
-
     def keep_start(self) -> None:
         """Remember the present state as the one `return_to_start` sets."""
         with self._asked("cannot save the state"):
             self._start = self._slave.getFMUState()
-        self._at_start = self.clock, self.do_step
 
     def return_to_start(self) -> None:
         """Set the state of `keep_start`, as a new instance has it."""
         with self._asked("cannot restore the state"):
             self._slave.setFMUState(self._start)
         self.moved, self.steps, self.rewinds = False, 0, 0
-        self.clock, self.do_step = self._at_start
         self._message = ""
 
-    def stepping(self, clock: Any) -> None:
-        """Let `do_step` make steps as the first two numbers of ``clock`` say."""
-        self.clock = clock
-        with self._asked("cannot be used"):
-            self.do_step = self._slave.stepping(*(c_double.from_buffer(clock, 8 * i) for i in (0, 1)))
-
-    def refuse(self, status: int) -> NoReturn:
-        """Raise StepRefused, or BodyFailed, for a step (fmi2DoStep) that has returned ``status``."""
-        time = self.clock[0]
+    def refuse(self, status: int, time: float, otherwise: str = "") -> NoReturn:
+        """Raise StepRefused, or FmuError, for a step from ``time`` [s] that has returned ``status``."""
         if status not in (DISCARD, ERROR):
             raise self.failed(status, f"cannot step at t = {time:.9g} s")
         self._worst = max(self._worst, status)
-        cause = self._cause(f"{self._slave.PREFIX}DoStep returned {_STATUS[status]}")
+        cause = self._cause(otherwise or f"{self._slave.PREFIX}DoStep returned {_STATUS[status]}")
         # Also after fmi2Error a saved state may be restored and the step tried again (FMI 2.0.4, section 2.1.3).
         raise StepRefused(f"{self._name}: {cause}")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import atexit
 from collections.abc import Callable, Hashable, Sequence
-from ctypes import byref, c_double, sizeof
+from ctypes import c_double
 from functools import partial
 from math import isfinite
 from struct import Struct
@@ -20,7 +20,7 @@ from .archive import own_fmu
 from .elements import EndLoaded
 from .fmu import Fmu
 from .force import combined
-from .functions import WARNING
+from .functions import DISCARD, WARNING, Failure
 from .protocol import NO_FORCE, BeamBody, Body, Energies, Felt, FmuError, Force, Motion, StepRefused
 
 #: The numbers by which the beam FMU knows its alternatives.
@@ -66,6 +66,13 @@ class FmuState(NamedTuple):
     dissipated: float = 0.0  #: before the FMU was last started again [J]
 
 
+#: What FMI 3.0 lets an FMU ask for after a step, and is not given.
+_ASKED = {
+    Failure.ENDS: "fmi3DoStep asks that the simulation end (terminateSimulation)",
+    Failure.EARLY: "fmi3DoStep returned early, which it was not allowed to (earlyReturn)",
+    Failure.EVENT: "fmi3DoStep asks for event mode, which it was told is not used (eventHandlingNeeded)",
+}
+
 #: ``Motion(*values)`` and its like in a third of the time.
 _motion_of: Callable[[type[Motion], tuple[float, ...]], Motion] = tuple.__new__
 _energies_of: Callable[[type[Energies], tuple[float, ...]], Energies] = tuple.__new__
@@ -82,8 +89,9 @@ class FmuBody(Body):
     _FORCES: tuple[str, ...]
     _constants: dict[str, float]  #: of the scene, by the inputs that hold them from the start
     _bears_loads = False  #: whether the last of the energies is the work of the loads
-    #: Highest derivative of a force that is handed over.
+    #: Highest derivative of a force that is handed over, and whether derivatives that are all 0 are, too.
     _SLOPES: int = 2
+    _ALWAYS_SLOPED = False
     state: Any
 
     def __init__(self, fmu: Fmu) -> None:
@@ -95,25 +103,22 @@ class FmuBody(Body):
             raise
 
     def _prepare(self, fmu: Fmu) -> None:
-        self._outputs = Reals(fmu, *self._MOTION, *self._ENERGIES)
         self._impulse = Reals(fmu, *self._IMPULSE)
-        self._prepare_inputs(())
+        self._prepare_step(())
         self.mass = self._mass()
         if not isfinite(self.mass):
             raise FmuError(f"{fmu.path}: the mass of its end is {self.mass}")
         self._begin()
 
-    def _prepare_inputs(self, loads: Sequence[str]) -> None:
-        """Prepare the calls that set the forces and ``loads``, inputs of the FMU, and their derivatives."""
+    def _prepare_step(self, loads: Sequence[str]) -> None:
+        """Prepare what a step sets, the forces and ``loads``, inputs of the FMU, and what it reads."""
         fmu, names = self.fmu, (*self._FORCES, *loads)
-        n = len(names)
+        self._outputs = Reals(fmu, *self._MOTION, *self._ENERGIES)
         Reals(fmu, *names)  # a wrong reference is found before the run
-        values: Any = (c_double * (2 + 3 * n))()  # time and size, forces and loads, then the two derivatives of each
-        fmu.stepping(values)
-        self._set_forces = fmu.accessor("Set", names, byref(values, 2 * sizeof(c_double)))
-        if self._SLOPES > 0:
-            self._set_slopes = fmu.input_derivatives(names, self._SLOPES, byref(values, (2 + n) * sizeof(c_double)))
-        self._write = partial(Struct(f"{len(values)}d").pack_into, values, 0)
+        made = fmu.advancing(names, self._SLOPES, self._outputs.names, self._ALWAYS_SLOPED)
+        self._advance, self._given, told = made
+        self._write = partial(Struct(f"{len(self._given)}d").pack_into, self._given, 0)
+        self._told = partial(Struct(f"{len(told)}d").unpack, told)
         #: The loads of a step, and two derivatives of each.
         self._loads: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,) * len(loads), (0.0,) * (2 * len(loads)))
 
@@ -123,9 +128,8 @@ class FmuBody(Body):
         for number, load in enumerate(loads):
             for name, share in self._inputs_of(load):
                 self._shares.setdefault(name, []).append((number, share))
-        self._prepare_inputs(tuple(self._shares))
         self._ENERGIES, self._bears_loads = (*self._ENERGIES[:3], "load_work"), True
-        self._outputs = Reals(self.fmu, *self._MOTION, *self._ENERGIES)
+        self._prepare_step(tuple(self._shares))
         self._tell()
 
     def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
@@ -191,21 +195,32 @@ class FmuBody(Body):
         struck = motion._replace(velocity=motion.velocity + impulse / self.mass)
         self.state = self.state._replace(motion=struck, pending=pending)
 
-    def _step(self, sloped: bool) -> Motion:
-        """Step as has been written, under forces that vary if they are ``sloped``; return the motion."""
+    def _step(self, *given: float) -> Motion:
+        """Step from a time [s] over a size [s] under forces and loads, whose derivatives follow; return the motion."""
         fmu = self.fmu
-        fmu.moved = True
+        self._write(*given)
+        moved, fmu.moved = fmu.moved, True
+        if code := self._advance():
+            self._stop(*Failure.of(code), moved)
         fmu.steps += 1
-        if (status := self._set_forces()) > WARNING:
+        return self._take(self._told())
+
+    def _stop(self, failure: Failure, status: int, moved: bool) -> NoReturn:
+        """Say why a step was not made: see `Failure`. ``moved``: whether anything had happened before it."""
+        fmu, (time, _, *forces) = self.fmu, self._given
+        if failure is Failure.INPUTS_NOT_FINITE:
+            fmu.moved = moved
+            raise StepRefused(f"{fmu.path.name}: the force it should step under is not finite: {forces}")
+        if failure is Failure.SET:
             raise fmu.failed(status, f"cannot set {', '.join(self._FORCES)} and loads")
-        if sloped and (status := self._set_slopes()) > WARNING:
+        if failure is Failure.SET_DERIVATIVES:
             raise fmu.failed(status, "cannot set input derivatives")
-        if (status := fmu.do_step()) > WARNING:
-            fmu.refuse(status)
-        told = self._outputs.get()
-        if not isfinite(sum(told)):
-            self._check(told)
-        return self._take(told)
+        fmu.steps += 1
+        if failure is Failure.GET:
+            raise fmu.failed(status, f"cannot read {', '.join(self._outputs.names)}")
+        if failure is Failure.OUTPUTS_NOT_FINITE:
+            self._check(self._told())
+        fmu.refuse(max(status, DISCARD), time, _ASKED.get(failure, ""))
 
     def _begin(self) -> None:
         """Read the motion that the FMU was initialised to."""
@@ -214,9 +229,6 @@ class FmuBody(Body):
         except StepRefused as refused:
             raise FmuError(f"{self.fmu.path}: starts with a motion that is {refused}") from refused
         super().mark()
-
-    def _refuse(self, *forces: Force) -> NoReturn:
-        raise StepRefused(f"{self.fmu.path.name}: the force it should step under is not finite: {forces}")
 
     def _take(self, told: tuple[float, ...]) -> Motion:
         """Take what the FMU has told as the present motion and energies, with no impulse pending; return the motion."""
@@ -286,13 +298,9 @@ class OwnBody(FmuBody):
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         (c, dc, ddc), (n, dn, ddn), (values, slopes) = contact, foundation, self._loads
-        if not isfinite(c + dc + ddc + n + dn + ddn):
-            self._refuse(contact, foundation)
         if len(self._FORCES) == 1:  # nothing but the other body presses its end
-            self._write(time, size, c, *values, dc, ddc, *slopes)
-        else:
-            self._write(time, size, c, n, *values, dc, ddc, dn, ddn, *slopes)
-        return self._step(bool(dc or ddc or dn or ddn or any(slopes)))
+            return self._step(time, size, c, *values, dc, ddc, *slopes)
+        return self._step(time, size, c, n, *values, dc, ddc, dn, ddn, *slopes)
 
     def energies(self) -> Energies:
         motion, told, pending, before = self.state

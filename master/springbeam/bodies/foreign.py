@@ -10,7 +10,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -79,6 +78,7 @@ class ForeignBody(FmuBody, EndLoaded):
     """
 
     state: ForeignState
+    _ALWAYS_SLOPED = True  # those of one step may act in the next if they are not set again
 
     #: Loads act on the end, and no input of the FMU is for them.
     expect_loads, set_loads = EndLoaded.expect_loads, EndLoaded.set_loads
@@ -135,10 +135,7 @@ class ForeignBody(FmuBody, EndLoaded):
         exchanged = force.combined((up, 1.0), (contact, foundation))
         inputs = self._followed(force.combined((sign * up, sign * up), (exchanged, load)), size)
         struck, self._size = self.state.pending != 0.0, size
-        if not isfinite(sum(inputs)):
-            self._refuse(inputs)
-        self._write(time, size, *inputs)
-        end = self._step(self._SLOPES > 0)  # the derivatives of one step may act in the next if they are not set again
+        end = self._step(time, size, *inputs[: 1 + self._SLOPES])
         if struck:
             self._impulse.set((0.0,))  # should the FMU not take it as used up
         received = self.state.received + force.work_on(exchanged, start, end, size)

@@ -1,16 +1,18 @@
 """Load FMUs of FMI 2.0 and 3.0 by FMPy, and make the calls of each step. Only this module and `fmu` import FMPy.
 
 FMPy does what is done once. It looks at each argument of each call, which takes as long as the call: what a step calls
-is bound to its arguments here.
+is bound to its arguments here, and `advance.cpp` makes the calls of one advance together.
 """
 
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from copy import copy
-from ctypes import CDLL, Array, byref, c_bool, c_double, c_int, c_size_t, c_void_p
-from functools import partial
+from ctypes import CDLL, POINTER, Structure, byref, c_double, c_int, c_size_t, c_uint, c_void_p, cast
+from enum import IntEnum
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -24,6 +26,52 @@ OK, WARNING, DISCARD, ERROR, FATAL = 0, 1, 2, 3, 4
 Call = Callable[[], int]
 #: Takes the status and the text of a message of an FMU.
 Log = Callable[[int, bytes | None], None]
+
+
+class Failure(IntEnum):
+    """What went wrong in an advance, as `advance.cpp` counts it."""
+
+    INPUTS_NOT_FINITE = 1
+    SET = 2
+    SET_DERIVATIVES = 3
+    STEP = 4
+    GET = 5
+    OUTPUTS_NOT_FINITE = 6
+    ENDS = 7  #: this and the next two: what fmi3DoStep has told beside its status
+    EARLY = 8
+    EVENT = 9
+
+    @classmethod
+    def of(cls, code: int) -> tuple[Failure, int]:
+        """Return what went wrong, and the status of the call that did."""
+        what, status = divmod(code, 16)
+        return cls(what), status
+
+
+class Advance(Structure):
+    """The calls of an advance with their arguments, as `advance.cpp` has them.
+
+    ``given`` are time, size [s], inputs and their derivatives; derivatives that are all 0 are set only ``always``.
+    """
+
+    _fields_ = (
+        *((name, c_void_p) for name in ("instance", "set", "set_derivatives", "step", "get")),
+        *((name, c_size_t) for name in ("n_inputs", "n_derivatives", "n_outputs")),
+        *((name, POINTER(c_uint)) for name in ("inputs", "derivatives", "outputs")),
+        ("orders", POINTER(c_int)),
+        *((name, POINTER(c_double)) for name in ("given", "told")),
+        ("always", c_int),
+    )
+
+
+@cache
+def _advancing() -> CDLL:
+    """Load what `advance.cpp` is compiled to. Raises OSError."""
+    suffix = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
+    path = Path(__file__).with_name(f"advance.{suffix}")
+    if not path.is_file():
+        raise OSError(f"{path} is missing; ./build.sh fmus builds it")
+    return CDLL(str(path))
 
 
 class Library(CDLL):
@@ -54,8 +102,10 @@ class Slave:
     """
 
     TYPES: ClassVar[Any]  #: FMPy's module with the types of C
+    VERSION: ClassVar[str]
     PREFIX: ClassVar[str]
     REAL: ClassVar[str]  #: the type of the variables of a motion
+    SET_DERIVATIVES: ClassVar[str]  #: the function that sets derivatives of inputs
     make: Callable[[], None]
     component: Any
     dll: Any
@@ -103,16 +153,33 @@ class Slave:
         function.restype = c_int
         return partial(function, c_void_p.from_param(self.component), *arguments)
 
-    def accessor(self, verb: str, references: Any, values: Any, n_values: int) -> Call:
+    def accessor(self, verb: str, references: Any, values: Any) -> Call:
         """Return what gets or sets (``verb`` "Get", "Set") real variables, by arrays of C."""
-        there = byref(values) if isinstance(values, Array) else values
-        return self.bound(verb + self.REAL, byref(references), c_size_t.from_param(len(references)), there)
+        return self.bound(verb + self.REAL, byref(references), c_size_t.from_param(len(references)), byref(values))
+
+    def advancing(self, inputs: Any, derivatives: Any, orders: Any, outputs: Any, always: bool) -> tuple[Call, Any, Any]:
+        """Return what makes an advance, and the arrays of C from which it takes what is ``given`` and ``told``.
+
+        It returns 0, or what `Failure.of` reads; the other arguments are those of `Advance`, as arrays of C. Raises
+        OSError if the library lacks a function.
+        """
+        names = {"set": "Set" + self.REAL, "step": "DoStep", "get": "Get" + self.REAL}
+        if len(derivatives):
+            names["set_derivatives"] = self.SET_DERIVATIVES
+        functions = {key: cast(self.dll[self.PREFIX + name], c_void_p) for key, name in names.items()}
+        given, told = (c_double * (2 + len(inputs) + len(derivatives)))(), (c_double * len(outputs))()
+        advance = Advance(
+            self.component, n_inputs=len(inputs), n_derivatives=len(derivatives), n_outputs=len(outputs), inputs=inputs,
+            derivatives=derivatives, outputs=outputs, orders=orders, given=given, told=told, always=always, **functions,
+        )  # fmt: skip
+        return partial(_advancing()[f"advance{self.VERSION[0]}"], byref(advance)), given, told
 
 
 class FMU2(Slave, fmi2.FMU2Slave):  # type: ignore[misc]
     """An FMU of FMI 2.0."""
 
     TYPES, VERSION, PREFIX, REAL, ENUMERATION, STATE = fmi2, "2.0", "fmi2", "Real", "Integer", "FMUstate"
+    SET_DERIVATIVES = "SetRealInputDerivatives"
 
     def make(self) -> None:
         """Instantiate the FMU."""
@@ -129,10 +196,6 @@ class FMU2(Slave, fmi2.FMU2Slave):  # type: ignore[misc]
         self.enterInitializationMode()
         self.exitInitializationMode()
 
-    def stepping(self, time: c_double, size: c_double) -> Call:
-        """Return what makes a step; a step that does not come to its end is discarded."""
-        return self.bound("DoStep", time, size, c_int.from_param(0))
-
 
 class FMU3(Slave, fmi3.FMU3Slave):  # type: ignore[misc]
     """An FMU of FMI 3.0: events stay inside it, and a step goes to its end.
@@ -141,6 +204,7 @@ class FMU3(Slave, fmi3.FMU3Slave):  # type: ignore[misc]
     """
 
     TYPES, VERSION, PREFIX, REAL, ENUMERATION, STATE = fmi3, "3.0", "fmi3", "Float64", "Int64", "FMUState"
+    SET_DERIVATIVES = "SetFloat64"
 
     def make(self) -> None:
         self.instantiate(logMessage=lambda _environment, status, _category, text: self._log(status, text))
@@ -150,30 +214,8 @@ class FMU3(Slave, fmi3.FMU3Slave):  # type: ignore[misc]
         self.enterInitializationMode(startTime=time)
         self.exitInitializationMode()
 
-    def accessor(self, verb: str, references: Any, values: Any, n_values: int) -> Call:
-        accessor: Any = super().accessor(verb, references, values, n_values)
-        return partial(accessor, c_size_t.from_param(n_values))
-
-    def stepping(self, time: c_double, size: c_double) -> Call:
-        event, end, early, reached = c_bool(), c_bool(), c_bool(), c_double()
-        out = (byref(event), byref(end), byref(early), byref(reached))
-        call = self.bound("DoStep", time, size, c_bool(False), *out)
-
-        def step() -> int:
-            status = call()
-            if status > WARNING:
-                return status
-            for asked, what in (
-                (end, b"asks that the simulation end (terminateSimulation)"),
-                (early, b"returned early, which it was not allowed to (earlyReturn)"),
-                (event, b"asks for event mode, which it was told is not used (eventHandlingNeeded)"),
-            ):
-                if asked.value:
-                    self._log(DISCARD, b"fmi3DoStep " + what)
-                    return DISCARD
-            return status
-
-        return step
+    def accessor(self, verb: str, references: Any, values: Any) -> Call:
+        return partial(super().accessor(verb, references, values), c_size_t.from_param(len(values)))
 
 
 #: The versions of FMI that are known.
