@@ -1,5 +1,6 @@
-// What a macro step asks of an FMU as one call: inputs, their derivatives, the step, outputs. Each call from Python takes
-// about as long as what it calls here. Nothing is decided here but whether to go on: `functions.py` has the other end.
+// What a macro step asks of an FMU as one call: inputs, their derivatives, the step, outputs. Each call from Python
+// takes about as long as what it calls here. Nothing is decided here but whether to go on: `functions.py` has the other
+// end.
 #include <cmath>
 #include <cstddef>
 

@@ -157,7 +157,7 @@ class Slave:
         """Return what gets or sets (``verb`` "Get", "Set") real variables, by arrays of C."""
         return self.bound(verb + self.REAL, byref(references), c_size_t.from_param(len(references)), byref(values))
 
-    def advancing(self, inputs: Any, derivatives: Any, orders: Any, outputs: Any, always: bool) -> tuple[Call, Any, Any]:
+    def advancing(self, inputs: Any, derivatives: Any, orders: Any, outputs: Any, always: bool) -> tuple[Any, ...]:
         """Return what makes an advance, and the arrays of C from which it takes what is ``given`` and ``told``.
 
         It returns 0, or what `Failure.of` reads; the other arguments are those of `Advance`, as arrays of C. Raises
@@ -215,7 +215,8 @@ class FMU3(Slave, fmi3.FMU3Slave):  # type: ignore[misc]
         self.exitInitializationMode()
 
     def accessor(self, verb: str, references: Any, values: Any) -> Call:
-        return partial(super().accessor(verb, references, values), c_size_t.from_param(len(values)))
+        accessor: Any = super().accessor(verb, references, values)
+        return partial(accessor, c_size_t.from_param(len(values)))
 
 
 #: The versions of FMI that are known.
