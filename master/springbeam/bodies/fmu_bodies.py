@@ -195,10 +195,9 @@ class FmuBody(Body):
         struck = motion._replace(velocity=motion.velocity + impulse / self.mass)
         self.state = self.state._replace(motion=struck, pending=pending)
 
-    def _step(self, *given: float) -> Motion:
-        """Step from a time [s] over a size [s] under forces and loads, whose derivatives follow; return the motion."""
+    def _step(self) -> Motion:
+        """Step as was written: time [s], size [s], forces and loads, and their derivatives; return the motion."""
         fmu = self.fmu
-        self._write(*given)
         moved, fmu.moved = fmu.moved, True
         if code := self._advance():
             self._stop(*Failure.of(code), moved)
@@ -299,8 +298,10 @@ class OwnBody(FmuBody):
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         (c, dc, ddc), (n, dn, ddn), (values, slopes) = contact, foundation, self._loads
         if len(self._FORCES) == 1:  # nothing but the other body presses its end
-            return self._step(time, size, c, *values, dc, ddc, *slopes)
-        return self._step(time, size, c, n, *values, dc, ddc, dn, ddn, *slopes)
+            self._write(time, size, c, *values, dc, ddc, *slopes)
+        else:
+            self._write(time, size, c, n, *values, dc, ddc, dn, ddn, *slopes)
+        return self._step()
 
     def energies(self) -> Energies:
         motion, told, pending, before = self.state

@@ -135,7 +135,8 @@ class ForeignBody(FmuBody, EndLoaded):
         exchanged = force.combined((up, 1.0), (contact, foundation))
         inputs = self._followed(force.combined((sign * up, sign * up), (exchanged, load)), size)
         struck, self._size = self.state.pending != 0.0, size
-        end = self._step(time, size, *inputs[: 1 + self._SLOPES])
+        self._write(time, size, *inputs[: 1 + self._SLOPES])
+        end = self._step()
         if struck:
             self._impulse.set((0.0,))  # should the FMU not take it as used up
         received = self.state.received + force.work_on(exchanged, start, end, size)
