@@ -148,6 +148,9 @@ def test_the_damage_boundary_of_an_oscillator_is_that_of_its_shock_spectrum(sign
     assert found[0]["velocity_change"] == pytest.approx(limit / rate, rel=0.01)
     files = study.write(records, tmp_path, pictures=True)
     assert {file.name for file in files} >= {"sweep-boundary.csv", "sweep-boundary.png"}
+    pictures = study.draw(records)
+    for picture, label in (("sweep-boundary", "peak [m/s²]"), ("sweep", "loads.0.amplitude [m/s²]")):
+        assert label in {label for ax in pictures[picture].axes for label in (ax.get_xlabel(), ax.get_ylabel())}
 
 
 # -- spectra ------------------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from ..scene import Scene, SceneError
+from ..scene import Load, Scene, SceneError
 from ..scene.messages import unit_of
 from .design import Axis, Sampling, design, parse_axis
 from .metrics import PRINCIPAL, USUAL, Metric, heading, metrics_of
@@ -102,14 +102,25 @@ class Sweep(Study):
 
         rows, axes, figures = self.rows(records), self.axes, Pictures()
         words = [any(isinstance(row[axis.name], str) for row in rows) for axis in axes]
-        scales = [Scale(axis.name, _labelled(axis), axis.log, word) for axis, word in zip(axes, words, strict=True)]
+        labelled = ((axis, self._labelled(axis)) for axis in axes)
+        scales = [Scale(a.name, label, a.log, word) for (a, label), word in zip(labelled, words, strict=True)]
         if shown := {name: heading(name) for name in self._shown if _varies(column(singly(rows, name), name))}:
             figures["sweep"] = multiples(rows, scales, shown, self.scene.title or "sweep")
         if self.boundary and (found := self._critical(records)):
             points = [Point("", self.boundary, pulse["velocity_change"], pulse["peak"]) for pulse in found]
-            labels = ("velocity change [unit of the load × s]", "peak [unit of the load]")
+            unit = self._load(self._pulse).unit
+            labels = (f"velocity change [{'m/s' if unit == 'm/s²' else f'{unit}·s'}]", f"peak [{unit}]")
             figures["sweep-boundary"] = curves(points, f"damage boundary: {self.boundary}", *labels, (7.0, 4.0))
         return figures
+
+    def _labelled(self, axis: Axis) -> str:
+        table, _, key = axis.name.rpartition(".")
+        unit = self._load(table).unit if key == "amplitude" else unit_of(table, key)
+        return f"{axis.name} [{unit}]" if unit != "–" else axis.name
+
+    def _load(self, table: str) -> Load:
+        """Return a load by its table, as loads.0."""
+        return self.scene.loads[int(table.partition(".")[2])]
 
     # Damage boundary
 
@@ -141,11 +152,7 @@ class Sweep(Study):
         integral of the load.
         """
         pulse, (metric, limit), found = self._pulse, self._limit, []
-        amplitude, duration, load = (
-            f"{pulse}.amplitude",
-            f"{pulse}.duration",
-            self.scene.loads[int(pulse.partition(".")[2])],
-        )
+        amplitude, duration, load = f"{pulse}.amplitude", f"{pulse}.duration", self._load(pulse)
         known = [row for row in self.rows(records) if row[metric] is not None]
         for length in sorted({row[duration] for row in known}):
             pairs = sorted((abs(row[amplitude]), abs(row[metric])) for row in known if row[duration] == length)
@@ -167,12 +174,6 @@ def _in_words(value: Any) -> str:
 def _varies(values: np.ndarray) -> bool:
     found = values[np.isfinite(values)]
     return found.size > 1 and bool(np.ptp(found) > _ROUNDING * np.abs(found).max())
-
-
-def _labelled(axis: Axis) -> str:
-    table, _, key = axis.name.rpartition(".")
-    unit = unit_of(table, key)
-    return f"{axis.name} [{unit}]" if unit != "–" else axis.name
 
 
 def _told(found: Sequence[Mapping[str, float]], limit: str) -> list[str]:
