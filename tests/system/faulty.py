@@ -19,6 +19,7 @@ from springbeam.run.stepping import Pair
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 NAMES = {"Discard": DISCARD, "Error": ERROR, "Fatal": FATAL}
+STATUSES = NAMES | {"unknown": 99}
 #: FMI 2.0.4, table of section 4.2.4: what is allowed after fmi2Error, until a state is restored or the FMU is reset,
 #: and after a step that was discarded.
 AFTER_ERROR = {
@@ -38,7 +39,7 @@ class Fault:
     fmu: str
     function: str
     where: str
-    kind: str  #: a name of `NAMES`, "raise", "hang", or what is put into the values: "nan", "inf", "1e300"
+    kind: str  #: a name of `STATUSES`, "raise", "hang", or what is put into the values: "nan", "inf", "1e300"
     once: bool = False
     skip: int = 3
     happened: int = 0
@@ -92,7 +93,7 @@ class Script:
                 assert allowed is None or function in allowed, f"{function} of {fmu} is not allowed here"
                 if function == "fmi2FreeInstance":
                     alive = False
-                elif status == FATAL:
+                elif status >= FATAL:
                     allowed = set()
                 elif status == ERROR:
                     allowed = AFTER_ERROR
@@ -152,8 +153,8 @@ class Library(functions.Library):
             raise ZeroDivisionError("nobody expected this")
         elif fault.kind == "hang":
             hang()
-        elif fault.kind in NAMES:
-            result = NAMES[fault.kind]
+        elif fault.kind in STATUSES:
+            result = STATUSES[fault.kind]
         else:
             result = function(*arguments)
             values = arguments[3]

@@ -96,6 +96,7 @@ COMMON = [
 LASTING = [
     *((*place, *fault) for place in THOROUGH for fault in COMMON),
     *((*place, *fault) for k, place in enumerate(ELSEWHERE) for fault in COMMON[k % 2 : k % 2 + 2]),
+    ("energy", "tied", "fmi2DoStep", "unknown", "it returned fatal"),
     ("energy", "tied", "fmi2SetFMUstate", "Discard", "cannot restore the state"),
     ("hermite", "touch", "fmi2SetFMUstate", "raise", "ZeroDivisionError"),
     ("energy", "location", "fmi2SetFMUstate", "Error", "cannot restore the state"),

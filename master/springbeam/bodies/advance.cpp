@@ -63,10 +63,10 @@ bool zero(const double* values, std::size_t n) {
   return true;
 }
 
-constexpr int kWarning = 1;
+constexpr int kWarning = 1, kFatal = 4, kLast = 5;
 
-// What went wrong, with the status of the call that did: 16 Failure + status.
-int failed(Failure what, int status) { return 16 * what + status; }
+// What went wrong, with the status of the call that did: 16 Failure + status. One that FMI does not know is fatal.
+int failed(Failure what, int status) { return 16 * what + (status > kLast ? kFatal : status); }
 
 int step(const Advance2& a) {
   const int status = a.step(a.instance, a.given[0], a.given[1], fmi2False);
