@@ -233,7 +233,7 @@ print(*(name for name in extra if has[name]))')
     $python -m pip install --quiet --disable-pip-version-check build wheel
     rm -rf dist
     $python -m build --outdir dist .
-    # The FMUs are all that is compiled in it; they load with glibc 2.14, see fmus/adapter/old_glibc.cpp.
+    # What is compiled in it loads with glibc 2.14, see fmus/adapter/old_glibc.cpp.
     [ "$(uname -sm)" != "Linux x86_64" ] || $python -m wheel tags --remove --platform-tag manylinux_2_17_x86_64 dist/*.whl
     SPRINGBEAM_WHEEL=$(echo "$PWD"/dist/*.whl) exec $python -m pytest tests/system/test_installation.py "$@"
     ;;
