@@ -245,6 +245,7 @@ class Instance3(Instance):
         self.set(f"der({name}{'' if order == 1 else f',{order}'})", value)
 
     def try_step(self, time, size):
+        self.last.value = math.nan  # it is told by steps that are discarded, too
         told = [ct.byref(value) for value in (self.event, self.end, self.early, self.last)]
         return self.call("DoStep", time, size, False, *told)
 

@@ -87,6 +87,7 @@ LOADED = {
             "tip_load": 0.2,
             "base_acceleration": 0.3,
             "integrator": integrator,
+            "communication_step": 0.02,
         }
         for integrator in (1, 2)
     ],
@@ -133,6 +134,18 @@ def test_the_rate_of_the_acceleration_counts_all_rates_of_forces(spring):
     for name, rate in rates.items():
         k.derive(name, 1, rate)
     assert k.derivative("acceleration") == pytest.approx((3.0 + 5.0 - 11.0) / 2.0 - 7.0)
+    seated = spring.running(stop_enabled=True, stop_position=0.0, gravity=1.0)
+    seated.step(0.0, 0.1)
+    seated.derive("external_force", 1, 3.0)
+    assert seated.derivative("acceleration") == 0.0
+
+
+def test_the_rate_of_the_forecast_counts_rates_of_loads(beam):
+    k, forecast = beam.moving(communication_step=1e-3), "tip_velocity_forecast"
+    before = k.derivative(forecast)
+    k.derive("tip_load", 1, 3.0)
+    (partial,) = k.partials([forecast], "tip_load")
+    assert k.derivative(forecast) - before == pytest.approx(3.0 * partial, rel=1e-9) != 0.0
 
 
 @pytest.mark.parametrize("load", LOADS)
@@ -199,19 +212,20 @@ def test_contact_force_is_ignored_by_the_law_inside(spring):
 def test_a_derivative_of_the_tip_that_is_set_counts_even_if_it_is_zero(spring):
     law = {"contact_law": 2, "mass": 1e9, "linear_stiffness": 0.0, "compliance_stiffness": 1e3}
     reactions = []
-    for derivatives in ((), (0.0,), (0.25,), (0.0, 2.0)):
+    tip, rate = "tip_displacement", "tip_velocity"
+    for name, derivatives in ((tip, ()), (tip, (0.0,)), (tip, (0.25,)), (tip, (0.0, 2.0)), (rate, (2.0,))):
         k = spring.running(**law, compliance_exponent=1.0)
         k.set("tip_displacement", -0.1)
         k.set("tip_velocity", -0.2)
         token = k.state()
         for order, value in enumerate(derivatives, 1):
-            k.derive("tip_displacement", order, value)
+            k.derive(name, order, value)
         copied = k.deserialized(k.serialized())  # what is set belongs to the state
         k.restore(token)
         k.restore(copied)
         k.step(0.0, 0.1)
         reactions.append(k.get("reaction"))
-    assert reactions == pytest.approx([120.0, 100.0, 75.0, 90.0], rel=1e-6)
+    assert reactions == pytest.approx([120.0, 100.0, 75.0, 90.0, 110.0], rel=1e-6)
 
 
 def test_derivatives_of_inputs_are_seen_as_soon_as_they_are_set(spring):
@@ -227,6 +241,28 @@ def test_derivatives_of_inputs_are_seen_as_soon_as_they_are_set(spring):
     acceleration = -(0.1 + force) + 3.0
     rate = 100.0 * rise * (1.0 + 0.5 * rise) + 5.0 * 0.5 * acceleration
     assert k.derivative("reaction") == pytest.approx(rate)
+
+
+def test_a_tip_that_is_not_set_after_a_step_is_where_that_left_it(spring):
+    """C = k δ (1 + χ δ̇) as above, for a top that stays at 0.1 m, and a tip at 0.05 m − 0.1 s · 0.2 m/s."""
+    law = {"contact_law": 2, "compliance_stiffness": 100.0, "compliance_exponent": 1.0, "compliance_damping": 0.5}
+    k = spring.running(**law, mass=1e12, displacement=0.1, tip_displacement=0.05, tip_velocity=-0.2)
+    k.step(0.0, 0.1)
+    assert k.get("reaction") == pytest.approx(7.0 * 1.1)
+    token = k.state()
+    k.set("tip_displacement", 0.0)
+    k.restore(token)
+    k.set("external_force", 0.0)  # which makes the outputs due
+    assert k.get("reaction") == pytest.approx(7.0 * 1.1)
+    k.set("tip_velocity", 1.0)
+    assert k.get("reaction") == pytest.approx(7.0 * 0.5)
+
+
+@pytest.mark.parametrize("arrives", ["tip_displacement", "tip_velocity", "tip_velocity_forecast"])
+def test_a_tip_that_arrives_where_there_is_no_law_is_told(spring, arrives):
+    k = spring.running(**{arrives: 0.1})
+    k.step(0.0, 1e-3)
+    assert "contact_law = 1: there is no contact" in k.message
 
 
 # -- What an engineer loads the pair for: forces, moments, stresses, gravity, a start at rest; impacts of the spring

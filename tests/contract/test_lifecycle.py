@@ -78,6 +78,9 @@ def test_debug_messages_only_when_asked_for(case):
     assert chatty.call("SetDebugLogging", 1, 1, names) == OK
     chatty.call("Terminate")
     assert len(chatty.messages) == 3
+    assert chatty.call("SetDebugLogging", 1, 1, (ct.c_char_p * 1)(b"logAll")) == OK
+    chatty.call("Reset")
+    assert len(chatty.messages) == 4
 
 
 NO_CATEGORY = "there is no log category 'logEverything'"

@@ -34,6 +34,13 @@ def test_no_step_past_the_stop_time(case):
     assert "past the stop time 0.3" in k.message
 
 
+@pytest.mark.parametrize(("time", "size", "why"), [(1e-5, 0.1, "the slave is at 0"), (0.0, 0.3005, "the stop time")])
+def test_what_is_more_than_rounding_is_refused(case, time, size, why):
+    k = case.running(stop_time=0.3)
+    assert k.try_step(time, size) == ERROR
+    assert why in k.message
+
+
 AHEAD = {"contact_law": 2, "communication_step": 1e-3, "tip_response": 1e-4}
 #: FMU, parameters, inputs of a step that is refused, its size, the size of one that is not, and what is said.
 REFUSALS = [
@@ -120,14 +127,16 @@ def advance(case, k, time, steps, impulse):
 
 def test_the_bytes_of_a_state_are_all_that_another_instance_needs(case):
     """tests/fuzz repeats steps from their states."""
-    k, twin, fresh = case.moving(), case.moving(), case.instance()
+    values = {"beam": {"communication_step": 1e-3}, "spring": {}}[case.name]
+    k, twin, fresh = case.moving(**values), case.moving(**values), case.instance()
     for one in (k, twin):
-        advance(case, one, 0.0, 3, 0.2)
+        told = advance(case, one, 0.0, 3, 0.2)[-1]
     time, blob = 0.01 + 0.02 + 0.03, k.serialized()
     assert twin.serialized() == blob  # no pointers in it
     first = advance(case, k, time, 7, 0.2)
     k.free()
     fresh.restore(fresh.deserialized(blob))
+    assert fresh.outputs() == told
     assert advance(case, fresh, time, 7, 0.2) == first
     assert fresh.serialized() != blob
 
@@ -167,9 +176,10 @@ def test_a_state_carries_its_phase_parameters_and_time(case, phase):
         k.start(**values).step(2.0, 0.01)
     blob = k.serialized()
     expected = finish(k)
-    # Into an instance that knows nothing of all this.
-    fresh.restore(fresh.deserialized(blob))
-    assert finish(fresh) == expected
+    # Into an instance that knows nothing of all this, and back into one that has gone on.
+    for one in (fresh, k):
+        one.restore(one.deserialized(blob))
+        assert finish(one) == expected
 
 
 @pytest.mark.parametrize("same", [True, False], ids=["same parameters", "others"])

@@ -31,6 +31,11 @@ TEST(BeamForecast, WithTheResponsesItIsWhereTheTipGoesUnderAnyForces) {
       const Beam::Forecast ahead = b->forecast(H);
       const double u = b->tip_displacement(), v = b->tip_velocity(), C1 = 3.0, C2 = -1.7;
       const double largest = std::abs(u) + std::abs(2 * H * ahead.velocity) + std::abs(r[0]) + std::abs(r[1]);
+      const auto struck = make_beam(p);
+      stir(*struck);
+      struck->apply_tip_impulse(0.2);
+      EXPECT_NEAR(struck->forecast(H).velocity, ahead.velocity + 0.2 * r[2],
+                  1e-12 * (std::abs(ahead.velocity) + std::abs(r[2])));
       b->step(H, {C1, 0.0, 0.0}, 0.3);
       b->step(H, {C2, 0.0, 0.0}, 0.3);
       EXPECT_NEAR(b->tip_displacement(), u + 2 * H * ahead.velocity + C1 * r[1] + C2 * r[0], 1e-12 * largest) << H;

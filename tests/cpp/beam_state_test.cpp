@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "beam.hpp"
@@ -89,13 +90,17 @@ TEST(BeamState, AStepRepeatedFromTheSameStateIsBitIdentical) {
       b->step(0.007, {1.0, 0.0, 0.0}, 0.0);
       EXPECT_EQ(outputs(*other), outputs(*b));
 
-      // Nor that the step was tried with another force or load before.
-      for (const double load : {0.0, 0.6}) {
-        b->restore(state);
-        b->step(0.007, {-3.0, 2.0, 0.0}, load);
+      // Nor that the step was tried with another force or load before, from another velocity or from another place.
+      std::vector<double> elsewhere = state;
+      elsewhere[0] += 0.01;
+      for (const auto& [load, impulse, from] : {std::tuple(0.0, 0.0, &state), std::tuple(0.6, 0.0, &state),
+                                                std::tuple(0.6, 0.1, &state), std::tuple(0.6, 0.1, &elsewhere)}) {
         const auto fresh = make_beam(p);
-        fresh->restore(state);
-        fresh->step(0.007, {-3.0, 2.0, 0.0}, load);
+        for (Beam* one : {b.get(), fresh.get()}) {
+          one->restore(*from);
+          one->apply_tip_impulse(impulse);
+          one->step(0.007, {-3.0, 2.0, 0.0}, load);
+        }
         EXPECT_EQ(outputs(*fresh), outputs(*b));
       }
     }
@@ -123,6 +128,19 @@ TEST(BeamState, AResultThatIsNotFiniteLeavesTheStateUnchanged) {
     // The tip's motion is finite, the energies are not.
     EXPECT_THROW(b->step(1e-3, {1e200, 0.0, 0.0}, 0.1), std::domain_error);
     EXPECT_EQ(outputs(*b), before);
+    // What is seen of the force at once is too large, then what the integrals grow with.
+    EXPECT_THROW(b->step(1e-200, {1e200, 0.0, 0.0}, 0.1), std::domain_error);
+    EXPECT_THROW(b->step(1e11, {0.0, 0.0, 0.0}, 0.0), std::domain_error);
+    EXPECT_EQ(outputs(*b), before);
+    try {
+      b->step(0.25, {1e200, 2.0, 3.0}, Polynomial{4.0, 5.0, 6.0});
+      ADD_FAILURE() << "the step was made";
+    } catch (const std::domain_error& error) {
+      const std::string said =
+          "step of 0.25 s under the tip force 1e+200 N, 2 N/s, 3 N/s2, distributed_load = 4 and its "
+          "derivatives 5, 6;";
+      EXPECT_NE(std::string(error.what()).find(said), std::string::npos) << error.what();
+    }
     const auto same = make_beam(p);
     same->step(0.01, {0.3, 0.0, 0.0}, 0.1);
     same->step(0.01, {0.2, 0.0, 0.0}, 0.1);
@@ -145,7 +163,10 @@ TEST(BeamState, ParametersThatDoNotGoTogetherAreRefused) {
       {[](Parameters& p) { p.n_modes = 101; }, {"n_modes", "= 101 ", "100"}},
       {[](Parameters& p) { p.n_elements = 501; }, {"n_modes", "= 0 ", "generalized_alpha", "fewer n_modes"}},
       {[](Parameters& p) { p.n_elements = 501, p.n_modes = 502; }, {"n_modes", "= 502 ", "501"}},
+      {[](Parameters& p) { p.element_degree = 8, p.n_elements = 125000; }, {"n_modes", "125000 elements of degree 8"}},
       {[](Parameters& p) { p.density = 1e-200, p.area = 1e-200; }, {"density * area"}},
+      {[](Parameters& p) { p.young_modulus = 1e-310; }, {"young_modulus * area"}},
+      {[](Parameters& p) { p.shear_modulus = 1e-310; }, {"shear_modulus * shear_coefficient * area"}},
   };
   for (const Refused& refused : all) {
     Parameters p = unit_beam(50);

@@ -149,6 +149,10 @@ TEST(BeamStatics, LoadsAreConsistent) {
     const auto b = at_rest(loads);
     // At rest the potential of the load is −2 times the strain energy (Clapeyron).
     EXPECT_NEAR(b->load_potential(), -2.0 * b->strain_energy(), 1e-11 * b->strain_energy());
+    // What the clamp bears is the loads: the hat's −6 h/2 acts h/3 before the tip.
+    const double L = p.length, h = L / p.n_elements;
+    EXPECT_NEAR(b->response().forces.shear[0], 2.0 * L - 3.0 * h, 1e-9);
+    EXPECT_NEAR(b->response().forces.moment[0], L * L - 3.0 * h * (L - h / 3.0), 1e-9);
   }
 }
 

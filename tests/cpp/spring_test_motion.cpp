@@ -157,10 +157,12 @@ TEST(Spring, OscillatorUnderQuadraticForceWithIntegrals) {
   const double k = 30.0, w = std::sqrt(k), F0 = 2.0, F1 = -5.0, F2 = 80.0, y0 = 0.04, z0 = 0.6;
   const double p0 = (F0 - F2 / k) / k, p1 = F1 / k, p2 = F2 / k, a = y0 - p0, b = (z0 - p1) / w;
   Inputs inputs;
-  inputs.contact_force = {-F0, -F1, -F2};
+  inputs.external_force = {F0, F1, F2};
   for (const double H : {1e-3, 1e-2, 0.1, 0.4}) {
     Spring s(duffing(k, 0.0, y0, z0));
+    const double start = energy(s);
     s.step(H, inputs);
+    EXPECT_NEAR(s.load_work(), energy(s) - start, 1e-12);
     const double c = std::cos(w * H), sn = std::sin(w * H), vers = 2 * std::pow(std::sin(w * H / 2), 2);
     // 1e-12 of what y, ẏ have in size, the tolerance; the integrals to the same of H y, H² y.
     const double size = 0.15;

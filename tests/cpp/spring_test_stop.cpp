@@ -144,6 +144,20 @@ TEST(SpringStop, LeavesWhenTheForceTurns) {
   EXPECT_NEAR(s.velocity(), 50 * tau * tau / 2, 4e-14);
   EXPECT_NEAR(s.stop_force(), 1.0, 1e-15);  // ∫₀^0.2 (10 − 50 t) dt
   EXPECT_EQ(s.stop_impulse(), 0.0);
+
+  Spring early(ball(0.0, 0.0, 0.5));
+  EXPECT_NEAR(early.step_to_event(1.0, inputs, 0.0, true).size, 0.2, 1e-15);
+  EXPECT_NEAR(early.stop_force(), 5.0, 1e-14);  // the mean up to there
+}
+
+// Falls for T, then lies at 0: ∫y = ⅔hT, ∫∫y = 5/12 hT² + ⅔hT (1 − T).
+TEST(SpringStop, IntegralsGoOnWhileItIsSeated) {
+  const double h = 0.8, T = 0.4;
+  Spring s(ball(h, 0.0, 0.0));
+  s.step(1.0, weight(2 * h / T / T));
+  EXPECT_TRUE(s.seated());
+  EXPECT_NEAR(s.displacement_integral(), 2.0 / 3.0 * h * T, 1e-13);
+  EXPECT_NEAR(s.displacement_integral_2(), 5.0 / 12.0 * h * T * T + 2.0 / 3.0 * h * T * (1 - T), 1e-13);
 }
 
 // N ≥ 0 touches below 0 for a moment: seen although both ends of the step have N > 0.

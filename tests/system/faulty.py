@@ -39,7 +39,9 @@ class Fault:
     fmu: str
     function: str
     where: str
-    kind: str  #: a name of `STATUSES`, "raise", "hang", or what is put into the values: "nan", "inf", "1e300"
+    #: A name of `STATUSES`, "Warning" (of a call that does its work), "raise", "hang", or what is put into the values:
+    #: "nan", "inf", "1e300".
+    kind: str
     once: bool = False
     skip: int = 3
     happened: int = 0
@@ -155,6 +157,9 @@ class Library(functions.Library):
             hang()
         elif fault.kind in STATUSES:
             result = STATUSES[fault.kind]
+        elif fault.kind == "Warning":
+            function(*arguments)
+            result = WARNING
         else:
             result = function(*arguments)
             values = arguments[3]

@@ -111,6 +111,7 @@ LASTING = [
     ("hermite", "location", "fmi2SetRealInputDerivatives", "Fatal", "cannot set input derivatives"),
     ("energy", "event", "fmi2SetReal", "Error", "impulse"),
     ("hermite", "event", "fmi2SetReal", "Fatal", "impulse"),
+    ("energy", "tied", "fmi2GetReal", "Discard", "cannot read "),
     ("energy", "row", "fmi2GetReal", "Error", "cannot read "),
     ("energy", "row", "fmi2GetReal", "Fatal", "cannot read "),
     ("energy", "row", "fmi2GetReal", "nan", "the beam's shape is not finite"),
@@ -130,6 +131,15 @@ def test_a_lasting_fault_stops_the_run(run, fmu, law, where, function, kind, cau
     assert fault.happened
     script.check()
     check_stopped(code, directory, expected, cause)
+
+
+@pytest.mark.parametrize("function", ["fmi2SetReal", "fmi2SetRealInputDerivatives", "fmi2DoStep", "fmi2GetReal"])
+def test_a_warning_is_no_fault(run, function):
+    expected = whole(run, "hermite")
+    warning = Fault("spring", function, "tied", "Warning")
+    code, directory, _ = run("hermite", warning)
+    assert warning.happened
+    assert (code, written(directory)) == (0, expected)
 
 
 PASSING = [("fmi2DoStep", "Discard"), ("fmi2GetReal", "nan")]

@@ -10,7 +10,7 @@ from springbeam import PointMass, RunStopped, SceneError, load_scene, simulate, 
 from springbeam.bodies import fmu, fmu_bodies
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.fmu_bodies import release
-from springbeam.bodies.protocol import StepRefused
+from springbeam.bodies.protocol import NO_FORCE, StepRefused
 
 SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 1e-3}, time={"t_end": 0.25})
 PULSE = {"on": "tip", "signal": "half_sine", "start": 0.01, "duration": 0.05, "amplitude": 3.0}
@@ -62,11 +62,23 @@ def test_a_kept_body_steps_to_the_bits_of_a_new_one(name, made):
     assert (new, len(made)) == (len(SCENES[name].fmus), new)
 
 
-def test_a_force_that_is_no_number_makes_no_step():
+@pytest.mark.parametrize("force", [(nan, 0.0, 0.0), (0.0, 0.0, nan)])
+def test_a_force_that_is_no_number_makes_no_step(force):
     for body in load_bodies(load_scene("soft"), 0.0):
         body.mark()
         with pytest.raises(StepRefused, match="the force it should step under is not finite"):
-            body.advance(0.0, 1e-3, (nan, 0.0, 0.0))
+            body.advance(0.0, 1e-3, force)
+        body.close()
+
+
+def test_the_last_derivative_alone_acts():
+    """F̈ τ²/2 gives the mass of an end F̈ H³/6, in a step too short for what is behind it."""
+    H = 1e-7
+    bent = (0.0, 0.0, 6.0 / H**3)
+    beam, spring = load_bodies(load_scene("soft"), 0.0)
+    for body, forces in ((beam, (bent,)), (spring, (NO_FORCE, bent))):
+        before = body.motion().velocity
+        assert body.advance(0.0, H, *forces).velocity - before == pytest.approx(1.0 / body.mass, rel=1e-4)
         body.close()
 
 
