@@ -5,7 +5,7 @@ import pytest
 
 from springbeam.contact.laws import stiffest
 from springbeam.results.steps import STEP
-from springbeam.results.totals import shortest_contact, totals
+from springbeam.results.totals import TOTALS, in_words, shortest_contact, totals
 from springbeam.results.trajectory import Event, EventKind
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.resolution import force_window, slowest_frequency
@@ -64,6 +64,8 @@ def test_durations_and_rebound():
     assert numbers["contact_duration_total"] == pytest.approx(0.2 + 0.1 + 0.1, rel=1e-14)
     assert numbers["rebound_velocity"] == 0.25  # of the last contact that has opened
     assert "rebound_velocity" not in found(steps, events[0], apart=False)
+    assert numbers["bounce_time"] == pytest.approx(0.8, rel=1e-15)
+    assert "bounce_time" not in found(steps[:6], *events[:4])  # it flies where the run ends
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -143,6 +145,12 @@ def test_a_window_over_steps_of_different_curvature_begins_where_both_its_ends_h
     numbers = found(steps, window=0.3)
     assert numbers["contact_force_max"] == pytest.approx(1.0 - 16.0 * 0.3**2 / 27.0, rel=1e-13)
     assert numbers["contact_force_max_time"] == pytest.approx(0.5 - 0.2, rel=1e-13)
+
+
+def test_words_say_what_is_not_zero_and_any_count_and_the_window_beside_the_peak():
+    words = dict(in_words({**dict.fromkeys(TOTALS, 0.0), "contact_force_max": 3.0, "contact_force_window": 0.5}))
+    counts = {"contacts": "0", "strokes on the foundation": "0"}
+    assert words == {"peak contact force, mean over 0.5 s": "3 N", **counts}
 
 
 def test_the_window_is_a_fiftieth_of_the_slowest_period():
