@@ -3,6 +3,7 @@
 import pytest
 
 from springbeam import Motion, load_scene, with_changes
+from springbeam.contact.laws import Compliance, Link, depth
 from springbeam.contact.phases import (
     Joint,
     Phase,
@@ -22,7 +23,7 @@ def test_ends_that_are_let_go_have_one_velocity_but_where_they_vibrate(kind, v, 
     z, tip_mass, mass = 0.5, 0.01, 1.0
     transitions = Transitions(load_scene("soft"), None, tip_mass, mass, fastest=lambda: 1.0, equilibrium=0.0)
     ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, z, 0.0, 0.0)
-    _, phase, impact = transitions.after(kind, Phase(Joint.TIED), ends, 0.0, ends, -1.0, 1e-17)
+    _, phase, impact = transitions.after(kind, Phase(Joint.TIED), ends, 0.0, ends, 0.0, 1e-17)
     assert phase.joint is Joint.FREE
     v_after, z_after = after(impact, v, z, tip_mass, mass)
     if one_velocity:
@@ -30,6 +31,14 @@ def test_ends_that_are_let_go_have_one_velocity_but_where_they_vibrate(kind, v, 
         assert tip_mass * v_after + mass * z_after == pytest.approx(tip_mass * v + mass * z, rel=1e-14)
     else:
         assert (v_after, z_after) == (v, z)
+
+
+@pytest.mark.parametrize(("z", "kind"), [(-0.5, "retie"), (0.5, "separation")])
+def test_a_massless_tip_whose_force_vanishes_at_equilibrium_is_tied_again_if_it_falls(z, kind):
+    transitions = Transitions(load_scene("soft"), None, 0.0, 1.0, fastest=lambda: 1.0, equilibrium=0.0)
+    ends = (Motion(0.0, z, 0.0, 0.0),) * 2
+    found, phase, _ = transitions.after(EventKind.SEPARATION, Phase(Joint.TOUCH), ends, 0.0, ends, 0.0, 1e-17)
+    assert (found, phase.joint) == (kind, Joint.TIED if kind == "retie" else Joint.FREE)
 
 
 @pytest.mark.parametrize(("v", "left"), [(0.19, 0.0), (-3.0, 0.0), (0.21, 0.21)])
@@ -62,3 +71,24 @@ def test_a_rebound_that_is_lower_than_heights_can_be_told_apart_is_none_if_it_is
         before, end = ((Motion(0.0, 0.0, 0.0, 0.0), Motion(scene.stop.position, w, 0.0, 0.0)) for w in (z + 1e-3, z))
         found, *_ = transitions.after(EventKind.STOP_IMPACT, Phase(), before, 1e-6, end, 0.0, tolerance)
     assert found == kind
+
+
+def test_a_depth_is_found_where_the_energy_of_a_little_more_is_no_double():
+    """λ p²⁰⁰¹/2001 = 1 J; 2²⁰⁰¹ is too large."""
+    assert depth(Compliance(1e-3, 2000.0), 1.0) == pytest.approx(2.001e6 ** (1.0 / 2001.0), rel=1e-15)
+
+
+@pytest.mark.parametrize("law", [Compliance(1e4, 1.5, 0.5), Link(1e4, 3.0)], ids=repr)
+@pytest.mark.parametrize("rate", [0.3, -1.9, -2.1])
+def test_the_slopes_of_what_damping_adds_are_those_of_its_force(law, rate):
+    """Compliance pushes no more where the ends part at 2 m/s or faster."""
+
+    def damping(p, rate):
+        return law.force(p, rate) - law.force(p)
+
+    p, d = 0.01, 1e-6
+    slopes = (
+        (damping(p + d, rate) - damping(p - d, rate)) / (2 * d),
+        (damping(p, rate + d) - damping(p, rate - d)) / (2 * d),
+    )
+    assert law.resistance(p, rate) == pytest.approx((damping(p, rate), *slopes), rel=1e-6, abs=1e-6)

@@ -6,7 +6,9 @@ from bodies import simulate
 from scenes import scene_from_dict
 from scipy.sparse.linalg import spsolve
 
+from springbeam.bodies.protocol import Motion
 from springbeam.bodies.quasi_static import QuasiStaticBeam
+from springbeam.contact.events import Holding
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import assemble, constant_forces
 from springbeam.results.contact_times import contact_changes
@@ -155,6 +157,12 @@ def test_the_whole_life_is_that_of_the_reference(what):
     assert run.e_beam[0] == pytest.approx(exact.e_beam[0], rel=1e-12, abs=1e-15)  # also what no place of the tip tells
     assert run.summary["max_energy_residual"] < 1e-12
     assert np.abs(exact.energy_residual).max() < 1e-12
+    # C/k and its rate, by the accelerations of the reference.
+    compliance, alpha = statics.tip_compliance(run.scene.beam), run.scene.beam.alpha_b
+    joined = np.isin(exact.phase, ("tied", "touch"))
+    y, z, C, acceleration = (exact[name][joined] for name in ("y", "z", "contact_force", "a_y"))
+    found = Holding(run.scene.beam, run.scene.spring)((None, Motion(y, z, 0.0, 0.0)))
+    np.testing.assert_allclose(found, [compliance * C, z + alpha * acceleration], rtol=1e-9, atol=1e-12)
 
 
 # -- what is said ----------------------------------------------------------------------------------------------------

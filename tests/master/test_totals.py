@@ -5,7 +5,7 @@ import pytest
 
 from springbeam.contact.laws import stiffest
 from springbeam.results.steps import STEP
-from springbeam.results.totals import shortest_contact, totals
+from springbeam.results.totals import TOTALS, in_words, shortest_contact, totals
 from springbeam.results.trajectory import Event, EventKind
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.resolution import force_window, slowest_frequency
@@ -56,6 +56,7 @@ def test_durations_and_rebound():
         Event(0.1, "impact"),
         Event(0.3, "separation", v_tip=0.5),
         Event(0.4, "impact"),
+        Event(0.5, "retie", v_tip=0.125),
         Event(0.5, "release", v_tip=0.25),
         Event(0.9, "impact"),
     )
@@ -64,6 +65,8 @@ def test_durations_and_rebound():
     assert numbers["contact_duration_total"] == pytest.approx(0.2 + 0.1 + 0.1, rel=1e-14)
     assert numbers["rebound_velocity"] == 0.25  # of the last contact that has opened
     assert "rebound_velocity" not in found(steps, events[0], apart=False)
+    assert numbers["bounce_time"] == pytest.approx(0.8, rel=1e-15)
+    assert "bounce_time" not in found(steps[:6], *events[:5])  # it flies where the run ends
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -145,6 +148,12 @@ def test_a_window_over_steps_of_different_curvature_begins_where_both_its_ends_h
     assert numbers["contact_force_max_time"] == pytest.approx(0.5 - 0.2, rel=1e-13)
 
 
+def test_words_say_what_is_not_zero_and_any_count_and_the_window_beside_the_peak():
+    words = dict(in_words({**dict.fromkeys(TOTALS, 0.0), "contact_force_max": 3.0, "contact_force_window": 0.5}))
+    counts = {"contacts": "0", "strokes on the foundation": "0"}
+    assert words == {"peak contact force, mean over 0.5 s": "3 N", **counts}
+
+
 def test_the_window_is_a_fiftieth_of_the_slowest_period():
     assert force_window(SCENE) == pytest.approx(2.0 * np.pi / slowest_frequency(SCENE.beam) / 50.0, rel=1e-15)
     assert force_window(with_changes(SCENE, contact={"force_window": 0.25})) == 0.25
@@ -184,7 +193,9 @@ def test_an_impulse_is_not_lost_by_the_rounding_of_a_window():
 
 def test_a_window_may_begin_before_the_run_where_the_ends_pull_later():
     steps = steps_with(lambda t: (1.0 if t < 0.5 else -0.5, 0.0, 0.0), [0.0, 0.5, 1.0])
-    assert found(steps, window=1.0)["contact_force_max"] == pytest.approx(0.5, rel=1e-14)
+    numbers = found(steps, window=1.0)
+    assert numbers["contact_force_max"] == pytest.approx(0.5, rel=1e-14)
+    assert numbers["contact_force_max_time"] == 0.0  # nothing acts before
 
 
 def test_there_is_no_force_before_the_run():

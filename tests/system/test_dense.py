@@ -7,6 +7,7 @@ import pytest
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
+from springbeam.results.steps import joined as are_joined
 from springbeam.studies.metrics import METRICS
 
 SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2})
@@ -17,7 +18,11 @@ SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2})
     [
         {},
         {"coupling": {"degree": 2}},
-        {"contact": {"law": "compliance", "stiffness": 1e4, "exponent": 1.5, "damping": 0.5}},
+        {
+            "contact": {"law": "compliance", "stiffness": 1e4, "exponent": 1.5, "damping": 0.5},
+            "coupling": {"degree": 1},
+            "stop": {"position": -1e-4, "restitution": 0.0},
+        },
         {"contact": {"law": "link", "stiffness": 1e3, "damping": 0.1}, "stop": None},
         {"stop": {"restitution": 0.5}, "spring": {"damping": 0.1}},
         {"spring": None},
@@ -34,7 +39,9 @@ def test_rows_are_themselves_and_between_them_every_column_holds(changes):
         assert np.array_equal(again[name], run[name][last]), name
 
     steps = run.steps[run.steps["size"] > 0.0]
-    middles = run.at(steps["time"] - 0.5 * steps["size"])
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    inside = [run.at(steps["time"] - 0.5 * (1.0 - x) * steps["size"]) for x in nodes]
+    middles, begin = inside[1], run.steps[np.flatnonzero(run.steps["size"] > 0.0) - 1]
     assert list(middles.columns) == list(run.columns)
     kept = sum(middles[name] for name in run.columns if name.startswith("e_") and name != "e_total")
     assert np.array_equal(middles.e_total, kept)
@@ -46,9 +53,18 @@ def test_rows_are_themselves_and_between_them_every_column_holds(changes):
         joined = (middles.phase == "tied") | (middles.phase == "touch")
         if run.scene.contact.rigid:
             assert np.abs(middles.gap[joined]).max() < 1e-12
-            begin = run.steps[np.flatnonzero(run.steps["size"] > 0.0) - 1]
             mismatch = 0.5 * (begin["v_tip_after"] - begin["z_after"] + steps["v_tip"] - steps["z"])
             assert (middles.v_tip - middles.z)[joined] == pytest.approx(mismatch[joined], abs=1e-12)
+    # Forces are those applied, ends keep the integral of their step, and what is seated stays so up to the next row.
+    tau = 0.5 * steps["size"]
+    for name in {"contact_force", "foundation_force"} & set(run.columns):
+        applied = steps[name] + tau * (steps[f"{name}_rate"] + 0.5 * tau * steps[f"{name}_rate_2"])
+        assert middles[name] == pytest.approx(applied, rel=1e-12, abs=1e-12 * np.abs(applied).max())
+    for name in {"u_tip", "y"} & set(run.columns):
+        mean = sum(weight * there[name] for weight, there in zip(weights, inside, strict=True)) / 2.0
+        own = (name == "y") | ~are_joined(begin) | (not run.scene.contact.rigid)
+        assert mean[own] == pytest.approx((steps[f"{name}_integral"] / steps["size"])[own], rel=1e-11, abs=1e-15)
+    assert np.array_equal(middles.phase == "seated", begin["phase"] >= 3.0)
     # Just before an event it has not happened yet.
     for event in run.events:
         if event.energy_loss > 1e-6 and event.time > run.time[0]:
