@@ -41,6 +41,28 @@ def test_a_massless_tip_whose_force_vanishes_at_equilibrium_is_tied_again_if_it_
     assert (found, phase.joint) == (kind, Joint.TIED if kind == "retie" else Joint.FREE)
 
 
+@pytest.mark.parametrize(("height", "z", "joint"), [
+    (-1e-9, 1.0, "tied"), (1e-9, -1.0, "touch"), (-1e-14, 1.0, "touch"), (1e-14, -1.0, "tied"),
+])  # fmt: skip
+def test_where_they_go_tells_what_ends_are_that_meet_at_equilibrium_to_rounding(height, z, joint):
+    transitions = Transitions(load_scene("soft"), None, 0.01, 1.0, fastest=lambda: 1.0, equilibrium=0.1)
+    ends = (Motion(0.1 + height, z, 0.0, 0.0),) * 2
+    _, phase, _ = transitions.after(EventKind.IMPACT, Phase(), ends, 0.0, ends, 0.0, 1e-18)
+    assert phase.joint.value == joint
+
+
+@pytest.mark.parametrize(
+    ("v", "e", "kind"), [(1.0, 0.9, "seated"), (1.0, 1.0, "stop_impact"), (-0.1, 0.9, "stop_impact")]
+)
+def test_what_a_heavier_tip_takes_up_at_once_has_struck_for_the_last_time_unless_nothing_is_lost(v, e, kind):
+    """A top that falls on the foundation by 0.5 m/s, tied to a tip of ten times its mass."""
+    scene = with_changes(load_scene("soft"), stop={"restitution": e})
+    transitions = Transitions(scene, None, 10.0, 1.0, fastest=lambda: 1.0, equilibrium=0.0)
+    ends = tuple(Motion(scene.stop.position, w, 0.0, 0.0) for w in (v, -0.5))
+    found, *_ = transitions.after(EventKind.STOP_IMPACT, Phase(Joint.TIED), ends, 0.0, ends, 0.0, 1e-17)
+    assert (found, transitions.state) == (kind, max(abs(v), 0.5))
+
+
 @pytest.mark.parametrize(("v", "left"), [(0.19, 0.0), (-3.0, 0.0), (0.21, 0.21)])
 @pytest.mark.parametrize(("kind", "mass"), [("separation", None), ("separation", 1.0), ("unseated", 1.0)])
 def test_a_tip_that_the_foundation_lets_go_leaves_at_rest_but_where_it_vibrates(kind, mass, v, left):

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 from numpy.polynomial import Legendre, Polynomial
 
+from springbeam import load_scene
 from springbeam.bodies import force
 from springbeam.bodies.protocol import Motion
+from springbeam.results.dense import between_rows
 from springbeam.results.paths import Path, sign_changes
+from springbeam.results.steps import STEP
 
 # -- The path of a position inside a step: quintics exactly, minima, zeros, the order of its error and of the cubic's
 
@@ -31,6 +34,19 @@ def test_path_and_cubic_are_apart_by_no_more_than_they_say(even, odd):
     assert told >= apart * (1.0 - 1e-6)
     if even * odd == 0.0:
         assert told == pytest.approx(apart, rel=1e-4)
+
+
+@pytest.mark.parametrize(("end", "phase", "seen"), [("y", 1.0, 1.0), ("u_tip", 0.0, 1.0), ("u_tip", 1.0, 0.0)])
+def test_the_last_moment_tells_how_far_an_end_may_be_off_between_rows_but_of_a_tip_that_takes_another_path(
+    end, phase, seen
+):
+    """An end goes 1 m in a step of 1 s from rest to rest, and ∫∫ is 1e-5 m·s² beside the cubic's: the path is 420 times
+    that times s²(1 − s)²(1 − 2s) beside it, which is at most 1/(25 √5)."""
+    steps = np.zeros(2, STEP)
+    steps["phase"], steps["size"][1], steps[end][1], steps[f"{end}_after"][1] = phase, 1.0, 1.0, 1.0
+    steps[f"{end}_integral"][1], steps[f"{end}_integral_2"][1] = 0.5, 0.15 + 1e-5
+    found = between_rows(load_scene("soft"), steps)
+    assert found == pytest.approx(seen * 420e-5 / (25.0 * 5.0**0.5), rel=1e-7, abs=1e-15)
 
 
 def test_a_quartic_is_beside_the_cubic_through_its_ends_and_a_cubic_is_not():

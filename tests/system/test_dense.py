@@ -83,7 +83,11 @@ def test_rows_are_themselves_and_between_them_every_column_holds(changes):
 
 @pytest.mark.parametrize(
     "changes",
-    [{}, {"contact": {"law": "compliance", "stiffness": 1e4, "exponent": 1.5}}, {"spring": None, "stop": None}],
+    [
+        {"stop": {"restitution": 0.5}, "spring": {"external_force": -9.0}},  # it is fastest when it strikes
+        {"contact": {"law": "compliance", "stiffness": 1e4, "exponent": 1.5}},
+        {"spring": None, "stop": None},
+    ],
     ids=["transmission", "compliance", "beam alone"],
 )
 def test_extremes_are_those_of_the_curve(changes):
