@@ -58,7 +58,12 @@ def test_let_go_it_relaxes_exponentially(alpha):
     w0, w = (0.1 - rest) * np.exp([0.0, -size / alpha])
     once = alpha * (w0 - w)
     expected = (rest + w, -w / alpha, rest * size + once, 0.5 * rest * size**2 + alpha * (w0 * size - once))
-    assert beam.advance_alone(0.0, size) == pytest.approx(expected, rel=1e-12)
+    end = beam.advance_alone(0.0, size)
+    assert end == pytest.approx(expected, rel=1e-12)
+    # Nothing holds it, and what it feels are its loads.
+    assert beam.holding_force(*end[:2]) == pytest.approx(0.0, abs=1e-12)
+    forces = statics.load_forces(BEAM, BEAM.length * (1.0 - SHAPE_POINTS))
+    assert beam.shape()[21:] == pytest.approx(np.concatenate(forces[::-1]), abs=1e-12)
 
 
 # -- the pair -------------------------------------------------------------------------------------------------------

@@ -111,7 +111,7 @@ LASTING = [
     ("hermite", "location", "fmi2SetRealInputDerivatives", "Fatal", "cannot set input derivatives"),
     ("energy", "event", "fmi2SetReal", "Error", "impulse"),
     ("hermite", "event", "fmi2SetReal", "Fatal", "impulse"),
-    ("energy", "tied", "fmi2GetReal", "Discard", "cannot read "),
+    ("energy", "tied", "fmi2GetReal", "Discard", "displacement, "),
     ("energy", "row", "fmi2GetReal", "Error", "cannot read "),
     ("energy", "row", "fmi2GetReal", "Fatal", "cannot read "),
     ("energy", "row", "fmi2GetReal", "nan", "the beam's shape is not finite"),

@@ -82,6 +82,31 @@ def test_the_last_derivative_alone_acts():
         body.close()
 
 
+def test_loads_add_to_the_constant_ones():
+    given = {"beam": {"distributed_load": -2.0}, "spring": {"external_force": -3.0}}
+    loads = [{"on": "beam", "amplitude": 0.5}, {"on": "spring", "amplitude": 0.25}]
+    loaded = with_changes(load_scene("soft"), **given, loads=loads)
+    summed = with_changes(load_scene("soft"), beam={"distributed_load": -1.5}, spring={"external_force": -2.75})
+    pairs = zip(load_bodies(loaded, 0.0), loaded.loads, load_bodies(summed, 0.0), strict=True)
+    for body, load, constant in pairs:
+        body.expect_loads([load])
+        body.set_loads([(load.amplitude, 0.0, 0.0)])
+        for one in (body, constant):
+            one.advance(0.0, 0.01, NO_FORCE)
+        assert body.motion() == pytest.approx(constant.motion(), rel=1e-12)
+        body.close()
+        constant.close()
+
+
+def test_what_was_dissipated_before_a_restart_counts():
+    beam, spring = load_bodies(with_changes(load_scene("soft"), spring={"damping": 2.0}), 0.0)
+    spring.restart(0.0, 0.1, -1.0, dissipated=0.5)
+    spring.advance(0.0, 1e-6, NO_FORCE)
+    assert spring.energies().dissipated == pytest.approx(0.5 + 2e-6, rel=1e-6)
+    for body in (beam, spring):
+        body.close()
+
+
 def test_few_are_kept_and_the_oldest_is_freed(monkeypatch):
     closed = []
     close = fmu.Fmu.close
