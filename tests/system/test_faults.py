@@ -135,11 +135,9 @@ def test_a_lasting_fault_stops_the_run(run, fmu, law, where, function, kind, cau
 
 @pytest.mark.parametrize("function", ["fmi2SetReal", "fmi2SetRealInputDerivatives", "fmi2DoStep", "fmi2GetReal"])
 def test_a_warning_is_no_fault(run, function):
-    expected = whole(run, "hermite")
     warning = Fault("spring", function, "tied", "Warning")
     code, directory, _ = run("hermite", warning)
-    assert warning.happened
-    assert (code, written(directory)) == (0, expected)
+    assert (code, written(directory), warning.happened > 0) == (0, whole(run, "hermite"), True)
 
 
 PASSING = [("fmi2DoStep", "Discard"), ("fmi2GetReal", "nan")]

@@ -9,7 +9,7 @@ import pytest
 from springbeam import PointMass, RunStopped, SceneError, load_scene, simulate, with_changes
 from springbeam.bodies import fmu, fmu_bodies
 from springbeam.bodies.factory import load_bodies
-from springbeam.bodies.fmu_bodies import release
+from springbeam.bodies.fmu_bodies import FmuSpring, release
 from springbeam.bodies.protocol import NO_FORCE, StepRefused
 
 SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 1e-3}, time={"t_end": 0.25})
@@ -72,8 +72,7 @@ def test_a_force_that_is_no_number_makes_no_step(force):
 
 
 def test_the_last_derivative_alone_acts():
-    """F̈ τ²/2 gives the mass of an end F̈ H³/6, in a step too short for what is behind it."""
-    H = 1e-7
+    H = 1e-7  # too short for what is behind an end: its mass takes F̈ H³/6
     bent = (0.0, 0.0, 6.0 / H**3)
     beam, spring = load_bodies(load_scene("soft"), 0.0)
     for body, forces in ((beam, (bent,)), (spring, (NO_FORCE, bent))):
@@ -83,28 +82,19 @@ def test_the_last_derivative_alone_acts():
 
 
 def test_loads_add_to_the_constant_ones():
-    given = {"beam": {"distributed_load": -2.0}, "spring": {"external_force": -3.0}}
-    loads = [{"on": "beam", "amplitude": 0.5}, {"on": "spring", "amplitude": 0.25}]
-    loaded = with_changes(load_scene("soft"), **given, loads=loads)
-    summed = with_changes(load_scene("soft"), beam={"distributed_load": -1.5}, spring={"external_force": -2.75})
-    pairs = zip(load_bodies(loaded, 0.0), loaded.loads, load_bodies(summed, 0.0), strict=True)
-    for body, load, constant in pairs:
-        body.expect_loads([load])
-        body.set_loads([(load.amplitude, 0.0, 0.0)])
-        for one in (body, constant):
-            one.advance(0.0, 0.01, NO_FORCE)
-        assert body.motion() == pytest.approx(constant.motion(), rel=1e-12)
-        body.close()
-        constant.close()
+    constant = {"beam": {"distributed_load": -2.0}, "spring": {"external_force": -3.0}}
+    added = [{"on": "beam", "amplitude": 0.5}, {"on": "spring", "amplitude": 0.25}]
+    summed = {"beam": {"distributed_load": -1.5}, "spring": {"external_force": -2.75}}
+    one, other = (simulate(with_changes(SOFT, **tables)) for tables in ({**constant, "loads": added}, summed))
+    assert one.y == pytest.approx(other.y, rel=1e-9, abs=1e-12)
 
 
 def test_what_was_dissipated_before_a_restart_counts():
-    beam, spring = load_bodies(with_changes(load_scene("soft"), spring={"damping": 2.0}), 0.0)
+    spring = FmuSpring.of(with_changes(SOFT, spring={"damping": 2.0}).spring, 0.0)
     spring.restart(0.0, 0.1, -1.0, dissipated=0.5)
     spring.advance(0.0, 1e-6, NO_FORCE)
     assert spring.energies().dissipated == pytest.approx(0.5 + 2e-6, rel=1e-6)
-    for body in (beam, spring):
-        body.close()
+    spring.close()
 
 
 def test_few_are_kept_and_the_oldest_is_freed(monkeypatch):
