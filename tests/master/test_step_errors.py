@@ -4,13 +4,16 @@ from contextlib import nullcontext
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, Upper
+from bodies import DuffingBody, Upper, solve
 
 from springbeam import RunStopped, load_scene, with_changes
 from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Motion
+from springbeam.contact.laws import Compliance
 from springbeam.coupling.hermite import gap_inside
-from springbeam.coupling.protocol import Step
+from springbeam.coupling.protocol import Scales, Step
+from springbeam.coupling.soft import SoftSolver
+from springbeam.coupling.tie import Tie
 from springbeam.run.adaptive import AdaptiveSteps
 from springbeam.run.stepping import Pair, State
 
@@ -28,6 +31,26 @@ def test_the_moment_inside_and_the_work_on_it_are_those_of_the_gap(degree):
     end = Motion(g(H), g.deriv()(H), once(H), twice(H))
     assert gap_inside(end, H, degree) == pytest.approx(abs(expected), rel=1e-12)
     assert force.work(c, end, H) == pytest.approx(work, rel=1e-12)
+
+
+@pytest.mark.parametrize(("scheme", "degree"), [
+    *((scheme, degree) for scheme in ("energy", "soft") for degree in (0, 1, 2)), ("hermite", 1), ("hermite", 2),
+])  # fmt: skip
+def test_the_errors_of_a_step_fall_with_its_size_by_the_orders_that_they_tell(scheme, degree):
+    """From a smooth start; the work on the gap of `hermite` 2, of which 6 is told, by 7."""
+    found, soft = [], scheme == "soft"
+    for size in (5e-3, 2.5e-3):
+        upper = Upper(1.0, 100.0, 0.0, y=0.1, z=-0.5)
+        lower = DuffingBody(2.0, 3.0, 40.0, y=0.1 + 0.02 * soft, z=-0.5 + 0.2 * soft)
+        start = upper.motion(), lower.motion()
+        coupling = SoftSolver(Compliance(1e3, 1.5), degree, 1e-13) if soft else Tie(scheme, degree, 1e-13)
+        contact = solve(coupling, size, upper, lower)
+        step = Step(0.0, size, contact, NO_FORCE, start, (upper.motion(), lower.motion()))
+        found.append(np.array(coupling.local_errors(step, Scales(1.0, 0.5, 1.0, 2.0 / 3.0))))
+    (errors, told), (halved, _) = (table.T for table in found)
+    observed = np.log2(errors / halved)
+    assert observed[0] == pytest.approx(told[0], abs=0.2)
+    assert (observed > told - 0.2).all()
 
 
 @pytest.mark.parametrize("apart", [0.0, 4.9e-5, 5.1e-5])
