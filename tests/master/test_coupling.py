@@ -433,7 +433,7 @@ def test_damping_never_gives_energy(start, end, mean, skew, degree, q, chi):
 @pytest.mark.parametrize("end", [1.0 + 2e-9, 0.95, 0.4, 0.2, -0.3])
 @pytest.mark.parametrize("degree", DEGREES)
 def test_the_force_and_what_it_leaves_out_are_projections_of_the_law(degree, end, chi):
-    """Beside Gauss points between the zeros of p, gathered there. The projection's own six are off by 2e-8 where p nearly touches 0."""
+    """Beside Gauss points between the zeros of p; the projection's own are off by 2e-8 where p nearly touches 0."""
     law, start, (v, w) = Compliance(1e4, 1.5, chi), 0.01, legendre.leggauss(100)
     x = [start * share for share in (end, (1.0 + 2.0 * end) / 3.0, (end - 1.0) / 5.0)][: degree + 1]
     projection = Projection(law, degree)
