@@ -1,6 +1,7 @@
 """Stability: what the classes of the grid mean, a small part of it, and critical macro steps as predicted."""
 
 import itertools
+import pickle
 from dataclasses import replace
 from functools import lru_cache
 
@@ -82,6 +83,14 @@ def test_a_coupling_that_changes_no_energy_is_not_excused_by_what_it_says(cause)
     for scheme, kind in (("energy", "garbage"), ("hermite", "stopped" if cause else "approximate")):
         run = done(scheme, 1)
         assert judged(changed(run, said, energy_residual=residual(run, 1e-2)), cause)["kind"] == kind
+
+
+def test_a_cell_is_stopped_by_what_its_last_steps_show_when_it_is_cut(monkeypatch):
+    """They are checked a thousand together, so here not before the cut."""
+    monkeypatch.setattr(grid, "_MOST_STEPS", 3)
+    outcome = run_cell(short(coupling=("compliance", "jacobi", 0), contact_stiffness=1e8, exponent=1.0))
+    assert outcome["kind"] == "stopped"
+    assert "jacobi of degree 0 has changed the energy" in outcome["reason"]
 
 
 # -- mutations ------------------------------------------------------------------------------------------------------
@@ -330,5 +339,8 @@ def soft(stiffness, size, scheme, degree, t_end):
 
 @pytest.mark.parametrize(("scheme", "degree"), ORDINARY)
 def test_a_stiff_contact_gains_energy_and_the_run_says_so(scheme, degree):
-    with pytest.raises(RunStopped, match=f"{scheme} of degree {degree}"):
+    """The error can pass from one process to another, as from the workers of a study."""
+    with pytest.raises(RunStopped, match=f"{scheme} of degree {degree}") as stopped:
         simulate(soft(1e8, 0.004, scheme, degree, 0.2))
+    passed_on = pickle.loads(pickle.dumps(stopped.value))
+    assert (str(passed_on), len(passed_on.run)) == (str(stopped.value), len(stopped.value.run))

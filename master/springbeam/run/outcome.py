@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import isfinite
 from traceback import walk_tb
+from typing import Any
 
 from ..results.trajectory import Trajectory
 
@@ -39,3 +40,7 @@ class RunStopped(RuntimeError):
         at = "" if residual is None else f", residual {residual:.3g} m"
         super().__init__(f"stopped at t = {time:.9g} s: {cause}{at}")
         self.cause, self.time, self.residual = cause, time, residual
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let the error pass from one process to another."""
+        return type(self), (self.cause, self.time, self.residual), {"run": self.run}

@@ -111,8 +111,12 @@ class Simulation:
 
     @property
     def run(self) -> Trajectory:
-        """The trajectory so far; its summary has the ``status`` "running" until the run has ended."""
-        self._master.hand_over()
+        """The trajectory so far; its summary has the ``status`` "running" until the run has ended.
+
+        Raises RunStopped if the steps since the last check have gone wrong, which ends the run.
+        """
+        with self._ending():
+            self._master.hand_over()
         found = self.recorder.trajectory()
         found.summary = found.summary if self._summary else self._summed_up({"status": "running"})
         return found

@@ -199,9 +199,9 @@ def run_cell(cell: dict[str, Any]) -> Row:
             for _ in range(_MOST_STEPS):
                 if not simulation.step():
                     break
+            found = simulation.run  # where the last steps are checked
         except RunStopped as stopped:
-            cause = stopped.cause
-        found = simulation.run
+            cause, found = stopped.cause, simulation.run
     if "traceback" in found.summary:  # an error that nobody foresaw
         return ended("garbage", f"crashed: {cause}")
     outcome = judged(found, cause)
