@@ -29,10 +29,8 @@ _log = logging.getLogger(__name__)
 _MAX_ITERATIONS = 20
 #: Rounding of a sum of modes, relative to the largest it has been.
 _ROUNDING = 16.0 * float(np.finfo(float).eps)
-#: Where the iteration stops to converge within this factor of the tolerance it has met the bodies' own rounding.
-_NOISE = 1e3
-#: A correction that leaves more than this share of the residual makes no progress.
-_STAGNATES = 0.3
+#: An iteration that takes so long has met the bodies' own rounding: so many tolerances, or that of the tip's modes.
+_LATE, _NOISE = 8, 1e3
 
 #: Step sizes whose responses are remembered: the macro step's, and some of steps cut by events.
 SIZES_REMEMBERED = 64
@@ -123,15 +121,11 @@ class StepSolver(Coupling):
         norm = max(map(abs, residual))
         # Rounding is always enough. What is asked follows from the motion, and is looked at where that is not reached.
         enough = rounding = _ROUNDING * max(self.state.reach, abs(start[0].displacement))
-        left = inf  # when the upper body advanced last, of the residual [m]
-        noise = 0.0  # of the bodies' own rounding, once the iteration has met it [m]
         # S is measured once, when a size comes again: it then saves a step of the lower body in most.
         due = not measured and remembered[1] is not None and lower.mass < inf
-        fresh = False  # whether S was measured in this step
         for iteration in range(_MAX_ITERATIONS):
             if not norm < inf:
                 raise NotConverged(norm, iteration)
-            previous = norm
             if norm <= enough:
                 if not predicted:
                     break
@@ -146,34 +140,29 @@ class StepSolver(Coupling):
                 lower.rewind()
                 lower_end = lower.advance(time, size, acting)
                 r_lower = conditions(lower_end, size)
-                enough = rounding if rounding > noise else noise
+                enough = rounding
             before, gap = gap, list(map(sub, r_upper, r_lower))
             residual = gap if goal is None else list(map(sub, gap, goal))
             norm = max(map(abs, residual))
             if not norm > enough:
                 continue
-            tolerance = self._absolute_tolerance(start[0], lower_end, size, times(B, a))
-            enough = tolerance if tolerance > noise else noise
+            enough = self._absolute_tolerance(start[0], lower_end, size, times(B, a))
+            if iteration >= _LATE:
+                enough = max(_NOISE * enough, _ROUNDING * self._expected)
             if norm <= enough:
                 continue
-            if predicted:
-                stagnates = norm > _STAGNATES * previous
-                descent = broyden(descent, step, residual)
-            else:
-                stagnates, left = norm > _STAGNATES * left, norm
-                if norm > self._noise(tolerance):
-                    # The upper body is not linear: what it missed of the prediction corrects both responses.
-                    taken, missed = list(map(sub, a, known)), list(map(sub, gap, before))
-                    B, descent = secant(B, taken, missed), broyden(descent, taken, missed)
-                known = a
-            if due or (stagnates and predicted and not fresh):
+            if not predicted:
+                # The upper body is not linear: what it missed of the prediction corrects both responses.
+                taken, missed = list(map(sub, a, known)), list(map(sub, gap, before))
+                B, descent, known = secant(B, taken, missed), broyden(descent, taken, missed), a
+            elif due:
                 length = 1e-4 * max(abs(lower_end.displacement), size * abs(lower_end.velocity))
                 S = self._measure(lower, time, size, a, r_lower, length)
                 lower.rewind()
                 lower_end = lower.advance(time, size, acting)
-                descent, measured, fresh, due = _descent(B, S), True, True, False
-            elif stagnates and norm <= self._noise(tolerance):
-                noise = enough = self._noise(tolerance)
+                descent, measured, due = _descent(B, S), True, False
+            else:
+                descent = broyden(descent, step, residual)
             goal, step, better = self.aim(gap, a, descent, size, start)
             residual = gap if goal is None else list(map(sub, gap, goal))
             norm = max(map(abs, residual))
@@ -193,10 +182,6 @@ class StepSolver(Coupling):
         if len(state.of_size) > SIZES_REMEMBERED:  # the one that was used least recently is forgotten
             del state.of_size[next(iter(state.of_size))]
         return step_of(Step, (time, size, acting, NO_FORCE, start, (upper_end, lower_end)))
-
-    def _noise(self, tolerance: float) -> float:
-        """Return up to which residual [m] an iteration that stagnates may have met the bodies' own rounding."""
-        return max(_NOISE * tolerance, _ROUNDING * self._expected)
 
     def _free_response(self, lower: Body, size: float) -> Matrix:
         if lower.mass == inf:
