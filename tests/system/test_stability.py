@@ -93,6 +93,14 @@ def test_a_cell_is_stopped_by_what_its_last_steps_show_when_it_is_cut(monkeypatc
     assert "jacobi of degree 0 has changed the energy" in outcome["reason"]
 
 
+def test_a_spring_that_escapes_is_stopped_and_has_kept_its_energy():
+    """Its potential and its kinetic energy are 1e31 J and cancel to 1e23: beside that IDA's tolerance was 6e-5."""
+    outcome = run_cell(sampled_cells(100, 1)[53])
+    assert outcome["kind"] == "stopped"
+    assert "past its hilltop" in outcome["reason"]
+    assert outcome["residual"] < EXACT
+
+
 # -- mutations ------------------------------------------------------------------------------------------------------
 
 #: What the beam is given for the force of a step, beside which is that of the step before.

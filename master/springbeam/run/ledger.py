@@ -46,7 +46,9 @@ def errors(
         found, initial = ledger(scene, steps, of_interface=of_interface), float(first["energy_at_start"][0])
         if of_interface and scene.foreign:
             initial = float(ledger(scene, first, of_interface=True)["e_total"][0])
-        size = np.abs(found["e_beam"]) + np.abs(found["e_spring"]) + found["e_contact"]
+        # Beyond its hilltop a softening spring has a negative potential, which may cancel its kinetic energy.
+        of_spring = np.maximum(np.abs(found["e_spring"]), steps["spring_kinetic"])
+        size = np.abs(found["e_beam"]) + of_spring + found["e_contact"]
         largest = np.maximum.accumulate(np.maximum(size, max(scale, abs(initial))))
         residual = found["e_total"] - initial
         return np.divide(residual, largest, out=np.zeros_like(residual), where=largest > 0.0), largest
