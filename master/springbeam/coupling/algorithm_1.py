@@ -97,7 +97,8 @@ class Algorithm1(Coupling):
             self.state.injected_into_beam += (contact - inside) * (u_new - u)
             worked = (foundation - pressing + self._spring.external_force) * (y_new - y)
             after = lower.energies()
-            self.state.injected_into_spring += after.kinetic + after.potential - kinetic - potential - worked
+            gained = after.kinetic + after.potential + after.dissipated - kinetic - potential - dissipated
+            self.state.injected_into_spring += gained - worked
         self.state.law_force, self.state.made = inside, (phase, size * foundation)
         ends = (upper.motion(), lower.motion())
         return Step(time, size, (contact, 0.0, 0.0), (foundation, 0.0, 0.0), start, ends)
