@@ -15,7 +15,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import springbeam
-from springbeam.bodies.fmu_bodies import release
+from springbeam.bodies.fmu import release
 from springbeam.monolithic import event_driven
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -11,8 +11,8 @@ from measure import Row, Times, below, compare, median_and_spread, ratio_row, sh
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.bodies.factory import load_bodies
-from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring, release
-from springbeam.bodies.functions import Slave
+from springbeam.bodies.fmu import Fmu, release
+from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
 from springbeam.monolithic import algorithm1
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
@@ -26,7 +26,7 @@ class Inside:
 
     def __init__(self):
         self.seconds, self.calls = 0.0, 0
-        self._bound, self._advancing = Slave.bound, Slave.advancing
+        self._bound, self._advancing = Fmu.bound, Fmu.advancing
 
     def _timed(self, function):
         def call():
@@ -39,19 +39,19 @@ class Inside:
         return call
 
     def __enter__(self):
-        def bound(slave, name, *arguments):
-            function = self._bound(slave, name, *arguments)
+        def bound(fmu, name, *arguments):
+            function = self._bound(fmu, name, *arguments)
             return self._timed(function) if name in STEPPING else function
 
-        def advancing(slave, *arguments):
-            advance, *arrays = self._advancing(slave, *arguments)
+        def advancing(fmu, *arguments):
+            advance, *arrays = self._advancing(fmu, *arguments)
             return self._timed(advance), *arrays
 
-        Slave.bound, Slave.advancing = bound, advancing
+        Fmu.bound, Fmu.advancing = bound, advancing
         return self
 
     def __exit__(self, *_):
-        Slave.bound, Slave.advancing = self._bound, self._advancing
+        Fmu.bound, Fmu.advancing = self._bound, self._advancing
 
 
 def nothing(times=20_000):

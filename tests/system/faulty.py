@@ -11,7 +11,7 @@ from pathlib import Path
 
 from springbeam.bodies import fmu as fmus
 from springbeam.bodies import functions
-from springbeam.bodies.fmu_bodies import release
+from springbeam.bodies.fmu import release
 from springbeam.coupling.algorithm_1 import Algorithm1
 from springbeam.run import detection
 from springbeam.run.master import Master

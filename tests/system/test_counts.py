@@ -8,7 +8,7 @@ import pytest
 from faulty import installed
 
 from springbeam import Simulation, load_scene, simulate, with_changes
-from springbeam.bodies.fmu_bodies import release
+from springbeam.bodies.fmu import release
 from springbeam.contact.phases import Joint
 
 SET_SLOPES = "fmi2SetRealInputDerivatives"

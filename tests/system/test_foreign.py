@@ -18,6 +18,7 @@ from scenes import kinds
 
 from springbeam import RunStopped, SceneError, resume, simulate, with_changes
 from springbeam.bodies import isolated
+from springbeam.bodies.foreign import ForeignBody
 from springbeam.bodies.protocol import FmuError
 from springbeam.results.directory import RunDirectory
 from springbeam.results.files import load_summary
@@ -296,8 +297,8 @@ def test_an_fmu_that_hangs_is_given_up(fmu):
 def test_the_process_of_an_fmu_that_hangs_ends_with_the_master(fmu, hanging):
     """That it is gone is what the process sees: nobody holds its standard input open."""
     spec = pair(fmu(), spring={"parameters": {"lie": oscillator.LIES["late hang"]}}).lower
-    body = isolated.IsolatedBody(spec, False, 0.0, None)
-    process = body._process._process
+    body = ForeignBody(spec, False, 0.0, None)
+    process = body._port._process._process
     process.send_signal(signal.SIGINT)  # Ctrl-C in a terminal, which the process leaves to the master
 
     def gone():
@@ -306,7 +307,7 @@ def test_the_process_of_an_fmu_that_hangs_ends_with_the_master(fmu, hanging):
         process.stdin.close()
 
     ending = threading.Thread(target=gone)
-    body.PATIENCE = HANGS + 3600.0
+    body._port.patience = HANGS + 3600.0
     ending.start()
     with pytest.raises(FmuError, match=r"crashed \(exit code 1.*\) in its step at t = 1\.5 s"):
         body.advance(1.5, 0.1, (0.0, 0.0, 0.0))
@@ -319,8 +320,8 @@ def test_a_process_waits_for_the_next_body_of_its_file(fmu, monkeypatch):
 
     def used(path, lie="none"):
         spec = pair(path, spring={"parameters": {"lie": oscillator.LIES[lie]}}).lower
-        body = isolated.IsolatedBody(spec, False, 0.0, None)
-        process = body._process
+        body = ForeignBody(spec, False, 0.0, None)
+        process = body._port._process
         with suppress(FmuError):
             body.advance(1.5, 0.1, (0.0, 0.0, 0.0))
         body.close()
@@ -339,7 +340,7 @@ def test_a_process_waits_for_the_next_body_of_its_file(fmu, monkeypatch):
 
 
 def test_ctrl_c_names_an_fmu_that_does_not_return(fmu, monkeypatch, hanging):
-    monkeypatch.setattr(isolated.IsolatedBody, "PATIENCE", HANGS + 3600.0)  # it is not given up before
+    monkeypatch.setattr(ForeignBody, "PATIENCE", HANGS + 3600.0)  # it is not given up before
 
     def interrupting():
         while not hanging():

@@ -9,7 +9,8 @@ import pytest
 from springbeam import PointMass, RunStopped, SceneError, load_scene, simulate, with_changes
 from springbeam.bodies import fmu, fmu_bodies
 from springbeam.bodies.factory import load_bodies
-from springbeam.bodies.fmu_bodies import FmuSpring, release
+from springbeam.bodies.fmu import MOST_KEPT, release
+from springbeam.bodies.fmu_bodies import FmuSpring
 from springbeam.bodies.protocol import NO_FORCE, StepRefused
 
 SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 1e-3}, time={"t_end": 0.25})
@@ -90,7 +91,7 @@ def test_loads_add_to_the_constant_ones():
 
 
 def test_what_was_dissipated_before_a_restart_counts():
-    spring = FmuSpring.of(with_changes(SOFT, spring={"damping": 2.0}).spring, 0.0)
+    spring = FmuSpring(with_changes(SOFT, spring={"damping": 2.0}).spring, 0.0)
     spring.restart(0.0, 0.1, -1.0, dissipated=0.5)
     spring.advance(0.0, 1e-6, NO_FORCE)
     assert spring.energies().dissipated == pytest.approx(0.5 + 2e-6, rel=1e-6)
@@ -104,7 +105,7 @@ def test_few_are_kept_and_the_oldest_is_freed(monkeypatch):
     springs = [with_changes(load_scene("duffing"), spring={"mass": m}, time={"t_end": 0.1}) for m in range(1, 7)]
     for scene in springs:
         simulate(scene)
-    assert len(closed) == len(springs) - fmu_bodies._MOST_KEPT
+    assert len(closed) == len(springs) - MOST_KEPT
     release()
     assert len(closed) == len(springs)
     assert not any(one.faultless for one in closed)

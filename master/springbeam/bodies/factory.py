@@ -13,8 +13,7 @@ from ..scene.statics import resting_height, tip_compliance, tip_load_deflection
 from .archive import fmu_directory, own_fmu
 from .elements import ELEMENTS
 from .fmu_bodies import FmuBeam, FmuSpring
-from .foreign import Findings
-from .isolated import IsolatedBody
+from .foreign import Findings, ForeignBody
 from .probe import examined
 from .protocol import Body, FmuError
 from .quasi_static import QuasiStaticBeam
@@ -51,9 +50,9 @@ def _body(
 ) -> Body:
     if isinstance(spec, ForeignFmu):
         assert found is not None
-        return IsolatedBody(spec, spec is scene.upper, start_time, found)
+        return ForeignBody(spec, spec is scene.upper, start_time, found)
     if isinstance(spec, Spring):
-        return FmuSpring.of(spec, start_time, top_at_rest(scene, contact) if scene.static else None)
+        return FmuSpring(spec, start_time, top_at_rest(scene, contact) if scene.static else None)
     if isinstance(spec, Beam):
         return (_massless_beam if scene.massless else _beam)(scene, spec, start_time, contact)
     return ELEMENTS[spec.element](**spec.model_dump(exclude={"element"}))
@@ -64,7 +63,7 @@ def _beam(scene: Scene, spec: Beam, start_time: float, contact: float) -> Body:
         spec = spec.model_copy(update={"integrator": "generalized_alpha", "rho_inf": 1.0, "n_modes": 0})
     slope = spec.initial_deflection_slope + start_time * spec.initial_velocity_slope
     held = (0.0, scene.loads, contact) if scene.static else (slope, scene.loads)
-    return FmuBeam.of(spec, start_time, *held)
+    return FmuBeam(spec, start_time, *held)
 
 
 def _massless_beam(scene: Scene, spec: Beam, start_time: float, contact: float) -> Body:

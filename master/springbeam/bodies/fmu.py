@@ -1,4 +1,8 @@
-"""One instance of a co-simulation FMU and its state."""
+"""One instance of a co-simulation FMU and its state.
+
+FMPy does what is done once. It looks at each argument of each call, which takes as long as the call: what a step calls
+is bound to its arguments here, and `advance.cpp` makes the calls of one advance together.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +10,19 @@ import atexit
 import difflib
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from ctypes import byref, c_int, c_uint, c_void_p
-from functools import lru_cache
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from contextlib import suppress
+from ctypes import byref, c_double, c_int, c_size_t, c_uint, c_void_p, cast
+from functools import cache, lru_cache, partial
 from math import prod
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, read_model_description
 
-from .archive import UnsafeArchive, unpack
-from .functions import DISCARD, ERROR, FATAL, FMU2, FMU3, VERSIONS, WARNING, Call
+from .archive import UnsafeArchive, own_fmu, unpack
+from .functions import DISCARD, ERROR, FATAL, FMU2, FMU3, VERSIONS, WARNING, Advance, advances
 from .protocol import FmuError, StepRefused
 
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
@@ -49,6 +53,9 @@ def _opened(path: Path, modified: int) -> tuple[ModelDescription, FMU2 | FMU3]:
 
 #: A value of a parameter.
 Value = float | int | bool | str
+#: A function with its arguments, which returns its status.
+Call = Callable[[], int]
+_T = TypeVar("_T")
 
 
 class Fmu:
@@ -66,31 +73,26 @@ class Fmu:
         [s].
     """
 
-    _slave: Any  #: FMPy's FMU
-
     def __init__(self, name: str | None, path: Path, parameters: Mapping[str, Value], start_time: float) -> None:
         self.path, self._own = path, name is not None
         self._name = path.stem if name is None else name
         self._message = ""  #: the last that the FMU has logged
         self._worst = 0  #: status of the calls that have failed
-        #: Whether anything happened since the state was marked.
-        self.moved = False
-        #: doStep calls, and how often the state was set back.
-        self.steps = self.rewinds = 0
-        self._state = c_void_p()
-        self._start: Any = None  #: the state as initialised, if it is kept
         self._closed = False
-        self._slave = slave = self._load()
-        self.real, self.version = slave.REAL, slave.VERSION  #: the type of real variables, and the version of FMI
+        #: The state as marked, and as initialised, of our own FMUs.
+        self._state, self._start = c_void_p(), None
+        self._key: Hashable = None  #: what the instance was made of, of those of `of`
+        #: Parameters by how FMPy sets them and by value reference.
+        self._parameters: dict[str, dict[int, Value]] = {}
+        #: Returns ``kind(fmu, *arguments)``, made once: as an instance is kept, so are the calls bound for it.
+        self.once = cache(self._made)
+        self._slave: Any = self._load()
         try:
-            if self.says.canGetAndSetFMUstate:
-                self.get_state = self.bound(f"Get{slave.STATE}", byref(self._state))
-                self.set_state = self.bound(f"Set{slave.STATE}", self._state)
-            #: Parameters by how FMPy sets them and by value reference.
-            self._parameters: dict[str, dict[int, Value]] = {}
             for parameter, value in parameters.items():
                 self._give(parameter, value)
-            self.initialise(start_time)
+            self._initialise(start_time)
+            if self._own:
+                self._start = self._asked("cannot save the state", self._slave.getFMUState)
         except BaseException:
             self.close()
             raise
@@ -103,19 +105,21 @@ class Fmu:
         identifier = description.coSimulation.modelIdentifier
         if self._own and identifier != self._name:
             raise FmuError(f"{self.path}: model identifier {identifier!r}, expected {self._name!r}")
-        #: What it says it can do.
-        self.says = description.coSimulation
+        #: What it says it can do, and the version of FMI.
+        self.says, self.version = description.coSimulation, opened.VERSION
         self._variables = {v.name: v for v in description.modelVariables}
         try:
             return opened.instance(self._name, self._log)
         except Exception as error:  # FMPy's own have no other type
             raise FmuError(f"{self.path}: cannot be instantiated: {self._cause(error)}") from error
 
-    @contextmanager
-    def _asked(self, what: str) -> Iterator[None]:
-        """Name the FMU if one of its functions that FMPy calls fails, or is missing."""
+    def _made(self, kind: Callable[..., _T], *arguments: Any) -> _T:
+        return kind(self, *arguments)
+
+    def _asked(self, what: str, function: Callable[..., _T], *arguments: Any) -> _T:
+        """Return what ``function`` does; FmuError names ``what`` the FMU cannot do if that fails, or is missing."""
         try:
-            yield
+            return function(*arguments)
         except FMICallException as error:
             raise self.failed(error.status, what) from None
         except OSError as error:
@@ -129,59 +133,75 @@ class Fmu:
         kind = self._slave.ENUMERATION if variable.type == "Enumeration" else variable.type
         if not self._slave.holds(kind, value):
             raise FmuError(f"{self.path}: {name} = {value!r}: variable {name!r} is {variable.type} and cannot be that")
-        self._parameters.setdefault(f"set{kind}", {})[self.references([name], variable.type)[0]] = value
+        self._parameters.setdefault(f"set{kind}", {})[self._references([name], variable.type)[0]] = value
 
-    def initialise(self, time: float) -> None:
+    def _initialise(self, time: float) -> None:
         """Set parameters and start values and leave initialization mode at ``time`` [s]."""
 
         def set_parameters() -> None:
             for setter, given in self._parameters.items():
                 getattr(self._slave, setter)(list(given), list(given.values()))
 
-        with self._asked("cannot be initialised"):
-            self._slave.initialise(time, set_parameters)
+        self._asked("cannot be initialised", self._slave.initialise, time, set_parameters)
 
     def reset(self, time: float, changed: Mapping[str, float]) -> None:
         """Start again at ``time`` with some parameters changed."""
         for name, value in changed.items():
             self._give(name, value)
-        with self._asked("cannot be reset"):
-            self._slave.reset()
-        self.initialise(time)
+        self._asked("cannot be reset", self._slave.reset)
+        self._initialise(time)
 
-    @property
-    def faultless(self) -> bool:
-        """Whether every call so far did what it was asked for."""
-        return not self._closed and self._worst <= WARNING
+    # -- calls bound to their arguments --------------------------------------------------------------------------------
+
+    def _function(self, name: str) -> Any:
+        """Return a pointer of our own to a function, without types. Raises FmuError if the library lacks it."""
+        return self._asked("cannot be used", self._slave.dll.__getitem__, self._slave.PREFIX + name)
 
     def bound(self, name: str, *arguments: Any) -> Call:
-        """Return a function with its arguments, as FMPy's FMU does. Raises FmuError if the library lacks it."""
-        with self._asked("cannot be used"):
-            bound: Call = self._slave.bound(name, *arguments)
-        return bound
+        """Return a function with its arguments, which are converted once; what is given by `byref` stays where it is.
+
+        Raises FmuError if the library lacks it.
+        """
+        function = self._function(name)
+        function.restype = c_int
+        return partial(function, c_void_p.from_param(self._slave.component), *arguments)
+
+    def of_state(self) -> tuple[Call, Call]:
+        """Return what saves the state and what restores it."""
+        name = self._slave.STATE
+        return self.bound(f"Get{name}", byref(self._state)), self.bound(f"Set{name}", self._state)
 
     def accessor(self, verb: str, names: Sequence[str], values: Any, size: int = 1) -> Call:
         """Return what gets or sets (``verb``) variables of ``size`` real numbers each by ``values``, an array of C."""
-        references = self.references(names, self.real, size)
-        with self._asked("cannot be used"):
-            accessor: Call = self._slave.accessor(verb, references, values)
-        return accessor
+        references = self._references(names, self._slave.REAL, size)
+        counts = [c_size_t.from_param(n) for n in (len(references), len(values))]
+        last = counts[1:] if self._slave.COUNTED else []
+        return self.bound(verb + self._slave.REAL, byref(references), counts[0], byref(values), *last)
 
     def advancing(self, inputs: Sequence[str], slopes: int, outputs: Sequence[str], always: bool) -> Any:
-        """Return what makes an advance, and the arrays of C that it takes and leaves numbers in: see `Slave.advancing`.
+        """Return what makes an advance, and the arrays of C from which it takes what is given and leaves what is told.
 
-        Derivatives 1 … ``slopes`` of each input follow the inputs, those of one after another.
+        Derivatives 1 … ``slopes`` of each input follow the inputs, those of one after another. It returns 0, or what
+        `Failure` says.
         """
+        slave = self._slave
         each = [(name, order) for name in inputs for order in range(1, slopes + 1)]
-        if self.version == FMU3.VERSION:
-            sloped = [f"der({name}{f',{order}' if order > 1 else ''})" for name, order in each]
-        else:
-            sloped = [name for name, _ in each]
-        orders = (c_int * len(each))(*[order for _, order in each])
-        references = (self.references(names, self.real) for names in (inputs, sloped, outputs))
-        set_, derivatives, read = references
-        with self._asked("cannot be used"):
-            return self._slave.advancing(set_, derivatives, orders, read, always)
+        derivatives = [slave.DERIVATIVES[order - 1].format(name) for name, order in each]
+        named = {"set": f"Set{slave.REAL}", "step": "DoStep", "get": f"Get{slave.REAL}"}
+        if each:
+            named["set_derivatives"] = slave.SET_DERIVATIVES
+        of_inputs, of_derivatives, of_outputs = (
+            self._references(names, slave.REAL) for names in (inputs, derivatives, outputs)
+        )
+        given, told = (c_double * (2 + len(inputs) + len(each)))(), (c_double * len(outputs))()
+        advance = Advance(
+            slave.component, n_inputs=len(inputs), n_derivatives=len(each), n_outputs=len(outputs), inputs=of_inputs,
+            derivatives=of_derivatives, outputs=of_outputs, orders=(c_int * len(each))(*[order for _, order in each]),
+            given=given, told=told, always=always,
+            **{key: cast(self._function(name), c_void_p) for key, name in named.items()},
+        )  # fmt: skip
+        library = self._asked("cannot be used", advances)
+        return partial(library[f"advance{self.version[0]}"], byref(advance)), given, told
 
     def variable(self, name: str) -> Any:
         """Return what the FMU says of a variable. Raises FmuError if it has none of this name."""
@@ -192,7 +212,12 @@ class Fmu:
             meant = f"; did you mean {close[0]!r}?" if close else ""
             raise FmuError(f"{self.path}: has no variable {name!r}{meant}") from None
 
-    def references(self, names: Sequence[str], kind: str, size: int = 1) -> Any:
+    def real(self, name: str) -> Any:
+        """Return what the FMU says of a real variable. Raises FmuError if it is none."""
+        self._references([name], self._slave.REAL)
+        return self.variable(name)
+
+    def _references(self, names: Sequence[str], kind: str, size: int = 1) -> Any:
         """Return value references of variables of one type and size, as an array of C. Raises FmuError."""
         for name in names:
             if (variable := self.variable(name)).type != kind:
@@ -201,17 +226,7 @@ class Fmu:
                 raise FmuError(f"{self.path}: variable {name!r} is an array; only single numbers can be used")
         return (c_uint * len(names))(*[int(self.variable(name).valueReference) for name in names])
 
-    def keep_start(self) -> None:
-        """Remember the present state as the one `return_to_start` sets."""
-        with self._asked("cannot save the state"):
-            self._start = self._slave.getFMUState()
-
-    def return_to_start(self) -> None:
-        """Set the state of `keep_start`, as a new instance has it."""
-        with self._asked("cannot restore the state"):
-            self._slave.setFMUState(self._start)
-        self.moved, self.steps, self.rewinds = False, 0, 0
-        self._message = ""
+    # -- what went wrong -----------------------------------------------------------------------------------------------
 
     def refuse(self, status: int, time: float, otherwise: str = "") -> NoReturn:
         """Raise StepRefused, or FmuError, for a step from ``time`` [s] that has returned ``status``."""
@@ -227,20 +242,59 @@ class Fmu:
         self._worst = max(self._worst, status)
         return FmuError(f"{self.path}: {what}: {self._cause(f'it returned {_STATUS[status]}')}")
 
+    def _log(self, status: int, text: bytes | None) -> None:
+        if status > 0:
+            self._message = (text or b"").decode("utf-8", "replace")
+
+    def _cause(self, otherwise: Exception | str) -> str:
+        message, self._message = self._message, ""
+        return message or str(otherwise)
+
+    # -- its state, and how long it lives ------------------------------------------------------------------------------
+
     def serialized(self) -> bytes:
         """Return the present state as the FMU writes it. Raises FmuError."""
-        with self._asked("cannot save the state"):
-            state = self._slave.getFMUState()
-            content: bytes = self._slave.serializeFMUState(state)
-            self._slave.freeFMUState(state)
+        state = self._asked("cannot save the state", self._slave.getFMUState)
+        content: bytes = self._asked("cannot save the state", self._slave.serializeFMUState, state)
+        self._asked("cannot save the state", self._slave.freeFMUState, state)
         return content
 
     def deserialize(self, content: bytes) -> None:
         """Go on from what `serialized` of an equal FMU returned. Raises FmuError."""
-        with self._asked("cannot restore the state"):
-            state = self._slave.deserializeFMUState(content)
-            self._slave.setFMUState(state)
-            self._slave.freeFMUState(state)
+        state = self._asked("cannot restore the state", self._slave.deserializeFMUState, content)
+        self._asked("cannot restore the state", self._slave.setFMUState, state)
+        self._asked("cannot restore the state", self._slave.freeFMUState, state)
+
+    @classmethod
+    def of(cls, name: str, parameters: Mapping[str, Value], start_time: float) -> Fmu:
+        """Return an instance of our FMU ``name``, new or given back; both step to the same bits. Raises FmuError."""
+        path = own_fmu(name)
+        key = (path, path.stat().st_mtime_ns if path.is_file() else None, start_time, *parameters.items())
+        if (fmu := _kept.pop(key, None)) is None:
+            fmu = cls(name, path, parameters, start_time)
+            fmu._key = key
+            return fmu
+        fmu._message = ""
+        try:
+            fmu._asked("cannot restore the state", fmu._slave.setFMUState, fmu._start)
+        except FmuError:
+            fmu.close()
+            raise
+        return fmu
+
+    @property
+    def faultless(self) -> bool:
+        """Whether every call so far did what it was asked for."""
+        return not self._closed and self._worst <= WARNING
+
+    def give_back(self) -> None:
+        """Keep one of `of` for a later run, as making it takes longer than a short run; close it after a fault."""
+        if not self.faultless:
+            self.close()
+            return
+        _kept[self._key] = self
+        while len(_kept) > MOST_KEPT:
+            _kept.pop(next(iter(_kept))).close()
 
     def close(self) -> None:
         """Free the instance, unless it has returned fmi2Fatal: then none of its library may be called again."""
@@ -249,18 +303,23 @@ class Fmu:
         self._closed = True
         for state in (self._state, self._start):
             if state and self._worst < FATAL:
-                with suppress(FmuError), self._asked("cannot free a state"):
-                    self._slave.freeFMUState(state)
+                with suppress(FmuError):
+                    self._asked("cannot free a state", self._slave.freeFMUState, state)
         if self._worst == FATAL:
             _opened.cache_clear()  # the next instance takes a copy of the library of its own
         else:
             with suppress(OSError):
                 self._slave.freeInstance()
 
-    def _log(self, status: int, text: bytes | None) -> None:
-        if status > 0:
-            self._message = (text or b"").decode("utf-8", "replace")
 
-    def _cause(self, otherwise: Exception | str) -> str:
-        message, self._message = self._message, ""
-        return message or str(otherwise)
+#: Most instances that are kept: those of two scenes.
+MOST_KEPT = 4
+#: Instances that were given back, by what they were made of; the last one was given back last.
+_kept: dict[Hashable, Fmu] = {}
+
+
+@atexit.register
+def release() -> None:
+    """Free the instances that are kept."""
+    while _kept:
+        _kept.popitem()[1].close()

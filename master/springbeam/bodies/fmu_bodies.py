@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import atexit
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from ctypes import c_double
 from functools import partial
 from math import isfinite
@@ -12,16 +11,14 @@ from typing import Any, ClassVar, NamedTuple, NoReturn
 
 import msgspec
 import numpy as np
-from typing_extensions import Self
 
 from ..scene import Beam, Load, Spring
 from ..scene.statics import SHAPE_POINTS
-from .archive import own_fmu
 from .elements import EndLoaded
-from .fmu import Fmu
+from .fmu import Fmu, Value
 from .force import combined
-from .functions import DISCARD, WARNING, Failure
-from .protocol import NO_FORCE, BeamBody, Body, Energies, Felt, FmuError, Force, Motion, StepRefused
+from .functions import DISCARD, OK, WARNING, Failure
+from .protocol import NO_FORCE, BeamBody, Body, BodyFailed, Energies, Felt, FmuError, Force, Motion, StepRefused
 
 #: The numbers by which the beam FMU knows its alternatives.
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
@@ -52,9 +49,107 @@ class Reals:
 
     def set(self, values: Sequence[float]) -> None:
         self.values[:] = values
-        self._fmu.moved = True
         if (status := self._write()) > WARNING:
             raise self._fmu.failed(status, f"cannot set {', '.join(self.names)}")
+
+
+#: What FMI 3.0 lets an FMU ask for after a step, and is not given.
+_ASKED = {
+    Failure.ENDS: "fmi3DoStep asks that the simulation end (terminateSimulation)",
+    Failure.EARLY: "fmi3DoStep returned early, which it was not allowed to (earlyReturn)",
+    Failure.EVENT: "fmi3DoStep asks for event mode, which it was told is not used (eventHandlingNeeded)",
+}
+
+
+#: What it means that a call for the state fails.
+CANNOT = {"get_state": "cannot save the state", "set_state": "cannot restore the state"}
+
+
+class Port:
+    """What a run does with an FMU: its calls, and nothing of what they mean.
+
+    Parameters
+    ----------
+    inputs, outputs, impulse
+        Names of variables. A step sets the inputs and tells the outputs; an impulse, if the FMU takes one, acts at the
+        start of the next step.
+    slopes
+        Highest derivative of the inputs that a step sets; those that are all 0 only ``always``.
+    repeats
+        Whether the state can be saved and restored.
+    """
+
+    def __init__(
+        self,
+        fmu: Fmu,
+        inputs: tuple[str, ...],
+        outputs: tuple[str, ...],
+        impulse: tuple[str, ...],
+        slopes: int = 2,
+        always: bool = False,
+        repeats: bool = True,
+    ) -> None:
+        self.path, self._fmu, self._inputs = fmu.path, fmu, inputs
+        self._outputs, self._impulse = Reals(fmu, *outputs), Reals(fmu, *impulse)
+        Reals(fmu, *inputs)  # a wrong reference is found before the run
+        self._advance, self._given, told = fmu.advancing(inputs, slopes, outputs, always)
+        self._write = partial(Struct(f"{len(self._given)}d").pack_into, self._given, 0)
+        self._told = partial(Struct(f"{len(told)}d").unpack, told)
+        #: Save the state, and return to it; both return their status.
+        self.get_state, self.set_state = fmu.of_state() if repeats else (lambda: OK, self._refuse_to_repeat)
+
+    def read(self) -> tuple[float, ...]:
+        """Return the outputs. Raises StepRefused if one is not finite."""
+        return self._finite(self._outputs.get())
+
+    def _finite(self, told: tuple[float, ...]) -> tuple[float, ...]:
+        if not all(map(isfinite, told)):
+            values = ", ".join(f"{name} = {value}" for name, value in zip(self._outputs.names, told, strict=True))
+            raise StepRefused(f"not finite: {values} of {self.path.name}")
+        return told
+
+    def step(self, *given: float) -> tuple[float, ...]:
+        """Step by what is ``given``: time [s], size [s], inputs, and their derivatives; return the outputs."""
+        self._write(*given)
+        if code := self._advance():
+            self._stop(*divmod(code, 16))
+        return self._told()
+
+    def _stop(self, failure: int, status: int) -> NoReturn:
+        """Say why a step was not made."""
+        time, _, *inputs = self._given
+        failed = {
+            Failure.SET: f"cannot set {', '.join(self._inputs)}",
+            Failure.SET_DERIVATIVES: "cannot set input derivatives",
+            Failure.GET: f"cannot read {', '.join(self._outputs.names)}",
+        }
+        if failure in failed:
+            raise self._fmu.failed(status, failed[Failure(failure)])
+        if failure == Failure.INPUTS_NOT_FINITE:
+            raise StepRefused(f"{self.path.name}: the force it should step under is not finite: {inputs}")
+        if failure == Failure.OUTPUTS_NOT_FINITE:
+            self._finite(self._told())
+        self._fmu.refuse(max(status, DISCARD), time, _ASKED.get(Failure(failure), ""))
+
+    def strike(self, impulse: float) -> None:
+        """Let an upward ``impulse`` [N·s] act at the start of the next step."""
+        self._impulse.set((impulse,))
+
+    def failed(self, status: int, what: str) -> FmuError:
+        """Return the error of a call that returned ``status``."""
+        return self._fmu.failed(status, what)
+
+    def _refuse_to_repeat(self) -> NoReturn:
+        raise BodyFailed(f"{self.path}: a step had to be repeated, and its state cannot be restored")
+
+    def save(self) -> bytes:
+        return self._fmu.serialized()
+
+    def restore(self, content: bytes) -> None:
+        self._fmu.deserialize(content)
+
+    def close(self) -> None:
+        self._fmu.close()
 
 
 class FmuState(NamedTuple):
@@ -66,13 +161,6 @@ class FmuState(NamedTuple):
     dissipated: float = 0.0  #: before the FMU was last started again [J]
 
 
-#: What FMI 3.0 lets an FMU ask for after a step, and is not given.
-_ASKED = {
-    Failure.ENDS: "fmi3DoStep asks that the simulation end (terminateSimulation)",
-    Failure.EARLY: "fmi3DoStep returned early, which it was not allowed to (earlyReturn)",
-    Failure.EVENT: "fmi3DoStep asks for event mode, which it was told is not used (eventHandlingNeeded)",
-}
-
 #: ``Motion(*values)`` and its like in a third of the time.
 _motion_of: Callable[[type[Motion], tuple[float, ...]], Motion] = tuple.__new__
 _energies_of: Callable[[type[Energies], tuple[float, ...]], Energies] = tuple.__new__
@@ -81,56 +169,117 @@ _state_of: Callable[[type[FmuState], tuple[Motion, tuple[float, ...], float, flo
 
 
 class FmuBody(Body):
-    """What both bodies do alike; a subclass names its variables."""
+    """A body of an FMU: what the numbers mean that go through its port."""
 
-    _MOTION: tuple[str, ...]
-    _ENERGIES: tuple[str, ...]
-    _IMPULSE: tuple[str, ...]
-    _FORCES: tuple[str, ...]
-    _constants: dict[str, float]  #: of the scene, by the inputs that hold them from the start
-    _bears_loads = False  #: whether the last of the energies is the work of the loads
-    #: Highest derivative of a force that is handed over, and whether derivatives that are all 0 are, too.
-    _SLOPES: int = 2
-    _ALWAYS_SLOPED = False
     state: Any
+    _port: Port
+    _n_motion = 4  #: how many of the outputs are the motion; the others are energies
+    #: Whether anything happened since the state was marked.
+    _moved = False
+    #: Steps begun, and how often the state was set back.
+    steps = rewinds = 0
 
-    def __init__(self, fmu: Fmu) -> None:
-        self.fmu = fmu
+    def _begin(self, mass: float) -> None:
+        """Start, with what is ``mass`` [kg] to a force at the end, from the motion that the FMU was initialised to."""
+        if not isfinite(mass):
+            raise FmuError(f"{self._port.path}: the mass of its end is {mass}")
+        self.mass = mass
         try:
-            self._prepare(fmu)
+            self._take(self._port.read())
+        except StepRefused as refused:
+            raise FmuError(f"{self._port.path}: starts with a motion that is {refused}") from refused
+        super().mark()
+
+    def mark(self) -> None:
+        port = self._port
+        if (status := port.get_state()) > WARNING:
+            raise port.failed(status, CANNOT["get_state"])
+        self._moved, self._marked = False, self.state
+
+    def rewind(self) -> None:
+        if self._moved:
+            port = self._port
+            if (status := port.set_state()) > WARNING:
+                raise port.failed(status, CANNOT["set_state"])
+            self._moved, self.state = False, self._marked
+            self.rewinds += 1
+
+    def save(self) -> bytes:
+        return msgspec.msgpack.encode((super().save(), self.steps, self.rewinds, self._port.save()))
+
+    def restore(self, saved: bytes) -> None:
+        kept = msgspec.msgpack.decode(saved, type=tuple[bytes, int, int, bytes])
+        state, self.steps, self.rewinds, content = kept
+        super().restore(state)
+        self._port.restore(content)
+
+    def motion(self) -> Motion:
+        motion: Motion = self.state.motion
+        return motion
+
+    def apply_impulse(self, impulse: float) -> None:
+        # The FMU applies it at the start of its next step; motion and energies already show it.
+        motion, pending = self.state.motion, self.state.pending + impulse
+        self._moved = True
+        self._port.strike(pending)
+        struck = motion._replace(velocity=motion.velocity + impulse / self.mass)
+        self.state = self.state._replace(motion=struck, pending=pending)
+
+    def _take(self, told: tuple[float, ...]) -> Motion:
+        """Take what the FMU has told as the present motion and energies, with no impulse pending; return the motion."""
+        raise NotImplementedError
+
+    def _stored(self) -> tuple[float, ...]:
+        """Return the energies [J]; the kinetic one has the impulse that is still pending."""
+        motion, told, pending, *_ = self.state
+        kinetic, *others = told[self._n_motion :]
+        if pending != 0.0:
+            kinetic += 0.5 * pending * (motion.velocity - pending / self.mass + motion.velocity)
+        return (kinetic, *others)
+
+    def close(self) -> None:
+        self._port.close()
+
+
+class OwnBody(FmuBody):
+    """A body of an FMU of this project, whose instance may have been another's: see `Fmu.of`."""
+
+    NAME: ClassVar[str]  #: of the FMU
+    _MOTION: ClassVar[tuple[str, ...]]
+    _ENERGIES: ClassVar[tuple[str, ...]]
+    _IMPULSE: ClassVar[tuple[str, ...]]
+    _FORCES: ClassVar[tuple[str, ...]]
+    tells = True
+    _constants: dict[str, float]  #: of the scene, by the inputs that hold them from the start
+    #: By input of the FMU: what is added to it by a unit of which load.
+    _shares: dict[str, list[tuple[int, float]]]
+    #: The loads of a step, and two derivatives of each.
+    _loads: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+
+    def __init__(self, parameters: dict[str, Value], start_time: float) -> None:
+        self.fmu, self.state, self._shares = Fmu.of(self.NAME, parameters, start_time), FmuState(), {}
+        try:
+            self._connect()
+            self._begin(self._mass())
         except BaseException:
-            fmu.close()
+            self.fmu.close()
             raise
 
-    def _prepare(self, fmu: Fmu) -> None:
-        self._impulse = Reals(fmu, *self._IMPULSE)
-        self._prepare_step(())
-        self.mass = self._mass()
-        if not isfinite(self.mass):
-            raise FmuError(f"{fmu.path}: the mass of its end is {self.mass}")
-        self._begin()
+    def _mass(self) -> float:
+        raise NotImplementedError
 
-    def _prepare_step(self, loads: Sequence[str]) -> None:
-        """Prepare what a step sets, the forces and ``loads``, inputs of the FMU, and what it reads."""
-        fmu, names = self.fmu, (*self._FORCES, *loads)
-        self._outputs = Reals(fmu, *self._MOTION, *self._ENERGIES)
-        Reals(fmu, *names)  # a wrong reference is found before the run
-        made = fmu.advancing(names, self._SLOPES, self._outputs.names, self._ALWAYS_SLOPED)
-        self._advance, self._given, told = made
-        self._write = partial(Struct(f"{len(self._given)}d").pack_into, self._given, 0)
-        self._told = partial(Struct(f"{len(told)}d").unpack, told)
-        #: The loads of a step, and two derivatives of each.
-        self._loads: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,) * len(loads), (0.0,) * (2 * len(loads)))
+    def _connect(self) -> None:
+        """Prepare what a step sets and tells: under loads, also these and their work."""
+        inputs = (*self._FORCES, *self._shares)
+        energies = (*self._ENERGIES[:3], "load_work") if self._shares else self._ENERGIES
+        self._port = self.fmu.once(Port, inputs, (*self._MOTION, *energies), self._IMPULSE)
 
     def expect_loads(self, loads: Sequence[Load]) -> None:
-        #: By input of the FMU: what is added to it by a unit of which load.
-        self._shares: dict[str, list[tuple[int, float]]] = {}
         for number, load in enumerate(loads):
             for name, share in self._inputs_of(load):
                 self._shares.setdefault(name, []).append((number, share))
-        self._ENERGIES, self._bears_loads = (*self._ENERGIES[:3], "load_work"), True
-        self._prepare_step(tuple(self._shares))
-        self._tell()
+        self._connect()
+        self._take(self._port.read())
 
     def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
         """Return the inputs of the FMU that ``load`` acts by, and how much of it each takes."""
@@ -145,163 +294,18 @@ class FmuBody(Body):
             slopes += [df, ddf]
         self._loads = (tuple(values), tuple(slopes))
 
-    def _mass(self) -> float:
-        raise NotImplementedError
-
-    @property
-    def steps(self) -> int:
-        """doStep calls so far."""
-        return self.fmu.steps
-
-    @property
-    def rewinds(self) -> int:
-        """How often the state was set back."""
-        return self.fmu.rewinds
-
-    def mark(self) -> None:
-        fmu = self.fmu
-        if (status := fmu.get_state()) > WARNING:
-            raise fmu.failed(status, "cannot save the state")
-        fmu.moved = False
-        self._marked = self.state
-
-    def rewind(self) -> None:
-        fmu = self.fmu
-        if fmu.moved:
-            if (status := fmu.set_state()) > WARNING:
-                raise fmu.failed(status, "cannot restore the state")
-            fmu.moved = False
-            fmu.rewinds += 1
-            self.state = self._marked
-
-    def save(self) -> bytes:
-        fmu = self.fmu
-        return msgspec.msgpack.encode((super().save(), fmu.steps, fmu.rewinds, fmu.serialized()))
-
-    def restore(self, saved: bytes) -> None:
-        kept = msgspec.msgpack.decode(saved, type=tuple[bytes, int, int, bytes])
-        state, self.fmu.steps, self.fmu.rewinds, content = kept
-        super().restore(state)
-        self.fmu.deserialize(content)
-
-    def motion(self) -> Motion:
-        motion: Motion = self.state.motion
-        return motion
-
-    def apply_impulse(self, impulse: float) -> None:
-        # The FMU applies it at the start of its next step; motion and energies already show it.
-        motion, pending = self.state.motion, self.state.pending + impulse
-        self._impulse.set((pending,))
-        struck = motion._replace(velocity=motion.velocity + impulse / self.mass)
-        self.state = self.state._replace(motion=struck, pending=pending)
-
-    def _step(self) -> Motion:
-        """Step as was written: time [s], size [s], forces and loads, and their derivatives; return the motion."""
-        fmu = self.fmu
-        moved, fmu.moved = fmu.moved, True
-        if code := self._advance():
-            self._stop(*Failure.of(code), moved)
-        fmu.steps += 1
-        return self._take(self._told())
-
-    def _stop(self, failure: Failure, status: int, moved: bool) -> NoReturn:
-        """Say why a step was not made: see `Failure`. ``moved``: whether anything had happened before it."""
-        fmu, (time, _, *forces) = self.fmu, self._given
-        if failure is Failure.INPUTS_NOT_FINITE:
-            fmu.moved = moved
-            raise StepRefused(f"{fmu.path.name}: the force it should step under is not finite: {forces}")
-        if failure is Failure.SET:
-            raise fmu.failed(status, f"cannot set {', '.join(self._FORCES)} and loads")
-        if failure is Failure.SET_DERIVATIVES:
-            raise fmu.failed(status, "cannot set input derivatives")
-        fmu.steps += 1
-        if failure is Failure.GET:
-            raise fmu.failed(status, f"cannot read {', '.join(self._outputs.names)}")
-        if failure is Failure.OUTPUTS_NOT_FINITE:
-            self._check(self._told())
-        fmu.refuse(max(status, DISCARD), time, _ASKED.get(failure, ""))
-
-    def _begin(self) -> None:
-        """Read the motion that the FMU was initialised to."""
-        try:
-            self._tell()
-        except StepRefused as refused:
-            raise FmuError(f"{self.fmu.path}: starts with a motion that is {refused}") from refused
-        super().mark()
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        (c, dc, ddc), (n, dn, ddn), (values, slopes) = contact, foundation, self._loads
+        self.steps += 1
+        self._moved = True
+        if len(self._FORCES) == 1:  # nothing but the other body presses its end
+            return self._take(self._port.step(time, size, c, *values, dc, ddc, *slopes))
+        return self._take(self._port.step(time, size, c, n, *values, dc, ddc, dn, ddn, *slopes))
 
     def _take(self, told: tuple[float, ...]) -> Motion:
-        """Take what the FMU has told as the present motion and energies, with no impulse pending; return the motion."""
         motion = _motion_of(Motion, told[:4])
         self.state = _state_of(FmuState, (motion, told, 0.0, self.state.dissipated))
         return motion
-
-    def _tell(self) -> Motion:
-        """Read the motion, and the energies that belong to it."""
-        told = self._outputs.get()
-        self._check(told)
-        return self._take(told)
-
-    def _check(self, told: tuple[float, ...]) -> None:
-        """Raise StepRefused if the FMU has told a number that is not finite."""
-        if not all(map(isfinite, told)):
-            values = ", ".join(f"{name} = {value}" for name, value in zip(self._outputs.names, told, strict=True))
-            raise StepRefused(f"not finite: {values} of {self.fmu.path.name}")
-
-    def _stored(self) -> tuple[float, ...]:
-        """Return the energies [J]; the kinetic one has the impulse that is still pending."""
-        motion, told, pending, *_ = self.state
-        energies: tuple[float, ...] = told[len(self._MOTION) :]
-        if pending != 0.0:
-            before = motion.velocity - pending / self.mass
-            return (energies[0] + 0.5 * pending * (before + motion.velocity), *energies[1:])
-        return energies
-
-    def close(self) -> None:
-        self.fmu.close()
-
-
-#: Most bodies that are kept: those of two scenes.
-_MOST_KEPT = 4
-#: Closed bodies that a later run may take, by what they were made of; the last one was closed last.
-_kept: dict[Hashable, OwnBody] = {}
-
-
-class OwnBody(FmuBody):
-    """A body of an FMU of this project. It is kept when it is closed: to make it takes longer than a short run.
-
-    What is kept is the instance, with what follows from its parameters, and its state after initialisation.
-    """
-
-    NAME: ClassVar[str]  #: of the FMU
-    state: FmuState = FmuState()
-    tells = True
-    _key: Hashable = None  #: what the body was made of, if it is to be kept
-    _as_made: dict[str, Any]  #: the attributes then
-
-    @classmethod
-    def of(cls, *arguments: Any) -> Self:
-        """Return a body made of ``arguments``, new or kept; both step to the same bits. Raises FmuError."""
-        path = own_fmu(cls.NAME)
-        key = (cls, path, path.stat().st_mtime_ns if path.is_file() else None, arguments)
-        body = _kept.pop(key, None)
-        if not isinstance(body, cls):
-            body = cls(*arguments)
-            body._key, body._as_made = key, dict(vars(body))
-            body._guarded(body.fmu.keep_start)
-        else:
-            body._guarded(body.fmu.return_to_start)
-            as_made = body._as_made
-            vars(body).clear()
-            vars(body).update(as_made, _key=key, _as_made=as_made)
-        return body
-
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        (c, dc, ddc), (n, dn, ddn), (values, slopes) = contact, foundation, self._loads
-        if len(self._FORCES) == 1:  # nothing but the other body presses its end
-            self._write(time, size, c, *values, dc, ddc, *slopes)
-        else:
-            self._write(time, size, c, n, *values, dc, ddc, dn, ddn, *slopes)
-        return self._step()
 
     def energies(self) -> Energies:
         motion, told, pending, before = self.state
@@ -309,30 +313,11 @@ class OwnBody(FmuBody):
         if not load:  # the spring has none but its external force
             of_loads = -self._constants["external_force"] * motion.displacement
         else:
-            of_loads = -load[0] if self._bears_loads else load[0]
+            of_loads = -load[0] if self._shares else load[0]
         return _energies_of(Energies, (kinetic, potential, before + dissipated, of_loads))
 
-    def _guarded(self, call: Callable[[], None]) -> None:
-        try:
-            call()
-        except FmuError:
-            self.fmu.close()
-            raise
-
     def close(self) -> None:
-        if self._key is None or not self.fmu.faultless:
-            self.fmu.close()
-            return
-        _kept[self._key] = self
-        while len(_kept) > _MOST_KEPT:
-            _kept.pop(next(iter(_kept))).fmu.close()
-
-
-@atexit.register
-def release() -> None:
-    """Free the bodies that are kept."""
-    while _kept:
-        _kept.popitem()[1].fmu.close()
+        self.fmu.give_back()
 
 
 class FmuBeam(OwnBody, BeamBody):
@@ -363,7 +348,7 @@ class FmuBeam(OwnBody, BeamBody):
         """
         self._points = sorted({load.at for load in loads if load.at is not None})
         self._constants = {"distributed_load": beam.distributed_load}
-        parameters: dict[str, float | int | bool] = {name: value for name, value in beam if name not in beam.GIVEN_ONLY}
+        parameters: dict[str, Any] = {name: value for name, value in beam if name not in beam.GIVEN_ONLY}
         parameters["integrator"] = _INTEGRATORS[beam.integrator]
         parameters["mass_matrix"] = _MASS_MATRICES[beam.mass_matrix]
         parameters["initial_deflection_slope"] = deflection_slope
@@ -374,17 +359,13 @@ class FmuBeam(OwnBody, BeamBody):
             for load in loads:
                 for name, share in self._inputs_of(load) if load.on != "spring" else ():
                     parameters[name] = parameters.get(name, 0.0) + share * float(load.value(start_time))
-        super().__init__(Fmu(self.NAME, own_fmu(self.NAME), parameters, start_time))
-
-    def _prepare(self, fmu: Fmu) -> None:
-        super()._prepare(fmu)
-        along, points = ("deflection", "bending_moment", "shear_force"), len(SHAPE_POINTS)
-        each = [f"{name}[{i}]" for name in along for i in range(1, points + 1)]  # FMI 2.0 knows no arrays
-        self._shape = Reals(fmu, *each) if fmu.version == "2.0" else Reals(fmu, *along, size=points)
-        self._felt = Reals(fmu, "tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
+        super().__init__(parameters, start_time)
+        self._felt = self.fmu.once(Reals, "tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
+        self._shape = self.fmu.once(_shape)
 
     def _mass(self) -> float:
-        return Reals(self.fmu, "tip_mass").get()[0]
+        mass: float = self.fmu.once(Reals, "tip_mass").get()[0]
+        return mass
 
     def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
         if load.on == "tip":
@@ -405,6 +386,14 @@ class FmuBeam(OwnBody, BeamBody):
         return np.array(self._shape.values)
 
 
+def _shape(fmu: Fmu) -> Reals:
+    """Return what reads the shape of a beam; FMI 2.0 knows no arrays."""
+    along, points = ("deflection", "bending_moment", "shear_force"), len(SHAPE_POINTS)
+    if fmu.version == "2.0":
+        return Reals(fmu, *[f"{name}[{i}]" for name in along for i in range(1, points + 1)])
+    return Reals(fmu, *along, size=points)
+
+
 class FmuSpring(OwnBody, EndLoaded):
     """``spring.fmu`` as a body; contact law and foundation are the master's."""
 
@@ -417,10 +406,10 @@ class FmuSpring(OwnBody, EndLoaded):
     def __init__(self, spring: Spring, start_time: float, displacement: float | None = None) -> None:
         """Start at ``start_time`` [s] with y = ``displacement`` [m], which is Ψ if left out."""
         self._spring, self._constants = spring, {"external_force": spring.external_force}
-        parameters: dict[str, float | int | bool] = spring.model_dump(exclude={"initial_velocity"})
+        parameters: dict[str, Any] = spring.model_dump(exclude={"initial_velocity"})
         parameters["displacement"] = spring.equilibrium if displacement is None else displacement
         parameters["velocity"] = spring.initial_velocity
-        super().__init__(Fmu(self.NAME, own_fmu(self.NAME), parameters, start_time))
+        super().__init__(parameters, start_time)
 
     def _mass(self) -> float:
         return self._spring.mass
@@ -434,11 +423,11 @@ class FmuSpring(OwnBody, EndLoaded):
         return [("base_acceleration" if load.on == "base" else "external_force", 1.0)]
 
     def expect_loads(self, loads: Sequence[Load]) -> None:
-        FmuBody.expect_loads(self, loads)
+        OwnBody.expect_loads(self, loads)
         EndLoaded.expect_loads(self, loads)
 
     def restart(self, time: float, displacement: float, velocity: float, dissipated: float = 0.0) -> None:
         """Start again from y [m] and z [m/s], by the exact start values of the FMU."""
         self.fmu.reset(time, {"displacement": displacement, "velocity": velocity})
         self.state = FmuState(dissipated=dissipated)
-        self._begin()
+        self._begin(self.mass)

@@ -9,16 +9,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 from ..scene.partners import ForeignFmu
 from . import force
 from .elements import EndLoaded
 from .fmu import Fmu
-from .fmu_bodies import FmuBody
-from .functions import OK
+from .fmu_bodies import FmuBody, Port
+from .isolated import RemotePort
 from .protocol import NO_FORCE, Abilities, Body, BodyFailed, Energies, FmuError, Force, Motion
 
 #: Relative tolerance of a holding force, and the share of motion without it that it may leave.
@@ -51,6 +52,42 @@ def _promised(spec: ForeignFmu, says: Any) -> Abilities:
     )
 
 
+def opened(spec: ForeignFmu, start_time: float, abilities: Abilities | None) -> tuple[Port, Abilities]:
+    """Return an FMU at ``start_time`` [s], and its ``abilities``: by default, what it says. Raises FmuError."""
+    fmu = Fmu(None, Path(spec.fmu), spec.parameters, start_time)
+    abilities = abilities or _promised(spec, fmu.says)
+    keys = dict.fromkeys(spec.INPUTS, "input") | dict.fromkeys((*spec.MOTION, *spec.ENERGIES), "output")
+    try:
+        for key, wanted in keys.items():
+            if (name := getattr(spec, key)) is not None:
+                _check(fmu, name, key, wanted)
+        outputs = (*_named(spec, spec.MOTION), *(_named(spec, spec.ENERGIES) if abilities.energies else ()))
+        # Derivatives of one step may act in the next if they are not set again.
+        port = Port(
+            fmu, (spec.force,), outputs, _named(spec, ("impulse",)), abilities.slopes, always=True,
+            repeats=abilities.state,
+        )  # fmt: skip
+    except BaseException:
+        fmu.close()
+        raise
+    return port, abilities
+
+
+def _check(fmu: Fmu, name: str, key: str, wanted: str) -> None:
+    """Raise FmuError if a variable cannot be what the scene's ``key`` says."""
+    try:
+        causality = fmu.real(name).causality
+    except FmuError as error:
+        raise FmuError(f"{error}; it is the scene's {key}") from None
+    if causality != wanted and (causality, wanted) != ("local", "output"):
+        raise FmuError(f"{fmu.path}: variable {name!r} is {causality}, and {key} must be an {wanted}")
+
+
+def _named(spec: ForeignFmu, keys: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of variables by their keys, of those that have one."""
+    return tuple(name for name in spec.named(keys) if name is not None)
+
+
 class ForeignState(NamedTuple):
     """What changes of a foreign body beside the state inside the FMU."""
 
@@ -65,7 +102,7 @@ class ForeignState(NamedTuple):
 
 
 class ForeignBody(FmuBody, EndLoaded):
-    """A foreign FMU in either place.
+    """A foreign FMU in either place; the FMU is in a process of its own.
 
     Parameters
     ----------
@@ -77,57 +114,33 @@ class ForeignBody(FmuBody, EndLoaded):
         What was found out about it; by default that it can do what it says.
     """
 
+    #: Longest time that a call may take [s], and what is said of when it was made.
+    PATIENCE, OCCASION = 60.0, ""
     state: ForeignState
-    _ALWAYS_SLOPED = True  # those of one step may act in the next if they are not set again
-
-    #: Loads act on the end, and no input of the FMU is for them.
-    expect_loads, set_loads = EndLoaded.expect_loads, EndLoaded.set_loads
+    _port: RemotePort
 
     def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings | None) -> None:
-        fmu = Fmu(None, Path(spec.fmu), spec.parameters, start_time)
-        self._spec, self._found = spec, found or Findings(_promised(spec, fmu.says))
-        self.abilities = self._found.abilities
-        names, energies = spec.named(spec.MOTION), spec.named(spec.ENERGIES)
-        self._MOTION = tuple(name for name in names if name is not None)
-        self._ENERGIES = tuple(name for name in energies if name is not None) if self.abilities.energies else ()
-        self._IMPULSE = () if spec.impulse is None else (spec.impulse,)
-        self._FORCES, self._SLOPES = (spec.force,), self.abilities.slopes
-        self._upward = 1.0 if upper else -1.0
+        made = opened, spec, start_time, found and found.abilities
+        self._port, self.abilities = RemotePort.of(spec.fmu, self.PATIENCE, self.OCCASION, *made)
+        self._spec, self._upward, self._found = spec, 1.0 if upper else -1.0, found or Findings(self.abilities)
+        self._n_motion = len(_named(spec, spec.MOTION))
         self.state = ForeignState(Motion(0.0, 0.0, 0.0, 0.0), time=start_time)
         self._size = 0.0  #: of the step that is being made [s]
-        if not self.abilities.state:
-            fmu.get_state, fmu.set_state = lambda: OK, self._refuse_to_repeat
-        super().__init__(fmu)
+        try:
+            self._begin(spec.mass or self._found.mass)
+            self.mark()
+        except BaseException:
+            self.close()
+            raise
 
-    def _refuse_to_repeat(self) -> NoReturn:
-        raise BodyFailed(f"{self.fmu.path}: a step had to be repeated, and its state cannot be restored")
-
-    def _prepare(self, fmu: Fmu) -> None:
-        spec = self._spec
-        keys = dict.fromkeys(spec.INPUTS, "input") | dict.fromkeys((*spec.MOTION, *spec.ENERGIES), "output")
-        for key, wanted in keys.items():
-            if (name := getattr(spec, key)) is None:
-                continue
-            try:
-                fmu.references([name], fmu.real)
-            except FmuError as error:
-                raise FmuError(f"{error}; it is the scene's {key}") from None
-            causality = fmu.variable(name).causality
-            if causality != wanted and (causality, wanted) != ("local", "output"):
-                raise FmuError(f"{fmu.path}: variable {name!r} is {causality}, and {key} must be an {wanted}")
-        super()._prepare(fmu)
-
-    def told(self) -> tuple[Motion, float, Energies, int, int]:
-        """Return motion, the work received, energies, doStep calls, and how often the state was set back."""
-        return self.state.motion, self.state.received, self.energies(), self.steps, self.rewinds
+    @property
+    def received(self) -> float:  # type: ignore[override]
+        return self.state.received
 
     def join(self, velocity: float) -> None:
         """Let the end have the ``velocity`` [m/s] of what it is tied to, where its own is not told but measured."""
         if not self.abilities.velocity:
             self.state = self.state._replace(motion=self.state.motion._replace(velocity=velocity))
-
-    def _mass(self) -> float:
-        return self._spec.mass or self._found.mass
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         up, sign, start = self._upward, self._spec.force_sign, self.state.motion
@@ -135,10 +148,11 @@ class ForeignBody(FmuBody, EndLoaded):
         exchanged = force.combined((up, 1.0), (contact, foundation))
         inputs = self._followed(force.combined((sign * up, sign * up), (exchanged, load)), size)
         struck, self._size = self.state.pending != 0.0, size
-        self._write(time, size, *inputs[: 1 + self._SLOPES])
-        end = self._step()
+        self.steps += 1
+        self._moved = True
+        end = self._take(self._port.step(time, size, *inputs[: 1 + self.abilities.slopes]))
         if struck:
-            self._impulse.set((0.0,))  # should the FMU not take it as used up
+            self._port.strike(0.0)  # should the FMU not take it as used up
         received = self.state.received + force.work_on(exchanged, start, end, size)
         load_work = self.state.load_work + force.work_on(load, start, end, size)
         self.state = self.state._replace(
@@ -148,12 +162,13 @@ class ForeignBody(FmuBody, EndLoaded):
 
     def _followed(self, given: Force, size: float) -> Force:
         """Return what of a force over a step the FMU can follow: its mean, or its slope too."""
-        if not any(given[self._SLOPES + 1 :]):
+        slopes = self.abilities.slopes
+        if not any(given[slopes + 1 :]):
             return given
-        return force.derivatives(force.legendre(given, size, self._SLOPES), size)
+        return force.derivatives(force.legendre(given, size, slopes), size)
 
     def apply_impulse(self, impulse: float) -> None:
-        if not self._IMPULSE:
+        if not self.abilities.impulse:
             Body.apply_impulse(self, impulse)
             return
         before = self.state.motion.velocity
@@ -163,9 +178,8 @@ class ForeignBody(FmuBody, EndLoaded):
 
     def _take(self, told: tuple[float, ...]) -> Motion:
         """See `FmuBody._take`; what the FMU does not tell of its motion is made up for."""
-        size, (w0, v0, *_) = self._size, self.state.motion
-        by_name = dict[str | None, float](zip(self._MOTION, told, strict=False))
-        w, v, once, twice = (by_name.get(name) for name in self._spec.named(self._spec.MOTION))
+        size, (w0, v0, *_), given = self._size, self.state.motion, iter(told)
+        w, v, once, twice = (None if name is None else next(given) for name in self._spec.named(self._spec.MOTION))
         assert w is not None
         if v is None:
             v0 = v = (w - w0) / size if size > 0.0 else self._found.velocity
@@ -209,8 +223,8 @@ class ForeignBody(FmuBody, EndLoaded):
         fallen = abs(let_go.displacement - displacement)
         if abs(end.displacement - displacement) > _STAYS * fallen and abs(end.velocity) > _STAYS * abs(let_go.velocity):
             raise BodyFailed(
-                f"{self.fmu.path}: no constant force holds its end at rest on the foundation; use a [stop] restitution "
-                "of 1, which lets nothing come to rest, or leave [stop] out"
+                f"{self._port.path}: no constant force holds its end at rest on the foundation; use a [stop] "
+                "restitution of 1, which lets nothing come to rest, or leave [stop] out"
             )
         self.state = self._marked = self.state._replace(held=(displacement, found))
         return found

@@ -1,7 +1,6 @@
-"""Load FMUs of FMI 2.0 and 3.0 by FMPy, and make the calls of each step. Only this module and `fmu` import FMPy.
+"""The libraries of FMUs of FMI 2.0 and 3.0, loaded by FMPy, and in what the versions differ.
 
-FMPy does what is done once. It looks at each argument of each call, which takes as long as the call: what a step calls
-is bound to its arguments here, and `advance.cpp` makes the calls of one advance together.
+Only this module and `fmu` import FMPy.
 """
 
 from __future__ import annotations
@@ -10,9 +9,9 @@ import os
 import sys
 from collections.abc import Callable
 from copy import copy
-from ctypes import CDLL, POINTER, Structure, byref, c_double, c_int, c_size_t, c_uint, c_void_p, cast
+from ctypes import CDLL, POINTER, Structure, c_double, c_int, c_size_t, c_uint, c_void_p
 from enum import IntEnum
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -22,14 +21,12 @@ from typing_extensions import Self
 
 #: Values of fmi2Status and fmi3Status.
 OK, WARNING, DISCARD, ERROR, FATAL = 0, 1, 2, 3, 4
-#: A function with its arguments, which returns its status.
-Call = Callable[[], int]
 #: Takes the status and the text of a message of an FMU.
 Log = Callable[[int, bytes | None], None]
 
 
 class Failure(IntEnum):
-    """What went wrong in an advance, as `advance.cpp` counts it."""
+    """What went wrong in an advance: `advance.cpp` returns 16 of these + the status of the call that did."""
 
     INPUTS_NOT_FINITE = 1
     SET = 2
@@ -40,12 +37,6 @@ class Failure(IntEnum):
     ENDS = 7  #: this and the next two: what fmi3DoStep has told beside its status
     EARLY = 8
     EVENT = 9
-
-    @classmethod
-    def of(cls, code: int) -> tuple[Failure, int]:
-        """Return what went wrong, and the status of the call that did."""
-        what, status = divmod(code, 16)
-        return cls(what), status
 
 
 class Advance(Structure):
@@ -65,7 +56,7 @@ class Advance(Structure):
 
 
 @cache
-def _advancing() -> CDLL:
+def advances() -> CDLL:
     """Load what `advance.cpp` is compiled to. Raises OSError."""
     suffix = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
     path = Path(__file__).with_name(f"advance.{suffix}")
@@ -105,12 +96,9 @@ class Slave:
     VERSION: ClassVar[str]
     PREFIX: ClassVar[str]
     REAL: ClassVar[str]  #: the type of the variables of a motion
-    SET_DERIVATIVES: ClassVar[str]  #: the function that sets derivatives of inputs
-    make: Callable[[], None]
-    component: Any
+    make: Callable[[Log], None]
     dll: Any
     instanceName: str
-    _log: Log
 
     def __init__(self, description: ModelDescription, folder: Path) -> None:
         identifier, here = description.coSimulation.modelIdentifier, Path.cwd()
@@ -123,8 +111,8 @@ class Slave:
     def instance(self, name: str, log: Log) -> Self:
         """Return an instance, whose messages ``log`` takes. Raises whatever FMPy does if the FMU makes none."""
         made = copy(self)
-        made.instanceName, made._log = name, log
-        made.make()
+        made.instanceName = name
+        made.make(log)
         return made
 
     def freeLibrary(self) -> None:
@@ -144,47 +132,19 @@ class Slave:
             return False
         return isinstance(held, float) or held == value
 
-    def bound(self, name: str, *arguments: Any) -> Call:
-        """Return a function with its arguments, which are converted once. Raises OSError if the library lacks it.
-
-        This is a pointer of our own to the function, without types; what is given by `byref` stays where it is.
-        """
-        function = self.dll[self.PREFIX + name]
-        function.restype = c_int
-        return partial(function, c_void_p.from_param(self.component), *arguments)
-
-    def accessor(self, verb: str, references: Any, values: Any) -> Call:
-        """Return what gets or sets (``verb`` "Get", "Set") real variables, by arrays of C."""
-        return self.bound(verb + self.REAL, byref(references), c_size_t.from_param(len(references)), byref(values))
-
-    def advancing(self, inputs: Any, derivatives: Any, orders: Any, outputs: Any, always: bool) -> tuple[Any, ...]:
-        """Return what makes an advance, and the arrays of C from which it takes what is ``given`` and ``told``.
-
-        It returns 0, or what `Failure.of` reads; the other arguments are those of `Advance`, as arrays of C. Raises
-        OSError if the library lacks a function.
-        """
-        names = {"set": "Set" + self.REAL, "step": "DoStep", "get": "Get" + self.REAL}
-        if len(derivatives):
-            names["set_derivatives"] = self.SET_DERIVATIVES
-        functions = {key: cast(self.dll[self.PREFIX + name], c_void_p) for key, name in names.items()}
-        given, told = (c_double * (2 + len(inputs) + len(derivatives)))(), (c_double * len(outputs))()
-        advance = Advance(
-            self.component, n_inputs=len(inputs), n_derivatives=len(derivatives), n_outputs=len(outputs), inputs=inputs,
-            derivatives=derivatives, outputs=outputs, orders=orders, given=given, told=told, always=always, **functions,
-        )  # fmt: skip
-        return partial(_advancing()[f"advance{self.VERSION[0]}"], byref(advance)), given, told
-
 
 class FMU2(Slave, fmi2.FMU2Slave):  # type: ignore[misc]
     """An FMU of FMI 2.0."""
 
     TYPES, VERSION, PREFIX, REAL, ENUMERATION, STATE = fmi2, "2.0", "fmi2", "Real", "Integer", "FMUstate"
-    SET_DERIVATIVES = "SetRealInputDerivatives"
+    #: The function that sets derivatives of inputs, what it calls those of order 1 and 2, and whether the functions
+    #: that get and set are told the number of values as well.
+    SET_DERIVATIVES, DERIVATIVES, COUNTED = "SetRealInputDerivatives", ("{}", "{}"), False
 
-    def make(self) -> None:
+    def make(self, log: Log) -> None:
         """Instantiate the FMU."""
         callbacks = fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(lambda _1, _2, status, _3, text: self._log(status, text))
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(lambda _1, _2, status, _3, text: log(status, text))
         callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
         callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
         self.instantiate(callbacks=callbacks)
@@ -204,19 +164,15 @@ class FMU3(Slave, fmi3.FMU3Slave):  # type: ignore[misc]
     """
 
     TYPES, VERSION, PREFIX, REAL, ENUMERATION, STATE = fmi3, "3.0", "fmi3", "Float64", "Int64", "FMUState"
-    SET_DERIVATIVES = "SetFloat64"
+    SET_DERIVATIVES, DERIVATIVES, COUNTED = "SetFloat64", ("der({})", "der({},2)"), True
 
-    def make(self) -> None:
-        self.instantiate(logMessage=lambda _environment, status, _category, text: self._log(status, text))
+    def make(self, log: Log) -> None:
+        self.instantiate(logMessage=lambda _environment, status, _category, text: log(status, text))
 
     def initialise(self, time: float, parameters: Callable[[], None]) -> None:
         parameters()
         self.enterInitializationMode(startTime=time)
         self.exitInitializationMode()
-
-    def accessor(self, verb: str, references: Any, values: Any) -> Call:
-        accessor: Any = super().accessor(verb, references, values)
-        return partial(accessor, c_size_t.from_param(len(values)))
 
 
 #: The versions of FMI that are known.

@@ -1,7 +1,8 @@
 """A foreign FMU in a process of its own, which may crash or hang: the run then ends by name and keeps what it has.
 
-The process holds the body and runs `answer`. A request is a list of calls, of which the last is answered. Those that
-need no answer, as `mark` and `rewind`, wait for the next that does, so that a step costs one exchange (some 20 µs).
+The process holds the `Port` of the FMU and runs `answer`. A request is a list of calls, of which the last is answered.
+Those that need no answer, as `get_state` and `set_state`, wait for the next that does, so that a step costs one
+exchange (some 20 µs).
 """
 
 from __future__ import annotations
@@ -18,13 +19,11 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
 from time import monotonic
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
-from ..scene import SceneError
-from ..scene.partners import ForeignFmu
-from .elements import EndLoaded
-from .foreign import Findings, ForeignBody
-from .protocol import NO_FORCE, BodyFailed, Energies, FmuError, Force, Motion, StepRefused
+from .fmu_bodies import CANNOT, Port
+from .functions import OK, WARNING
+from .protocol import BodyFailed, FmuError, StepRefused
 
 #: From when on Ctrl-C means the FMU, not the run [s].
 LONG = 5.0
@@ -34,6 +33,7 @@ _FAREWELL = 2.0
 _MOST_IDLE = 4
 #: A method and its arguments.
 Call = tuple[Any, ...]
+_T = TypeVar("_T")
 
 
 class FmuProcess:
@@ -69,22 +69,22 @@ class FmuProcess:
                 return process
         return cls(path)
 
-    def ask(self, calls: Sequence[Call], doing: str, patience: float | None) -> tuple[Any, Any]:
-        """Make ``calls``; return what the last one returns, and what the body says of itself then.
+    def ask(self, calls: Sequence[Call], doing: str, patience: float | None) -> Any:
+        """Make ``calls``; return what the last one returns.
 
         Raises
         ------
         FmuError
             If the process crashes, or does not answer within ``patience`` [s], ``doing`` this.
-        BodyFailed, StepRefused, SceneError
-            If the body does.
+        BodyFailed, StepRefused
+            If the FMU fails.
         """
         began, self.idle = monotonic(), False
         try:
             self._requests.send(calls)
             if not self._answers.poll(patience):
                 raise FmuError(f"{self._path}: has not returned within {patience:g} s from {doing}")
-            value, told = self._answers.recv()
+            value = self._answers.recv()
         except (EOFError, OSError):
             raise FmuError(f"{self._path}: crashed ({self._last_words()}) in {doing}") from None
         except KeyboardInterrupt:
@@ -95,7 +95,7 @@ class FmuProcess:
         self.idle = True
         if isinstance(value, Exception):
             raise value
-        return value, told
+        return value
 
     def _last_words(self) -> str:
         code = self._process.wait()
@@ -126,21 +126,23 @@ def answer() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the master's
     requests, answers = (Connection(int(end)) for end in ends)
     threading.Thread(target=_end_with_the_master, daemon=True).start()
-    body: Any = None
+    port: Any = None
     while True:
         value: Any = None
         try:
             for name, *arguments in requests.recv():
                 if name == "make":
-                    body = ForeignBody(*arguments)
-                    value = body.mass, body.abilities
+                    make, *given = arguments
+                    port, value = make(*given)
                 else:
-                    value = getattr(body, name)(*arguments)
+                    value = getattr(port, name)(*arguments)
+                if name in CANNOT and value > WARNING:
+                    raise port.failed(value, CANNOT[name])
         except EOFError:
             return
-        except (BodyFailed, StepRefused, SceneError) as failure:
+        except (BodyFailed, StepRefused) as failure:
             value = failure
-        answers.send((value, None if body is None else body.told()))
+        answers.send(value)
 
 
 def _end_with_the_master() -> None:
@@ -149,70 +151,59 @@ def _end_with_the_master() -> None:
     os._exit(1)
 
 
-def _forwarded(name: str, doing: str) -> Callable[..., Any]:
-    """Return the method ``name`` of a body in another process, which is then ``doing`` this."""
-    return lambda body, *arguments: body._ask(doing, name, *arguments)
+class RemotePort(Port):
+    """A `Port` in a process of its own."""
 
-
-def _later(name: str) -> Callable[..., None]:
-    """Return the method ``name`` of `EndLoaded`, which a body in another process does as well, before its next call."""
-
-    def method(body: IsolatedBody, *arguments: Any) -> None:
-        getattr(EndLoaded, name)(body, *arguments)
-        body._waiting.append((name, *arguments))
-
-    return method
-
-
-class IsolatedBody(EndLoaded):
-    """A `springbeam.bodies.foreign.ForeignBody` in a process of its own; parameters as of that."""
-
-    #: Longest time that a call may take [s], and what is said of when it was made.
-    PATIENCE, OCCASION = 60.0, ""
-    state: tuple[Motion, float, Energies]  #: the motion, the work received [J], and the energies
-
-    def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings | None) -> None:
+    def __init__(self, path: str, patience: float, occasion: str) -> None:
+        self.path, self.patience, self._occasion = Path(path), patience, occasion
         self._waiting: list[Call] = []
-        self._process: FmuProcess | None = FmuProcess.of(spec.fmu)
+        self._process: FmuProcess | None = FmuProcess.of(path)
+
+    @classmethod
+    def of(
+        cls, path: str, patience: float, occasion: str, make: Callable[..., tuple[Port, _T]], *arguments: Any
+    ) -> tuple[RemotePort, _T]:
+        """Return the port that ``make(*arguments)`` returns for the FMU at ``path``, and what it returns beside it.
+
+        A call may take no longer than ``patience`` [s]; ``occasion`` is said of when it was made.
+        """
+        port = cls(path, patience, occasion)
         try:
-            self.mass, self.abilities = self._ask("initialisation", "make", spec, upper, start_time, found)
+            return port, port._ask("initialisation", "make", make, *arguments)
         except BaseException:
-            self.close()
+            port.close()
             raise
-        self.mark()
 
     def _ask(self, doing: str, *call: Any) -> Any:
         assert self._process is not None
         calls, self._waiting = [*self._waiting, call], []
-        value, told = self._process.ask(calls, doing + self.OCCASION, self.PATIENCE)
-        *state, self.steps, self.rewinds = told
-        self.state = tuple(state)
-        return value
+        return self._process.ask(calls, doing + self._occasion, self.patience)
 
-    mark, rewind = _later("mark"), _later("rewind")
-    expect_loads, set_loads = _later("expect_loads"), _later("set_loads")
-    apply_impulse = _forwarded("apply_impulse", "taking an impulse")
-    holding_force = _forwarded("holding_force", "a trial step")
-    save = _forwarded("save", "saving its state")
-    restore = _forwarded("restore", "restoring its state")
+    def read(self) -> tuple[float, ...]:
+        told: tuple[float, ...] = self._ask("initialisation", "read")
+        return told
 
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        self._ask(f"its step at t = {time:.9g} s", "advance", time, size, contact, foundation)
-        return self.state[0]
+    def step(self, *given: float) -> tuple[float, ...]:
+        told: tuple[float, ...] = self._ask(f"its step at t = {given[0]:.9g} s", "step", *given)
+        return told
 
-    def join(self, velocity: float) -> None:
-        if not self.abilities.velocity:
-            self._ask("its start", "join", velocity)
+    def strike(self, impulse: float) -> None:
+        self._ask("taking an impulse", "strike", impulse)
 
-    def motion(self) -> Motion:
-        return self.state[0]
+    def get_state(self) -> int:
+        self._waiting.append(("get_state",))
+        return OK
 
-    def energies(self) -> Energies:
-        return self.state[2]
+    def set_state(self) -> int:
+        self._waiting.append(("set_state",))
+        return OK
 
-    @property
-    def received(self) -> float:  # type: ignore[override]
-        return self.state[1]
+    def save(self) -> bytes:
+        content: bytes = self._ask("saving its state", "save")
+        return content
+
+    def restore(self, content: bytes) -> None:
+        self._ask("restoring its state", "restore", content)
 
     def close(self) -> None:
         process, self._process = self._process, None

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..scene.partners import ForeignFmu
-from .foreign import Findings, moments
-from .isolated import IsolatedBody
+from .foreign import Findings, ForeignBody, moments
 from .protocol import NO_FORCE, FmuError, Force, StepRefused
 
 #: Sizes tried, over H; steps of a record.
@@ -30,7 +29,7 @@ _RESPONSE, _AGREE = 0.1, 0.01
 _FORCES, _SEEN = (1.0, 1e3, 1e6, 1e9, 1e12, 1e15), 1e-6
 
 
-class _TriedBody(IsolatedBody):
+class _TriedBody(ForeignBody):
     PATIENCE, OCCASION = 20.0, " of the check before the run"
 
 

@@ -12,7 +12,6 @@ from typing import Any
 from .. import __version__
 from ..bodies.factory import findings, fingerprints, load_bodies
 from ..bodies.fmu_bodies import FmuBody
-from ..bodies.isolated import IsolatedBody
 from ..bodies.protocol import Body
 from ..results.directory import RunDirectory
 from ..results.files import load_summary, load_trajectory
@@ -191,7 +190,7 @@ class Simulation:
     def _summed_up(self, status: dict[str, Any]) -> dict[str, Any]:
         wall_time, summary = self._wall_time(), self._master.summary()
         told = zip(("beam", "spring"), self._bodies, strict=True)
-        counting = {name: body for name, body in told if isinstance(body, FmuBody | IsolatedBody)}
+        counting = {name: body for name, body in told if isinstance(body, FmuBody)}
         return {
             **status,
             "version": __version__,
