@@ -152,11 +152,22 @@ class Port:
         self._fmu.close()
 
 
+class Names(NamedTuple):
+    """What an FMU of ours calls its variables."""
+
+    fmu: str
+    mass: str
+    motion: tuple[str, str, str, str]
+    energies: tuple[str, ...]
+    impulse: str
+    forces: tuple[str, ...]
+
+
 class FmuState(NamedTuple):
     """What changes of a body beside the state inside the FMU."""
 
     motion: Motion = Motion(0.0, 0.0, 0.0, 0.0)
-    told: tuple[float, ...] = ()  #: motion and energies as the FMU has told them
+    told: tuple[float, ...] = ()  #: motion and energies as the FMU has told them, with the work of impulses since
     pending: float = 0.0  #: upward impulse that the FMU applies at the start of its next step [N·s]
     dissipated: float = 0.0  #: before the FMU was last started again [J]
 
@@ -219,23 +230,18 @@ class FmuBody(Body):
 
     def apply_impulse(self, impulse: float) -> None:
         # The FMU applies it at the start of its next step; motion and energies already show it.
-        motion, pending = self.state.motion, self.state.pending + impulse
+        motion, told, pending, *_ = self.state
+        pending += impulse
         self._moved = True
         self._port.strike(pending)
-        struck = motion._replace(velocity=motion.velocity + impulse / self.mass)
-        self.state = self.state._replace(motion=struck, pending=pending)
+        velocity, n = motion.velocity + impulse / self.mass, self._n_motion
+        work = 0.5 * impulse * (motion.velocity + velocity)
+        told = (*told[:n], *[kinetic + work for kinetic in told[n : n + 1]], *told[n + 1 :])
+        self.state = self.state._replace(motion=motion._replace(velocity=velocity), told=told, pending=pending)
 
     def _take(self, told: tuple[float, ...]) -> Motion:
         """Take what the FMU has told as the present motion and energies, with no impulse pending; return the motion."""
         raise NotImplementedError
-
-    def _stored(self) -> tuple[float, ...]:
-        """Return the energies [J]; the kinetic one has the impulse that is still pending."""
-        motion, told, pending, *_ = self.state
-        kinetic, *others = told[self._n_motion :]
-        if pending != 0.0:
-            kinetic += 0.5 * pending * (motion.velocity - pending / self.mass + motion.velocity)
-        return (kinetic, *others)
 
     def close(self) -> None:
         self._port.close()
@@ -244,11 +250,7 @@ class FmuBody(Body):
 class OwnBody(FmuBody):
     """A body of an FMU of this project, whose instance may have been another's: see `Fmu.of`."""
 
-    NAME: ClassVar[str]  #: of the FMU
-    _MOTION: ClassVar[tuple[str, ...]]
-    _ENERGIES: ClassVar[tuple[str, ...]]
-    _IMPULSE: ClassVar[tuple[str, ...]]
-    _FORCES: ClassVar[tuple[str, ...]]
+    NAMES: ClassVar[Names]
     tells = True
     _constants: dict[str, float]  #: of the scene, by the inputs that hold them from the start
     #: By input of the FMU: what is added to it by a unit of which load.
@@ -257,22 +259,19 @@ class OwnBody(FmuBody):
     _loads: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
 
     def __init__(self, parameters: dict[str, Value], start_time: float) -> None:
-        self.fmu, self.state, self._shares = Fmu.of(self.NAME, parameters, start_time), FmuState(), {}
+        self.fmu, self.state, self._shares = Fmu.of(self.NAMES.fmu, parameters, start_time), FmuState(), {}
         try:
             self._connect()
-            self._begin(self._mass())
+            self._begin(*self.fmu.once(Reals, self.NAMES.mass).get())
         except BaseException:
             self.fmu.close()
             raise
 
-    def _mass(self) -> float:
-        raise NotImplementedError
-
     def _connect(self) -> None:
         """Prepare what a step sets and tells: under loads, also these and their work."""
-        inputs = (*self._FORCES, *self._shares)
-        energies = (*self._ENERGIES[:3], "load_work") if self._shares else self._ENERGIES
-        self._port = self.fmu.once(Port, inputs, (*self._MOTION, *energies), self._IMPULSE)
+        names, loads = self.NAMES, self._shares
+        energies = (*names.energies[:3], "load_work") if loads else names.energies
+        self._port = self.fmu.once(Port, (*names.forces, *loads), (*names.motion, *energies), (names.impulse,))
 
     def expect_loads(self, loads: Sequence[Load]) -> None:
         for number, load in enumerate(loads):
@@ -298,7 +297,7 @@ class OwnBody(FmuBody):
         (c, dc, ddc), (n, dn, ddn), (values, slopes) = contact, foundation, self._loads
         self.steps += 1
         self._moved = True
-        if len(self._FORCES) == 1:  # nothing but the other body presses its end
+        if len(self.NAMES.forces) == 1:  # nothing but the other body presses its end
             return self._take(self._port.step(time, size, c, *values, dc, ddc, *slopes))
         return self._take(self._port.step(time, size, c, n, *values, dc, ddc, dn, ddn, *slopes))
 
@@ -308,8 +307,8 @@ class OwnBody(FmuBody):
         return motion
 
     def energies(self) -> Energies:
-        motion, told, pending, before = self.state
-        kinetic, potential, dissipated, *load = told[4:] if pending == 0.0 else self._stored()
+        motion, told, _, before = self.state
+        kinetic, potential, dissipated, *load = told[4:]
         if not load:  # the spring has none but its external force
             of_loads = -self._constants["external_force"] * motion.displacement
         else:
@@ -323,16 +322,14 @@ class OwnBody(FmuBody):
 class FmuBeam(OwnBody, BeamBody):
     """``beam.fmu`` as a body."""
 
-    NAME = "beam"
-    _MOTION = (
-        "tip_displacement",
-        "tip_velocity",
-        "tip_displacement_integral",
-        "tip_displacement_integral_2",
+    NAMES = Names(
+        "beam",
+        "tip_mass",
+        ("tip_displacement", "tip_velocity", "tip_displacement_integral", "tip_displacement_integral_2"),
+        ("kinetic_energy", "strain_energy", "dissipated_energy", "load_potential"),
+        "tip_impulse",
+        ("tip_force",),
     )
-    _ENERGIES = ("kinetic_energy", "strain_energy", "dissipated_energy", "load_potential")
-    _IMPULSE = ("tip_impulse",)
-    _FORCES = ("tip_force",)
 
     def __init__(
         self,
@@ -362,10 +359,6 @@ class FmuBeam(OwnBody, BeamBody):
         super().__init__(parameters, start_time)
         self._felt = self.fmu.once(Reals, "tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
         self._shape = self.fmu.once(_shape)
-
-    def _mass(self) -> float:
-        mass: float = self.fmu.once(Reals, "tip_mass").get()[0]
-        return mass
 
     def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
         if load.on == "tip":
@@ -397,11 +390,14 @@ def _shape(fmu: Fmu) -> Reals:
 class FmuSpring(OwnBody, EndLoaded):
     """``spring.fmu`` as a body; contact law and foundation are the master's."""
 
-    NAME = "spring"
-    _MOTION = ("displacement", "velocity", "displacement_integral", "displacement_integral_2")
-    _ENERGIES = ("kinetic_energy", "potential_energy", "dissipated_energy")
-    _IMPULSE = ("impulse",)
-    _FORCES = ("contact_force", "foundation_force")
+    NAMES = Names(
+        "spring",
+        "mass",
+        ("displacement", "velocity", "displacement_integral", "displacement_integral_2"),
+        ("kinetic_energy", "potential_energy", "dissipated_energy"),
+        "impulse",
+        ("contact_force", "foundation_force"),
+    )
 
     def __init__(self, spring: Spring, start_time: float, displacement: float | None = None) -> None:
         """Start at ``start_time`` [s] with y = ``displacement`` [m], which is Ψ if left out."""
@@ -410,9 +406,6 @@ class FmuSpring(OwnBody, EndLoaded):
         parameters["displacement"] = spring.equilibrium if displacement is None else displacement
         parameters["velocity"] = spring.initial_velocity
         super().__init__(parameters, start_time)
-
-    def _mass(self) -> float:
-        return self._spring.mass
 
     def holding_force(self, displacement: float, velocity: float) -> float:
         spring, y = self._spring, displacement

@@ -9,7 +9,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -52,25 +51,23 @@ def _promised(spec: ForeignFmu, says: Any) -> Abilities:
     )
 
 
-def opened(spec: ForeignFmu, start_time: float, abilities: Abilities | None) -> tuple[Port, Abilities]:
-    """Return an FMU at ``start_time`` [s], and its ``abilities``: by default, what it says. Raises FmuError."""
+def opened(spec: ForeignFmu, start_time: float, found: Findings | None) -> tuple[Port, Findings]:
+    """Return an FMU at ``start_time`` [s], and what was ``found`` out: by default, what it says. Raises FmuError."""
     fmu = Fmu(None, Path(spec.fmu), spec.parameters, start_time)
-    abilities = abilities or _promised(spec, fmu.says)
+    found = found or Findings(_promised(spec, fmu.says))
+    abilities = found.abilities
     keys = dict.fromkeys(spec.INPUTS, "input") | dict.fromkeys((*spec.MOTION, *spec.ENERGIES), "output")
     try:
         for key, wanted in keys.items():
             if (name := getattr(spec, key)) is not None:
                 _check(fmu, name, key, wanted)
-        outputs = (*_named(spec, spec.MOTION), *(_named(spec, spec.ENERGIES) if abilities.energies else ()))
+        outputs, impulse = tuple(_told(spec, found).values()), () if spec.impulse is None else (spec.impulse,)
         # Derivatives of one step may act in the next if they are not set again.
-        port = Port(
-            fmu, (spec.force,), outputs, _named(spec, ("impulse",)), abilities.slopes, always=True,
-            repeats=abilities.state,
-        )  # fmt: skip
+        always = {"always": True, "repeats": abilities.state}
+        return Port(fmu, (spec.force,), outputs, impulse, abilities.slopes, **always), found
     except BaseException:
         fmu.close()
         raise
-    return port, abilities
 
 
 def _check(fmu: Fmu, name: str, key: str, wanted: str) -> None:
@@ -83,9 +80,10 @@ def _check(fmu: Fmu, name: str, key: str, wanted: str) -> None:
         raise FmuError(f"{fmu.path}: variable {name!r} is {causality}, and {key} must be an {wanted}")
 
 
-def _named(spec: ForeignFmu, keys: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of variables by their keys, of those that have one."""
-    return tuple(name for name in spec.named(keys) if name is not None)
+def _told(spec: ForeignFmu, found: Findings) -> dict[str, str]:
+    """Return the names of what an FMU tells after a step by their keys: first of its motion, then of its energies."""
+    keys = (*spec.MOTION, *(spec.ENERGIES if found.abilities.energies else ()))
+    return {key: name for key, name in zip(keys, spec.named(keys), strict=True) if name is not None}
 
 
 class ForeignState(NamedTuple):
@@ -120,12 +118,12 @@ class ForeignBody(FmuBody, EndLoaded):
     _port: RemotePort
 
     def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings | None) -> None:
-        made = opened, spec, start_time, found and found.abilities
-        self._port, self.abilities = RemotePort.of(spec.fmu, self.PATIENCE, self.OCCASION, *made)
-        self._spec, self._upward, self._found = spec, 1.0 if upper else -1.0, found or Findings(self.abilities)
-        self._n_motion = len(_named(spec, spec.MOTION))
+        self._port = RemotePort(spec.fmu, self.PATIENCE, self.OCCASION, opened, spec, start_time, found)
+        self._found: Findings = self._port.found
+        self.abilities, self._spec, self._upward = self._found.abilities, spec, 1.0 if upper else -1.0
+        self._keys = tuple(_told(spec, self._found))
+        self._n_motion = len({*self._keys} & {*spec.MOTION})
         self.state = ForeignState(Motion(0.0, 0.0, 0.0, 0.0), time=start_time)
-        self._size = 0.0  #: of the step that is being made [s]
         try:
             self._begin(spec.mass or self._found.mass)
             self.mark()
@@ -147,17 +145,15 @@ class ForeignBody(FmuBody, EndLoaded):
         load = self._followed(self._on_end, size)
         exchanged = force.combined((up, 1.0), (contact, foundation))
         inputs = self._followed(force.combined((sign * up, sign * up), (exchanged, load)), size)
-        struck, self._size = self.state.pending != 0.0, size
         self.steps += 1
         self._moved = True
-        end = self._take(self._port.step(time, size, *inputs[: 1 + self.abilities.slopes]))
-        if struck:
+        told = self._port.step(time, size, *inputs[: 1 + self.abilities.slopes])
+        if self.state.pending != 0.0:
             self._port.strike(0.0)  # should the FMU not take it as used up
+        end = self._take(told, size)
         received = self.state.received + force.work_on(exchanged, start, end, size)
         load_work = self.state.load_work + force.work_on(load, start, end, size)
-        self.state = self.state._replace(
-            received=received, load_work=load_work, motion=end, time=time + size, size=size
-        )
+        self.state = self.state._replace(received=received, load_work=load_work, time=time + size, size=size)
         return end
 
     def _followed(self, given: Force, size: float) -> Force:
@@ -176,23 +172,22 @@ class ForeignBody(FmuBody, EndLoaded):
         received = self.state.received + 0.5 * impulse * (before + self.state.motion.velocity)
         self.state = self.state._replace(received=received)
 
-    def _take(self, told: tuple[float, ...]) -> Motion:
-        """See `FmuBody._take`; what the FMU does not tell of its motion is made up for."""
-        size, (w0, v0, *_), given = self._size, self.state.motion, iter(told)
-        w, v, once, twice = (None if name is None else next(given) for name in self._spec.named(self._spec.MOTION))
-        assert w is not None
-        if v is None:
-            v0 = v = (w - w0) / size if size > 0.0 else self._found.velocity
-        first, second = moments(w0, v0, w, v, size)
-        motion = Motion(w, v, first if once is None else once, second if twice is None else twice)
+    def _take(self, told: tuple[float, ...], size: float = 0.0) -> Motion:
+        """See `FmuBody._take`; what the FMU does not tell of its motion over ``size`` [s] is made up for."""
+        by_key, (w0, v0, *_) = dict(zip(self._keys, told, strict=True)), self.state.motion
+        w = by_key["displacement"]
+        if "velocity" not in by_key:
+            v0 = by_key["velocity"] = (w - w0) / size if size > 0.0 else self._found.velocity
+        first, second = moments(w0, v0, w, by_key["velocity"], size)
+        motion = Motion(w, by_key["velocity"], by_key.get("integral", first), by_key.get("integral_2", second))
         self.state = self.state._replace(motion=motion, told=told, pending=0.0)
         return motion
 
     def energies(self) -> Energies:
         if not self.abilities.energies:
             return Energies(0.0, self.state.received, 0.0, 0.0)
-        told = iter(self._stored())
-        energies = Energies(*(0.0 if name is None else next(told) for name in self._spec.named(self._spec.ENERGIES)))
+        told = dict(zip(self._keys, self.state.told, strict=True))
+        energies = Energies(*(told.get(key, 0.0) for key in self._spec.ENERGIES))
         return energies._replace(load_potential=energies.load_potential - self.state.load_work)
 
     def holding_force(self, displacement: float, velocity: float) -> float:

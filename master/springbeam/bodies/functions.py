@@ -25,18 +25,9 @@ OK, WARNING, DISCARD, ERROR, FATAL = 0, 1, 2, 3, 4
 Log = Callable[[int, bytes | None], None]
 
 
-class Failure(IntEnum):
-    """What went wrong in an advance: `advance.cpp` returns 16 of these + the status of the call that did."""
-
-    INPUTS_NOT_FINITE = 1
-    SET = 2
-    SET_DERIVATIVES = 3
-    STEP = 4
-    GET = 5
-    OUTPUTS_NOT_FINITE = 6
-    ENDS = 7  #: this and the next two: what fmi3DoStep has told beside its status
-    EARLY = 8
-    EVENT = 9
+#: What went wrong in an advance: `advance.cpp` returns 16 of these + the status of the call that did. The last three
+#: are what fmi3DoStep has told beside its status.
+Failure = IntEnum("Failure", "INPUTS_NOT_FINITE SET SET_DERIVATIVES STEP GET OUTPUTS_NOT_FINITE ENDS EARLY EVENT")
 
 
 class Advance(Structure):

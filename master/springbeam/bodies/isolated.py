@@ -19,7 +19,7 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
 from time import monotonic
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar
 
 from .fmu_bodies import CANNOT, Port
 from .functions import OK, WARNING
@@ -33,7 +33,6 @@ _FAREWELL = 2.0
 _MOST_IDLE = 4
 #: A method and its arguments.
 Call = tuple[Any, ...]
-_T = TypeVar("_T")
 
 
 class FmuProcess:
@@ -152,26 +151,28 @@ def _end_with_the_master() -> None:
 
 
 class RemotePort(Port):
-    """A `Port` in a process of its own."""
+    """A `Port` in a process of its own.
 
-    def __init__(self, path: str, patience: float, occasion: str) -> None:
+    Parameters
+    ----------
+    path
+        Of the FMU.
+    patience, occasion
+        Longest time that a call may take [s], and what is said of when it was made.
+    make, arguments
+        ``make(*arguments)`` returns the port, and what it has ``found`` out.
+    """
+
+    def __init__(
+        self, path: str, patience: float, occasion: str, make: Callable[..., tuple[Port, Any]], *arguments: Any
+    ) -> None:
         self.path, self.patience, self._occasion = Path(path), patience, occasion
         self._waiting: list[Call] = []
         self._process: FmuProcess | None = FmuProcess.of(path)
-
-    @classmethod
-    def of(
-        cls, path: str, patience: float, occasion: str, make: Callable[..., tuple[Port, _T]], *arguments: Any
-    ) -> tuple[RemotePort, _T]:
-        """Return the port that ``make(*arguments)`` returns for the FMU at ``path``, and what it returns beside it.
-
-        A call may take no longer than ``patience`` [s]; ``occasion`` is said of when it was made.
-        """
-        port = cls(path, patience, occasion)
         try:
-            return port, port._ask("initialisation", "make", make, *arguments)
+            self.found = self._ask("initialisation", "make", make, *arguments)
         except BaseException:
-            port.close()
+            self.close()
             raise
 
     def _ask(self, doing: str, *call: Any) -> Any:
@@ -179,13 +180,11 @@ class RemotePort(Port):
         calls, self._waiting = [*self._waiting, call], []
         return self._process.ask(calls, doing + self._occasion, self.patience)
 
-    def read(self) -> tuple[float, ...]:
-        told: tuple[float, ...] = self._ask("initialisation", "read")
-        return told
+    def read(self) -> Any:
+        return self._ask("initialisation", "read")
 
-    def step(self, *given: float) -> tuple[float, ...]:
-        told: tuple[float, ...] = self._ask(f"its step at t = {given[0]:.9g} s", "step", *given)
-        return told
+    def step(self, *given: float) -> Any:
+        return self._ask(f"its step at t = {given[0]:.9g} s", "step", *given)
 
     def strike(self, impulse: float) -> None:
         self._ask("taking an impulse", "strike", impulse)
@@ -198,9 +197,8 @@ class RemotePort(Port):
         self._waiting.append(("set_state",))
         return OK
 
-    def save(self) -> bytes:
-        content: bytes = self._ask("saving its state", "save")
-        return content
+    def save(self) -> Any:
+        return self._ask("saving its state", "save")
 
     def restore(self, content: bytes) -> None:
         self._ask("restoring its state", "restore", content)
