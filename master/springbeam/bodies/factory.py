@@ -49,7 +49,6 @@ def _body(
     scene: Scene, spec: Beam | Spring | Partner, start_time: float, found: Findings | None, contact: float
 ) -> Body:
     if isinstance(spec, ForeignFmu):
-        assert found is not None
         return ForeignBody(spec, spec is scene.upper, start_time, found)
     if isinstance(spec, Spring):
         return FmuSpring(spec, start_time, top_at_rest(scene, contact) if scene.static else None)

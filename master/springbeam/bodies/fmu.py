@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import atexit
 import difflib
+import os
 import shutil
 import tempfile
 from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -31,7 +32,7 @@ _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 @lru_cache(maxsize=8)
 def _opened(path: Path, modified: int) -> tuple[ModelDescription, FMU2 | FMU3]:
     """Return what the FMU at ``path`` says of itself, and its library. Raises FmuError."""
-    folder = Path(tempfile.mkdtemp(prefix="springbeam-"))
+    folder, here = Path(tempfile.mkdtemp(prefix="springbeam-")), Path.cwd()
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     try:
         unpack(path, folder)
@@ -46,9 +47,12 @@ def _opened(path: Path, modified: int) -> tuple[ModelDescription, FMU2 | FMU3]:
                 f"it is for {kind} of FMI {description.fmiVersion}; export it for co-simulation, as FMI "
                 f"{' or '.join(VERSIONS)}"
             )
-        return description, version(description, folder)
+        identifier = description.coSimulation.modelIdentifier
+        return description, version(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder))
     except Exception as error:  # FMPy raises bare Exceptions for whatever is wrong with an archive
         raise FmuError(f"{path}: not a usable FMU: {error}") from error
+    finally:
+        os.chdir(here)  # FMPy stays in the folder of a library that cannot be loaded
 
 
 #: A value of a parameter.
@@ -178,11 +182,11 @@ class Fmu:
         last = counts[1:] if self._slave.COUNTED else []
         return self.bound(verb + self._slave.REAL, byref(references), counts[0], byref(values), *last)
 
-    def advancing(self, inputs: Sequence[str], slopes: int, outputs: Sequence[str], always: bool) -> Any:
-        """Return what makes an advance, and the arrays of C from which it takes what is given and leaves what is told.
+    def advancing(self, inputs: Sequence[str], slopes: int, outputs: Sequence[str], told: Any, always: bool) -> Any:
+        """Return what makes an advance, and the array of C from which it takes what is given.
 
-        Derivatives 1 … ``slopes`` of each input follow the inputs, those of one after another. It returns 0, or what
-        `Failure` says.
+        Derivatives 1 … ``slopes`` of each input follow the inputs, those of one after another. An advance leaves the
+        outputs in the array ``told`` and returns 0, or what `Failure` says.
         """
         slave = self._slave
         each = [(name, order) for name in inputs for order in range(1, slopes + 1)]
@@ -193,7 +197,7 @@ class Fmu:
         of_inputs, of_derivatives, of_outputs = (
             self._references(names, slave.REAL) for names in (inputs, derivatives, outputs)
         )
-        given, told = (c_double * (2 + len(inputs) + len(each)))(), (c_double * len(outputs))()
+        given = (c_double * (2 + len(inputs) + len(each)))()
         advance = Advance(
             slave.component, n_inputs=len(inputs), n_derivatives=len(each), n_outputs=len(outputs), inputs=of_inputs,
             derivatives=of_derivatives, outputs=of_outputs, orders=(c_int * len(each))(*[order for _, order in each]),
@@ -201,7 +205,7 @@ class Fmu:
             **{key: cast(self._function(name), c_void_p) for key, name in named.items()},
         )  # fmt: skip
         library = self._asked("cannot be used", advances)
-        return partial(library[f"advance{self.version[0]}"], byref(advance)), given, told
+        return partial(library[f"advance{self.version[0]}"], byref(advance)), given
 
     def variable(self, name: str) -> Any:
         """Return what the FMU says of a variable. Raises FmuError if it has none of this name."""

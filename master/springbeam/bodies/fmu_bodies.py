@@ -37,7 +37,7 @@ class Reals:
         self.names = names
         self._fmu = fmu
         self.values: Any = (c_double * n)()  #: as last read or written
-        self._unpacked = partial(Struct(f"{n}d").unpack, self.values)
+        self.unpacked = partial(Struct(f"{n}d").unpack, self.values)
         self._read, self._write = (fmu.accessor(verb, names, self.values, size) for verb in ("Get", "Set"))
         if names:
             self.get()  # a wrong reference is found before the run
@@ -45,7 +45,7 @@ class Reals:
     def get(self) -> tuple[float, ...]:
         if (status := self._read()) > WARNING:
             raise self._fmu.failed(status, f"cannot read {', '.join(self.names)}")
-        return self._unpacked()
+        return self.unpacked()
 
     def set(self, values: Sequence[float]) -> None:
         self.values[:] = values
@@ -92,9 +92,9 @@ class Port:
         self.path, self._fmu, self._inputs = fmu.path, fmu, inputs
         self._outputs, self._impulse = Reals(fmu, *outputs), Reals(fmu, *impulse)
         Reals(fmu, *inputs)  # a wrong reference is found before the run
-        self._advance, self._given, told = fmu.advancing(inputs, slopes, outputs, always)
+        self._advance, self._given = fmu.advancing(inputs, slopes, outputs, self._outputs.values, always)
         self._write = partial(Struct(f"{len(self._given)}d").pack_into, self._given, 0)
-        self._told = partial(Struct(f"{len(told)}d").unpack, told)
+        self._told = self._outputs.unpacked
         #: Save the state, and return to it; both return their status.
         self.get_state, self.set_state = fmu.of_state() if repeats else (lambda: OK, self._refuse_to_repeat)
 

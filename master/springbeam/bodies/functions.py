@@ -5,7 +5,6 @@ Only this module and `fmu` import FMPy.
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable
 from copy import copy
@@ -16,7 +15,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from fmpy import fmi2, fmi3
-from fmpy.model_description import ModelDescription
 from typing_extensions import Self
 
 #: Values of fmi2Status and fmi3Status.
@@ -73,15 +71,7 @@ class Library(CDLL):
 
 
 class Slave:
-    """An FMU whose library is loaded, once in a process, beside FMPy's class of its version; `instance` makes one.
-
-    Parameters
-    ----------
-    description, folder
-        Of the FMU, and where it is unpacked.
-
-    Raises whatever FMPy does if the library cannot be loaded.
-    """
+    """An FMU whose library is loaded, once in a process, beside FMPy's class of its version; `instance` makes one."""
 
     TYPES: ClassVar[Any]  #: FMPy's module with the types of C
     VERSION: ClassVar[str]
@@ -90,14 +80,6 @@ class Slave:
     make: Callable[[Log], None]
     dll: Any
     instanceName: str
-
-    def __init__(self, description: ModelDescription, folder: Path) -> None:
-        identifier, here = description.coSimulation.modelIdentifier, Path.cwd()
-        given = {"guid": description.guid, "modelIdentifier": identifier, "unzipDirectory": str(folder)}
-        try:
-            super().__init__(**given)
-        finally:
-            os.chdir(here)  # FMPy stays in the folder of a library that cannot be loaded
 
     def instance(self, name: str, log: Log) -> Self:
         """Return an instance, whose messages ``log`` takes. Raises whatever FMPy does if the FMU makes none."""
