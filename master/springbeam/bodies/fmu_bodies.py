@@ -1,4 +1,5 @@
-"""The two FMUs as bodies. One module, though longer than others: every step of a run passes through all of it."""
+"""The port through which a run uses an FMU, and our two FMUs as bodies. One module, though longer than others: every step
+of a run passes through all of it."""
 
 from __future__ import annotations
 
@@ -191,7 +192,7 @@ class FmuBody(Body):
     steps = rewinds = 0
 
     def _begin(self, mass: float) -> None:
-        """Start, with what is ``mass`` [kg] to a force at the end, from the motion that the FMU was initialised to."""
+        """Start from the motion that the FMU was initialised to; a force at the end meets ``mass`` [kg]."""
         if not isfinite(mass):
             raise FmuError(f"{self._port.path}: the mass of its end is {mass}")
         self.mass = mass
