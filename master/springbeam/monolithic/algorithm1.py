@@ -4,7 +4,7 @@ Line numbers in comments are those of the printed algorithm. Where it leaves som
 
 ``contact.impact``
     z at t_c: ``"tip"`` the tip's velocity (line 5), which in the semi-discrete model does not jump, so that it is also
-    the average of eq. (11); else 0 (section 6).
+    the average of eq. (11); else as it is, which is 0 of a spring that rests (section 6).
 ``y_temp`` (lines 16–17, "accommodate the transmission condition")
     ``"equation"``: (53) starts from the tip's position u instead of yˡ, and line 29 forms z from the true yˡ.
     ``"guess"``: u is where Newton's method starts; (53) keeps yˡ.
@@ -110,7 +110,7 @@ class _Algorithm:
         self._set_step(scene.coupling.H)
         self.phi = -np.inf if scene.stop is None else scene.stop.position
         self.stiffness = 0.0  #: λ_nc as the last step has left it
-        self.iterations: dict[str, list[int]] = {"beam": [], "predicted": [], "joined": []}
+        self.iterations: dict[str, list[int]] = {"free": [], "beam": [], "predicted": [], "joined": []}
         self.time = scene.contact_time or 0.0  #: [s]
         self.events: list[Event] = []
         self.rows: list[_Row] = []
@@ -167,7 +167,7 @@ class _Algorithm:
         self.began = clock.perf_counter()
         row, psi = self._start(), self.spring.equilibrium
         touched = self.beam.approach == "undeformed" or row.q[-1] <= psi  # else lines 1–4 come first
-        self.rows.append(self._first_contact(row) if touched else row)
+        self.rows.append(self._first_contact(row)._replace(phase="tied") if touched else row)
         (whole, rest), start = self.scene.equal_steps, self.time
         for step in range(1, whole + (rest > 0.0) + 1):
             if step > whole:
@@ -186,7 +186,8 @@ class _Algorithm:
     def _first_contact(self, row: _Row) -> _Row:
         """Make lines 5 and 6."""
         self.stiffness = self.scene.contact.stiffness
-        row = row._replace(z=float(row.v[-1]) if self.scene.contact.impact == "tip" else 0.0, phase="tied")
+        z = float(row.v[-1]) if self.scene.contact.impact == "tip" else row.z
+        row = row._replace(y=self.spring.equilibrium, z=z)
         self._note("impact", row)
         return row
 
@@ -202,8 +203,10 @@ class _Algorithm:
         return q
 
     def _free_step(self, before: _Row) -> _Row:
-        q = self._unforced(before)
-        return _Row(self.time, q, 2.0 * (q - before.q) / self.h - before.v, before.y, before.z)
+        _, q, v, y, z, *_ = before
+        q_new = self._unforced(before)
+        y_new = self._newton(partial(self._foundation_force, y, z), y, "free")  # λ_nc = 0 until the first contact
+        return _Row(self.time, q_new, 2.0 * (q_new - q) / self.h - v, y_new, 2.0 * (y_new - y) / self.h - z)
 
     def _contact_step(self, before: _Row) -> _Row:
         """Make lines 8–30."""
