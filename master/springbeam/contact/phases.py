@@ -76,16 +76,16 @@ def meeting(kind: str, v: float, z: float, tip_mass: float, mass: float) -> Impa
 
 def rebound(velocity: float, mass: float, restitution: float) -> tuple[float, float]:
     """Impulse −(1+e) m w [N·s] that reverses w to −e w, and its loss ½ m w² (1 − e²) [J]."""
-    return -(1.0 + restitution) * mass * velocity, 0.5 * mass * velocity**2 * (1.0 - restitution**2)
+    return 0.0 - (1.0 + restitution) * mass * velocity, 0.5 * mass * velocity**2 * (1.0 - restitution**2)
 
 
-def foundation_impact(z: float | None, mass: float, v: float | None, tip_mass: float, restitution: float) -> Impact:
-    """The lower end strikes the foundation: the spring at ``z``, and the tip at ``v`` if it is tied to it.
+def foundation_impact(v: float, z: float, tip_mass: float, mass: float, restitution: float) -> Impact:
+    """Tip and spring top strike the foundation, each at its velocity [m/s]; a mass of 0 [kg] takes no part.
 
-    ``None`` marks an end that does not take part. Each velocity is reversed by itself, so nothing is lost at e = 1.
+    Each velocity is reversed by itself, so nothing is lost at e = 1.
     """
-    on_spring, loss_spring = rebound(z, mass, restitution) if z is not None else (0.0, 0.0)
-    on_beam, loss_beam = rebound(v, tip_mass, restitution) if v is not None else (0.0, 0.0)
+    on_beam, loss_beam = rebound(v, tip_mass, restitution)
+    on_spring, loss_spring = rebound(z, mass, restitution)
     return Impact(on_beam, on_spring, on_spring + on_beam, loss_spring + loss_beam)
 
 
@@ -111,7 +111,7 @@ class Transitions(Stateful):
     law
         Between the ends.
     tip_mass, mass
-        What an impulse meets at the tip and at the spring top [kg]; ``None`` for an absent body.
+        What an impulse meets at the tip and at the spring top [kg]; a body that is absent has an infinite one.
     equilibrium
         Ψ: the height below which the ends are tied [m].
     """
@@ -122,13 +122,14 @@ class Transitions(Stateful):
         self,
         scene: Scene,
         law: SoftLaw | None,
-        tip_mass: float | None,
-        mass: float | None,
+        tip_mass: float,
+        mass: float,
         fastest: Callable[[], float],
         equilibrium: float,
     ) -> None:
         self._law, self._equilibrium = law, equilibrium
         self._scene, self._tip_mass, self._mass, self._fastest = scene, tip_mass, mass, fastest
+        self._alone = scene.lower is None  #: the tip itself strikes the foundation, and rests on it
 
     def after(
         self,
@@ -157,17 +158,14 @@ class Transitions(Stateful):
         if kind is EventKind.RETIE:
             return kind, Phase(Joint.TIED), Impact()
         if kind is EventKind.UNSEATED:
-            tied = phase.joint is not Joint.FREE and self._law is None
-            return kind, Phase(phase.joint), self._part(phase, tip, low) if tied else Impact()
+            return kind, Phase(phase.joint), self._part(phase, tip, low) if self._ties(phase) else Impact()
         assert kind is EventKind.SEPARATION
         if self._tip_mass == 0.0 and low.velocity < 0.0 and self._at_equilibrium(low, tolerance):
             return EventKind.RETIE, Phase(Joint.TIED), Impact()  # C vanishes at Ψ, where they are tied again
-        opened = Phase(Joint.FREE, seated=phase.seated and self._mass is not None)
+        opened = Phase(Joint.FREE, seated=phase.seated and not self._alone)
         return kind, opened, self._part(opened, tip, low)
 
     def _meet(self, phase: Phase, tip: Motion, low: Motion, tolerance: float) -> tuple[Phase, Impact]:
-        assert self._tip_mass is not None
-        assert self._mass is not None
         impact = meeting(self._scene.contact.impact, tip.velocity, low.velocity, self._tip_mass, self._mass)
         common = low.velocity + impact.on_spring / self._mass
         if self._scene.contact.lasting:
@@ -178,6 +176,10 @@ class Transitions(Stateful):
             tied = low.displacement < self._equilibrium
         # A top that stands on the foundation is driven into it, and strikes it at once; a massless tip cannot do that.
         return Phase(Joint.TIED if tied else Joint.TOUCH, phase.seated and self._tip_mass == 0.0), impact
+
+    def _ties(self, phase: Phase) -> bool:
+        """Whether a rigid law holds the ends together in ``phase``."""
+        return phase.joint is not Joint.FREE and self._law is None
 
     def _at_equilibrium(self, low: Motion, tolerance: float) -> bool:
         """Whether the lower end is at Ψ, to rounding."""
@@ -203,37 +205,23 @@ class Transitions(Stateful):
         """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
         assert self._scene.stop is not None
         e = self._scene.stop.restitution
-        tied = self._tip_mass is not None and phase.joint is not Joint.FREE and self._law is None
-        v, z = self._striking(ends, tied)
-        speed = max(abs(w) for w in (z, v) if w is not None)
+        with_tip = self._alone or self._ties(phase)
+        masses = self._tip_mass if with_tip else 0.0, 0.0 if self._alone else self._mass
+        v, z = (end.velocity for end in ends)
+        speed = max(abs(z), abs(v) if with_tip else 0.0)
         self.state = max(self.state, speed)
-        after, before = (self._common(*self._striking(motions, tied)) for motions in (ends, start))
+        after, before = (common_velocity(tip.velocity, low.velocity, *masses) for tip, low in (ends, start))
         # It strikes while rising if the rebound would be over in no time.
         dies_out = after > 0.0 or e * speed <= _SEATING_SPEED * self.state
-        if z is not None and elapsed > 0.0 and e * speed <= _SEATING_SPEED_UNSEEN * self.state:
+        if not self._alone and elapsed > 0.0 and e * speed <= _SEATING_SPEED_UNSEEN * self.state:
             # What presses it down is told by the flight: C at its end may be off by what reverses a mismatch of
             # velocities, (d + 1)(d + 2) times their quotient by the step. It rises by (e z)²/2a; each impact is found
             # to no better than the tolerance, which brings it as much.
             dies_out |= 0.5 * (e * after) ** 2 * elapsed <= tolerance * (before - after)
-        masses = self._mass or 0.0, self._tip_mass or 0.0
         if (dies_out and e < 1.0) or speed == 0.0:
-            joint = phase.joint if self._mass is not None else Joint.TIED
-            stays = Phase(joint, seated=True)
-            return EventKind.SEATED, stays, foundation_impact(z, masses[0], v, masses[1], restitution=0.0)
-        return EventKind.STOP_IMPACT, phase, foundation_impact(z, masses[0], v, masses[1], restitution=e)
-
-    def _striking(self, ends: Ends, tied: bool) -> tuple[float | None, float | None]:
-        """Velocities (tip, spring top) [m/s] of those that strike the foundation; ``None`` for one that does not."""
-        tip, low = ends
-        return (
-            tip.velocity if tied or self._mass is None else None,
-            low.velocity if self._mass is not None else None,
-        )
-
-    def _common(self, v: float | None, z: float | None) -> float:
-        """Velocity [m/s] with which those go on that strike together."""
-        tip_mass = 0.0 if v is None else self._tip_mass or 0.0
-        return common_velocity(v or 0.0, z or 0.0, tip_mass, self._mass or 0.0)
+            stays = Phase(Joint.TIED if self._alone else phase.joint, seated=True)
+            return EventKind.SEATED, stays, foundation_impact(v, z, *masses, restitution=0.0)
+        return EventKind.STOP_IMPACT, phase, foundation_impact(v, z, *masses, restitution=e)
 
     def _part(self, held: Phase, tip: Motion, low: Motion) -> Impact:
         """Ends that a tie or the foundation lets go have one velocity; where a scheme has let it differ, they take it.
@@ -242,9 +230,9 @@ class Transitions(Stateful):
         that the foundation holds in the phase ``held`` is at rest.
         """
         parting = tip.velocity - low.velocity
-        if self._tip_mass is None or parting == 0.0 or parting > VIBRATION * self._fastest():
+        if parting == 0.0 or parting > VIBRATION * self._fastest():
             return Impact()
-        if self._mass is None or held.seated:
+        if self._alone or held.seated:
             on_beam, loss = rebound(tip.velocity, self._tip_mass, restitution=0.0)
             return Impact(on_beam, of_foundation=on_beam, energy_loss=loss)
         return meeting("inelastic", tip.velocity, low.velocity, self._tip_mass, self._mass)

@@ -42,9 +42,7 @@ class Detector:
 
     def __init__(self, scene: Scene, pair: Pair, steps: MacroGrid | AdaptiveSteps) -> None:
         self._pair, self._steps = pair, steps
-        tip_share = 0.0
-        if pair.beam is not None and pair.spring is not None:
-            tip_share = common_velocity(1.0, 0.0, pair.beam.mass, pair.spring.mass)
+        tip_share = common_velocity(1.0, 0.0, pair.upper.mass, pair.lower.mass)
         self._separation = Separation(pair, _NO_TIME)
         self._functions = EventFunctions(scene, pair.law, tip_share, pair.equilibrium)
         self._level = pair.stop or 0.0

@@ -93,8 +93,8 @@ class Balance:
         summary = {
             "max_energy_residual": of_own,
             **({"max_interface_residual": of_judged} if self._scene.foreign else {}),
-            **({"loss_beam": float(last["beam_dissipated"])} if self._pair.beam is not None else {}),
-            **({"loss_spring": float(last["spring_dissipated"])} if self._pair.spring is not None else {}),
+            **({"loss_beam": float(last["beam_dissipated"])} if self._scene.upper is not None else {}),
+            **({"loss_spring": float(last["spring_dissipated"])} if self._scene.lower is not None else {}),
             **({"loss_contact": float(last["law_dissipated"])} if self._pair.law is not None else {}),
         }
         warnings = []

@@ -96,19 +96,19 @@ class Loads:
     ----------
     scene
         Whose loads act.
-    beam, spring
-        The bodies; ``None`` where the scene has none.
+    upper, lower
+        The bodies.
     """
 
-    def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
+    def __init__(self, scene: Scene, upper: Body, lower: Body) -> None:
         self._signals = [Signal(load) for load in scene.loads]
         self._end = scene.time.t_end
         self._kinked = [signal for signal in self._signals if signal.kinks]
         self._bodies: list[tuple[Body, list[int]]] = []
         self._last = (-1.0, 0.0)
-        for body, places in ((beam, ON_BEAM), (spring, ON_SPRING)):
+        for body, places in ((upper, ON_BEAM), (lower, ON_SPRING)):
             taken = [i for i, load in enumerate(scene.loads) if load.on in places]
-            if body is not None and taken:
+            if taken:
                 body.expect_loads([scene.loads[i] for i in taken])
                 self._bodies.append((body, taken))
         self.any = bool(self._bodies)

@@ -88,8 +88,8 @@ class Master(Stateful):
         self._transitions = Transitions(
             scene,
             self._pair.law,
-            None if beam is None else beam.mass,
-            None if spring is None else spring.mass,
+            self._pair.upper.mass,
+            self._pair.lower.mass,
             lambda: self.state.fastest,
             self._pair.equilibrium,
         )
@@ -146,15 +146,14 @@ class Master(Stateful):
 
     def _parts(self) -> dict[str, Stateful]:
         pair = self._pair
-        parts = {
+        return {
             "run": self,
             "steps": self._steps,
             "transitions": self._transitions,
             "coupling": pair.joined,
-            "beam": pair.beam,
-            "spring": pair.spring,
+            "beam": pair.upper,
+            "spring": pair.lower,
         }
-        return {name: part for name, part in parts.items() if part is not None}
 
     def _step(self) -> None:
         state, steps, pair = self.state, self._steps, self._pair
@@ -230,7 +229,7 @@ class Master(Stateful):
             self._happened(EventKind.IMPACT, Impact(), 0.0)
         if self._in_contact(start) or (pair.law is None and state.contact[0] != 0.0):
             pair.mark()
-            self._act(EventKind.IMPACT if pair.joinable else EventKind.STOP_IMPACT, step)
+            self._act(EventKind.IMPACT if self._scene.coupled else EventKind.STOP_IMPACT, step)
         self._record(step, pair.ends())
         state.begun = True
 
@@ -238,10 +237,10 @@ class Master(Stateful):
         """Is the tip on the spring top (or the stop), moving down or at rest?"""
         pair = self._pair
         if (
-            pair.beam is None
+            self._scene.upper is None
             or pair.law is not None
             or pair.joined.decides
-            or (pair.spring is None and pair.stop is None)
+            or (pair.alone and pair.stop is None)
         ):
             return False
         tip, low = start
@@ -271,9 +270,9 @@ class Master(Stateful):
         self._happened(kind, impact, lost)
 
     def _happened(self, kind: EventKind, impact: Impact, lost: float) -> None:
-        pair, (tip, low) = self._pair, self._pair.ends()
-        y, z = (None, None) if pair.spring is None else low[:2]
-        u, v = (None, None) if pair.beam is None else tip[:2]
+        tip, low = self._pair.ends()
+        y, z = (None, None) if self._scene.lower is None else low[:2]
+        u, v = (None, None) if self._scene.upper is None else tip[:2]
         self.state.events += 1
         self._log.events.append(Event(self.state.time, kind, y, z, u, v, impact.on_beam, impact.of_foundation, lost))
 

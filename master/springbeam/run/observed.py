@@ -45,7 +45,7 @@ def observed(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event
     if pair.law is not None:
         return Observed(momentum=momentum, misplaced=far)
     hidden = False
-    if pair.joinable and not pair.lasting:
+    if scene.coupled and not pair.lasting:
         hidden = bool((normal_compliance(scene, steps["u_tip_after"], steps[:1]) > MOST_SHOWN).any())
     mismatch = float(np.abs(steps["v_tip_after"] - steps["z_after"])[joined(steps)].max(initial=0.0))
     return Observed(mismatch, momentum, far, hidden)

@@ -64,7 +64,7 @@ class Separation:
     def _ending(self, phase: Phase) -> EventKind | None:
         """Return the event that ends ``phase`` where a force that can only push would pull; ``None`` if all may."""
         pair = self._pair
-        if phase.seated and pair.spring is not None:
+        if phase.seated and not pair.alone:
             return EventKind.UNSEATED
         touches = phase.joint is Joint.TOUCH and pair.law is None and not pair.upper.massless
         return EventKind.SEPARATION if phase.seated or touches else None
@@ -108,7 +108,7 @@ class Separation:
             height: EventFunction = Height(1, pair.stop, share=0.0)
             let_go = Phase(phase.joint)
         else:
-            height, let_go = gap, Phase(Joint.FREE, phase.seated and pair.spring is not None)
+            height, let_go = gap, Phase(Joint.FREE, phase.seated and not pair.alone)
         if height(pair.attempt(state, step.size, step.start, let_go).end)[0] > 0.0:
             return True
         drift = abs(height(step.start)[1])  # what the scheme leaves open of the ends' velocities, no parting

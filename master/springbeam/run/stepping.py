@@ -85,10 +85,6 @@ class State(Memory):
             self.foundation = NO_FORCE
 
 
-#: In place of a body that the scene does not have: at rest at 0.
-_ABSENT = RigidWall(0.0)
-
-
 class Pair:
     """Both bodies of a scene, one of them possibly missing, and what couples them in each phase.
 
@@ -97,32 +93,30 @@ class Pair:
     scene
         Whose contact law and coupling scheme hold.
     beam, spring
-        The bodies; ``None`` where the scene has none.
+        The bodies; ``None`` where the scene has none: a wall stands there, at 0 or where the foundation is.
     """
 
     def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
-        self.beam, self.spring = beam, spring
         self.stop = None if scene.stop is None else scene.stop.position
         #: What holds a lower end that is seated.
         self._held = None if self.stop is None or scene.contact.algorithm else RigidWall(self.stop)
-        self.upper: Body = beam or _ABSENT
-        self.lower: Body = spring or self._held or _ABSENT
-        self.loads = Loads(scene, beam, spring)
-        self.bodies: list[Body] = [body for body in (beam, spring) if body is not None]
+        self.upper: Body = beam or RigidWall(0.0)
+        self.lower: Body = spring or self._held or RigidWall(0.0)
+        self.alone = spring is None  #: whether nothing but the foundation is below the tip
+        self.loads = Loads(scene, self.upper, self.lower)
+        self.bodies = (self.upper, self.lower)
         for body in self.bodies:
-            body.take_place(upper=body is beam)
+            body.take_place(upper=body is self.upper)
         self.repeatable = all(body.abilities.state for body in self.bodies)
         #: Ψ: where the ends of a rigid law are tied below [m].
         self.equilibrium = scene.spring.equilibrium if scene.spring is not None else self.lower.motion().displacement
         #: Where the ends are; looked up once, since every step asks a few times.
         self._tip, self._low = self.upper.motion, self.lower.motion
         self._last: Step | None = None  #: at whose end the bodies are
-        #: Whether a law acts between the tip and what lies below it, the spring top or an elastic stop.
-        self.joinable = beam is not None and (spring is not None or scene.elastic_stop)
-        #: The soft law between these; a rigid one has no force of its own, and ties the ends while they are joined.
-        self.law = law_of(scene) if self.joinable else None
+        #: The soft law between the ends; a rigid one has no force of its own, and ties them while they are joined.
+        self.law = law_of(scene)
         #: Whether they are joined for good.
-        self.lasting = self.joinable and scene.contact.lasting
+        self.lasting = scene.coupled and scene.contact.lasting
         #: Whether contact opens and closes inside steps, without an event that ends them.
         self.opens_softly = self.law is not None and not self.lasting
         #: What couples the bodies where the law acts, and where the ends are apart.
@@ -140,7 +134,7 @@ class Pair:
         tip, low = ends = self.ends()
         if self.law is None:
             held = (contact, 0.0, 0.0)
-            return State(time, ends, contact=held, smoothed=contact, foundation=NO_FORCE if self.spring else held)
+            return State(time, ends, contact=held, smoothed=contact, foundation=held if self.alone else NO_FORCE)
         at_start = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
         phase = Phase(Joint.TIED) if self.lasting else Phase()
         return State(time, ends, phase, (at_start, 0.0, 0.0), smoothed=at_start)
@@ -180,14 +174,14 @@ class Pair:
     def _with_foundation(self, step: Step) -> Step:
         """Return ``step`` with the force N on the lower end that the foundation holds; a spring is at rest under it."""
         time, size, contact, _, _, (tip, _) = step
-        if self.spring is None:
+        if self.alone:
             return step._replace(foundation=contact)
         assert self.stop is not None
-        static, (load, slope, bend) = self.spring.holding_force(self.stop, 0.0), self.spring.load_on_end()
+        static, (load, slope, bend) = self.lower.holding_force(self.stop, 0.0), self.lower.load_on_end()
         bearing = (static - load, -slope, -bend)
-        self.spring.rewind()
+        self.lower.rewind()
         # C and the part of N that bears it cancel: together, rounding of a large C would move a light top.
-        low = self.spring.advance(time, size, NO_FORCE, bearing)
+        low = self.lower.advance(time, size, NO_FORCE, bearing)
         foundation = (contact[0] + bearing[0], contact[1] + bearing[1], contact[2] + bearing[2])
         return step._replace(foundation=foundation, end=(tip, low))
 
@@ -195,10 +189,10 @@ class Pair:
         """Leave the bodies at the end of ``step``, repeating it if a look inside it has moved them."""
         return step if step is self._last else self.attempt(state, step.size, step.start)
 
-    def apply_impulses(self, on_beam: float, on_spring: float) -> None:
-        """Upward impulses [N·s]."""
-        for body, impulse in ((self.beam, on_beam), (self.spring, on_spring)):
-            if body is not None and impulse != 0.0:
+    def apply_impulses(self, *impulses: float) -> None:
+        """Upward impulses [N·s], on the upper and on the lower body."""
+        for body, impulse in zip(self.bodies, impulses, strict=True):
+            if impulse != 0.0:
                 body.apply_impulse(impulse)
 
     def follow_phase(self, phase: Phase) -> float:
@@ -209,7 +203,7 @@ class Pair:
         return 0.0
 
     def ends(self) -> Ends:
-        """(tip, lower end); the one that is missing is at rest at 0."""
+        """(tip, lower end)."""
         return self._tip(), self._low()
 
     def end_force(self, state: State, step: Step) -> float:
