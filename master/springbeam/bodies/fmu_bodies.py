@@ -1,5 +1,7 @@
-"""The port through which a run uses an FMU, and our two FMUs as bodies. One module, though longer than others: every step
-of a run passes through all of it."""
+"""The port through which a run uses an FMU, and our two FMUs as bodies.
+
+One module, though longer than others: every step of a run passes through all of it.
+"""
 
 from __future__ import annotations
 

@@ -118,9 +118,9 @@ class Algorithm1(Coupling):
     def booking(self, ends: Ends) -> Booking:
         return Booking(law_force=self.state.law_force)
 
-    def report(self, steps: int) -> tuple[dict[str, Any], list[str]]:
+    def report(self) -> tuple[dict[str, Any], list[str]]:
         """Return what `Coupling.report` does, with what the algorithm has injected [J]."""
-        found, _ = super().report(steps)
+        found, _ = super().report()
         found |= {
             "spring_steps_per_solve": self.state.iterations / self.state.solves if self.state.solves else 0.0,
             "injected_into_beam": self.state.injected_into_beam,

@@ -47,7 +47,6 @@ class OneWay(SoftSolver):
         if driven.mass == inf:
             held = driven.advance(time, size, guess)
             ends = (end.motion(), held) if self._upper_drives else (held, end.motion())
-            self._maker = self
             known = Step(time, size, guess, NO_FORCE, start, ends)
             before, x = penetration(known, self.degree)
             return known._replace(contact=force.derivatives(self._projection.force(before, size, x), size))

@@ -234,12 +234,9 @@ class Booked(Coupling):
         self.state = Counts()
 
     def accept(self, step: Step) -> None:
-        self._book(step, self._projection)
-
-    def _book(self, step: Step, projection: Projection) -> None:
         if self.law.damped:
-            start, x = penetration(step, projection.degree)
-            self.state.dissipated += projection.dissipated(start, step.size, x)
+            start, x = penetration(step, self.degree)
+            self.state.dissipated += self._projection.dissipated(start, step.size, x)
 
     def booking(self, ends: Ends) -> Booking:
         (u, v, _, _), (y, z, _, _) = ends

@@ -63,7 +63,6 @@ class Counts(Memory):
     """What a coupling remembers: at least what it has counted."""
 
     iterations: int = 0  #: corrections of the force since the start
-    reduced: int = 0  #: steps since the start whose force was not found at the degree asked for, but at degree 0
     dissipated: float = 0.0  #: by a soft law since the start [J]
 
 
@@ -109,17 +108,9 @@ class Coupling(Stateful):
         """Return the phase at ``time`` [s], at the start of the run or at the end of a step, of one that `decides`."""
         raise NotImplementedError
 
-    def report(self, steps: int) -> tuple[dict[str, Any], list[str]]:
-        """Return what the summary of a run of so many ``steps`` says of the coupling, and warnings."""
-        reduced = {"reduced_steps": self.state.reduced} if self.state.reduced else {}
-        warnings = []
-        if reduced:
-            warnings.append(
-                f"the contact force of {self.state.reduced} of {steps} macro steps was not found at coupling.degree = "
-                f"{self.degree}; they were made at degree 0, which keeps the energy but has order 2. The "
-                "contact is stiffer than the macro step follows: take a smaller coupling.macro_step"
-            )
-        return {"iterations": self.state.iterations, **reduced}, warnings
+    def report(self) -> tuple[dict[str, Any], list[str]]:
+        """Return what the summary of a run says of the coupling, and warnings."""
+        return {"iterations": self.state.iterations}, []
 
     def booking(self, ends: Ends) -> Booking:
         """Return the energies at the ``ends``."""

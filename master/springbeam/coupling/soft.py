@@ -16,7 +16,7 @@ from operator import add, neg, sub
 
 import numpy as np
 
-from ..bodies.protocol import Body, Ends, Force
+from ..bodies.protocol import Ends
 from ..contact.laws import SoftLaw
 from . import energy
 from .projection import Booked, penetration
@@ -44,7 +44,7 @@ class SoftState(Responses):
 
 
 class SoftSolver(Booked, StepSolver):
-    """Coupling by a soft law; a step that does not converge at its degree is made at degree 0, which conserves as well.
+    """Coupling by a soft law.
 
     Parameters
     ----------
@@ -62,23 +62,6 @@ class SoftSolver(Booked, StepSolver):
         StepSolver.__init__(self, energy.CONDITIONS[degree], degree, tolerance)
         Booked.__init__(self, law, degree)
         self.state = SoftState()
-        self._maker: SoftSolver = self  #: of the last step tried: another one if that was made at degree 0
-
-    def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
-        self._maker = self
-        try:
-            return super().solve(upper, lower, time, size, start, guess)
-        except NotConverged:
-            if self.degree == 0:
-                raise
-        self._maker = SoftSolver(self.law, 0, self._tolerance)
-        found = self._maker.solve(upper, lower, time, size, start, (guess[0], 0.0, 0.0))
-        self.state.iterations += self._maker.state.iterations
-        return found
-
-    def accept(self, step: Step) -> None:
-        self.state.reduced += self._maker is not self
-        self._book(step, self._maker._projection)
 
     def local_errors(self, step: Step, scales: Scales) -> list[ErrorEstimate]:
         """Estimate from the part of the law's force that the polynomial leaves out: it changes velocities."""

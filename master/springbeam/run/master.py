@@ -354,7 +354,7 @@ class Master(Stateful):
         energies, warnings, changed = self._balance.report(steps)
         seen = observed(scene, self._pair, inside, events)
         free_at_end = not are_joined(inside[-1:]).any()
-        of_coupling, warned = joined.report(made)
+        of_coupling, warned = joined.report()
         unresolved = why_not_resolved(scene, self._steps.size, seen, inside, events, free_at_end=free_at_end)
         warnings += filter(None, [*warned, unresolved or peak_force_doubt(scene), NOT_SHOWN if seen.hidden else None])
         neglect = {}
