@@ -150,13 +150,6 @@ def position_tolerance(ends: Ends, level: float, macro_step: float) -> float:
     return 8.0 * _EPS * max(u, -u, y, -y, level, -level) + 1e-15 * max(v, -v, z, -z) * macro_step
 
 
-def clearance(start: Sample, end: Sample, size: float) -> tuple[float, float]:
-    """Return the lowest and the highest Bézier point of the cubic through both samples: it lies in their hull."""
-    (f0, d0), (f1, d1), third = start, end, size / 3.0
-    points = (f0, f1, f0 + third * d0, f1 - third * d1)
-    return min(points), max(points)
-
-
 def no_dip(start: Sample, end: Sample, size: float) -> bool:
     """Tell whether what both samples hold stays above 0 between them: no dip is deeper than all that changes there."""
     (f0, d0), (f1, d1) = start, end

@@ -11,7 +11,6 @@ from ..bodies.protocol import Ends, Motion, StepRefused
 from ..contact.events import (
     EventFunction,
     EventFunctions,
-    clearance,
     gap,
     locate,
     no_dip,
@@ -141,8 +140,6 @@ class Detector:
             return whole_step
         path = Path.through(start, end, step.size, function.means(step.end, step.size))
         unsure = path.beside_cubic  # a path may be as wrong as the cubic is beside it
-        if whole_step is None and clearance(start, end, step.size)[0] - unsure >= floor + unsure:
-            return None
         before, whole = 0.0, step.size
         for _ in range(_MAX_DIP_TRIALS):
             inside = path.lowest_inside()

@@ -32,7 +32,7 @@ from .detection import Detector
 from .ledger import Balance, Neglect
 from .log import TOGETHER, Log
 from .macro_steps import MacroGrid
-from .observed import NOT_SHOWN, observed, why_not_resolved
+from .observed import mismatch, not_shown, why_not_resolved
 from .outcome import RunStopped, cause_of
 from .stepping import SIMULTANEOUS, Pair, State
 
@@ -352,11 +352,10 @@ class Master(Stateful):
         made, joined = int(np.count_nonzero(np.diff(steps["time"]))), self._pair.joined
         inside = steps[:0] if joined.decides else steps  # what tells of the motion inside steps
         energies, warnings, changed = self._balance.report(steps)
-        seen = observed(scene, self._pair, inside, events)
         free_at_end = not are_joined(inside[-1:]).any()
         of_coupling, warned = joined.report()
-        unresolved = why_not_resolved(scene, self._steps.size, seen, inside, events, free_at_end=free_at_end)
-        warnings += filter(None, [*warned, unresolved or peak_force_doubt(scene), NOT_SHOWN if seen.hidden else None])
+        unresolved = why_not_resolved(scene, self._pair, self._steps.size, inside, events, free_at_end=free_at_end)
+        warnings += filter(None, [*warned, unresolved or peak_force_doubt(scene), not_shown(scene, self._pair, inside)])
         neglect = {}
         if scene.driver_stiffness is not None and len(steps):
             motion, share = Neglect(scene.coupling, scene.driver_stiffness).by(steps)
@@ -373,6 +372,6 @@ class Master(Stateful):
             **energies,
             "resolved": unresolved is None and not changed,
             "warnings": warnings,
-            **({"max_velocity_mismatch": seen.mismatch} if len(inside) else {}),
+            **({"max_velocity_mismatch": mismatch(self._pair, inside)} if len(inside) else {}),
             **(totals(scene, steps, events, window, free_at_end=free_at_end) if len(inside) else {}),
         }
