@@ -162,8 +162,8 @@ class Master(Stateful):
         step, event = self._advance(size, to_kink=target == kink)
         whole = event is None and abs(step.size - size) <= 1e-9 * steps.size
         end = target if whole else state.time + step.size
-        if step.size < steps.size:
-            state.count_cut(end, step.size, steps.size)
+        if event is not None:
+            state.count_event(end, steps.size)
         if step.size > 0.0:
             if self._adaptive is not None:
                 self._adaptive.accept(step)

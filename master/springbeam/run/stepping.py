@@ -17,9 +17,9 @@ from .outcome import RunStopped
 
 #: Events closer than this fraction of H are at once.
 SIMULTANEOUS = 1e-6
-#: Events within H; more of them and the contact is said to chatter. Impacts that die out are up to 18,000 (e = 0.999);
-#: those of a lossy body on a lossless stop are without end.
-_MAX_IN_STEP = 20_000
+#: Events in a row, each within H of the one before; more of them and the contact is said to chatter. Impacts that die
+#: out are up to 18,000 (e = 0.999); those of a lossy body on a lossless stop are without end.
+_MOST_IN_A_ROW = 20_000
 #: The force of a step is continued over at most this many times its size; beyond, its end value is held.
 _REACH_OF_FORCE = 4.0
 
@@ -43,8 +43,8 @@ class State(Memory):
     begun: bool = False  #: whether the row of the start is made
     energy_at_start: float = 0.0  #: before an impact there [J]
     last_opening: float = -inf  #: when a contact or a rest was last let go [s]
-    #: Steps cut by events within one macro step: how many, and since when [s].
-    in_step: tuple[int, float] = (0, -inf)
+    #: Events in a row, each within a macro step of the one before: how many, and when the last was [s].
+    in_a_row: tuple[int, float] = (0, -inf)
     macro_steps: int = 0
     events: int = 0
     halvings: int = 0  #: of steps that were refused
@@ -61,15 +61,15 @@ class State(Memory):
         self.foundation = force.shifted(foundation, size)
         self.steps_in_phase += 1
 
-    def count_cut(self, end: float, size: float, macro_step: float) -> None:
-        """Count a step of ``size`` [s] that was cut and ends at ``end`` [s]. Raises RunStopped if events crowd."""
-        number, since = self.in_step
-        self.in_step = (number + 1, since) if end - since <= macro_step else (1, end)
-        if self.in_step[0] > _MAX_IN_STEP:
+    def count_event(self, time: float, macro_step: float) -> None:
+        """Count an event at ``time`` [s]. Raises RunStopped if they crowd."""
+        number, last = self.in_a_row
+        self.in_a_row = (number + 1 if time - last <= macro_step else 1, time)
+        if number >= _MOST_IN_A_ROW:
             raise RunStopped(
-                f"the contact chatters: {_MAX_IN_STEP} events within a macro step of {macro_step:g} s; a restitution "
-                "below 1 lets impacts die out",
-                end - size,
+                f"the contact chatters: {_MOST_IN_A_ROW} events, each within a macro step of {macro_step:g} s of the one "
+                "before; a restitution below 1 lets impacts die out",
+                self.time,
             )
 
     def enter(self, phase: Phase) -> None:
