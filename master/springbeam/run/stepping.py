@@ -67,8 +67,8 @@ class State(Memory):
         self.in_a_row = (number + 1 if time - last <= macro_step else 1, time)
         if number >= _MOST_IN_A_ROW:
             raise RunStopped(
-                f"the contact chatters: {_MOST_IN_A_ROW} events, each within a macro step of {macro_step:g} s of the one "
-                "before; a restitution below 1 lets impacts die out",
+                f"the contact chatters: {_MOST_IN_A_ROW} events, each within a macro step of {macro_step:g} s of the "
+                "one before; a restitution below 1 lets impacts die out",
                 self.time,
             )
 
