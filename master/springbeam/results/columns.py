@@ -128,14 +128,15 @@ def ledger(scene: Scene, steps: np.ndarray, *, of_interface: bool = False) -> di
     In the ledger ``of_interface`` the energy of a foreign FMU is the work that it has received: its own account may be
     off.
     """
-    parts = []
-    for name in ("beam", "spring"):
-        if of_interface and name in scene.foreign:
-            parts.append((steps[f"{name}_received"], np.zeros(len(steps)), np.zeros(len(steps))))
-        else:
-            kinetic, potential = steps[f"{name}_kinetic"], steps[f"{name}_potential"]
-            parts.append((kinetic + potential, steps[f"{name}_dissipated"], steps[f"{name}_load"]))
-    (e_beam, lost_beam, load_beam), (e_spring, lost_spring, load_spring) = parts
+
+    def account(body: str) -> tuple[Any, Any, Any]:
+        """Return what a body stores, dissipates and has from its loads [J]."""
+        if of_interface and body in scene.foreign:
+            return steps[f"{body}_received"], 0.0, 0.0
+        stored = steps[f"{body}_kinetic"] + steps[f"{body}_potential"]
+        return stored, steps[f"{body}_dissipated"], steps[f"{body}_load"]
+
+    (e_beam, lost_beam, load_beam), (e_spring, lost_spring, load_spring) = account("beam"), account("spring")
     found = {
         "e_beam": e_beam,
         "e_spring": e_spring,
@@ -144,8 +145,4 @@ def ledger(scene: Scene, steps: np.ndarray, *, of_interface: bool = False) -> di
         "e_impact_loss": steps["impact_loss"],
         "e_load": load_beam + steps["unfelt"] + load_spring,
     }
-    # From left to right: `sum` would begin with 0.
-    e_total = e_beam + e_spring
-    for name in ("e_contact", "e_dissipated", "e_impact_loss", "e_load"):
-        e_total = e_total + found[name]
-    return {**found, "e_total": e_total}
+    return {**found, "e_total": np.sum(list(found.values()), axis=0)}

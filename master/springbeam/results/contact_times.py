@@ -7,7 +7,7 @@ at all is decided by rounding.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import pairwise, zip_longest
+from itertools import dropwhile, groupby, pairwise, zip_longest
 from math import inf, nan
 from typing import NamedTuple
 
@@ -119,11 +119,8 @@ def foundation_contacts(events: Iterable[Event], end: float) -> list[Interval]:
 
 def _intervals(changes: Iterable[tuple[float, bool]], end: float) -> list[Interval]:
     """Return when something is touched, from ``changes``: times [s], and whether it is touched from then on."""
-    edges, touched = list[float](), False
-    for time, touches in changes:
-        if touches != touched:
-            edges.append(time)
-            touched = touches
+    begun = dropwhile(lambda change: not change[1], changes)
+    edges = [next(alike)[0] for _, alike in groupby(begun, key=lambda change: change[1])]
     return list(zip_longest(edges[::2], edges[1::2], fillvalue=end))
 
 

@@ -19,7 +19,7 @@ Shapes, bending moments and shear forces along the beam are linear between those
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import comb
 from typing import Any, NamedTuple
@@ -29,7 +29,7 @@ from numpy.polynomial.polynomial import polyval
 
 from ..scene import Scene
 from .columns import columns
-from .paths import Path, derivative, sign_changes, value
+from .paths import LAST_MOMENT, Path, derivative, sign_changes, value
 from .steps import joined
 from .trajectory import Event, Trajectory
 
@@ -124,15 +124,12 @@ def extremes(scene: Scene, steps: np.ndarray, name: str) -> Extremes:
     """
     parts = [steps[f"{part}_after"] for part in (("u_tip", "y") if name == "gap" else (name,))]
     found = list(Extremes.of_rows(steps["time"], parts[0] - parts[1] if name == "gap" else parts[0]))
-    made = np.flatnonzero(steps["size"] > 0.0)
-    for begin in range(0, len(made), _TOGETHER):
-        after = made[begin : begin + _TOGETHER]
-        before, size = steps[after - 1], steps["size"][after]
-        powers = motion(scene, before, steps[after])[name]
+    for after, curves in _curves(scene, steps):
         for place, sign in ((0, 1.0), (2, -1.0)):
-            lowest, step, share = _lowest(sign * powers, below=sign * found[place])
+            lowest, step, share = _lowest(sign * curves[name], below=sign * found[place])
             if step >= 0:
-                found[place : place + 2] = sign * lowest, float(before["time"][step] + share * size[step])
+                end = after[step]
+                found[place : place + 2] = sign * lowest, float(steps["time"][end - 1] + share * steps["size"][end])
     return Extremes(*found)
 
 
@@ -142,26 +139,23 @@ def between_rows(scene: Scene, steps: np.ndarray) -> float:
     A part of the motion that turns far in a step may pass unseen through rows that are right. The last moment of a step
     tells: what it adds to the curve is 0.8 to 2 times the error where that is above a percent, and more of it below.
     """
-    found, made = 0.0, np.flatnonzero(steps["size"] > 0.0)
-    for position, velocity in _ENDS:
+    found = 0.0
+    for position in ("u_tip", "y"):
         places = steps[f"{position}_after"]
         way = float(np.abs(places - places[:1]).max(initial=0.0))
-        for begin in range(0, len(made) if way > 0.0 else 0, _TOGETHER):
-            after = made[begin : begin + _TOGETHER]
-            unsure: Any = _path(steps[after - 1], steps[after], position, velocity).unsure
-            if position == "u_tip":  # where a rigid law joins it to the lower end it takes the path of that
-                unsure = unsure[~(scene.contact.rigid & joined(steps[after - 1]))]
-            found = max(found, float((unsure - _ROUNDING * np.abs(places).max()).max(initial=0.0)) / way)
+        rounding = _ROUNDING * float(np.abs(places).max(initial=0.0))
+        for _, curves in _curves(scene, steps) if way > 0.0 else ():
+            unsure = LAST_MOMENT * float(np.abs(curves[position][_DEGREE]).max())
+            found = max(found, (unsure - rounding) / way)
     return found
 
 
-def _path(before: np.ndarray, steps: np.ndarray, position: str, velocity: str) -> Path:
-    """Return the path of an end over ``steps``, whose numbers are arrays, shape (n,)."""
-    size: Any = steps["size"]
-    begin: Any = (before[f"{position}_after"], before[f"{velocity}_after"])
-    end: Any = (steps[position], steps[velocity])
-    means: Any = (steps[f"{position}_integral"] / size, steps[f"{position}_integral_2"] / size**2)
-    return Path.through(begin, end, size, means)
+def _curves(scene: Scene, steps: np.ndarray) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray]]]:
+    """Yield the numbers of the records that end steps, some thousand at a time, and the `motion` over these steps."""
+    made = np.flatnonzero(steps["size"] > 0.0)
+    for begin in range(0, len(made), _TOGETHER):
+        after = made[begin : begin + _TOGETHER]
+        yield after, motion(scene, steps[after - 1], steps[after])
 
 
 def motion(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
@@ -182,9 +176,10 @@ def motion(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
     found: dict[str, np.ndarray] = {}
     size: Any = steps["size"]
     for position, velocity in _ENDS:
-        path = _path(before, steps, position, velocity)
-        powers = np.array(path.powers)
-        found[position] = powers
+        begin: Any = (before[f"{position}_after"], before[f"{velocity}_after"])
+        end: Any = (steps[position], steps[velocity])
+        means: Any = (steps[f"{position}_integral"] / size, steps[f"{position}_integral_2"] / size**2)
+        powers = found[position] = np.array(Path.through(begin, end, size, means).powers)
         found[velocity] = np.vstack([np.arange(1.0, 6.0)[:, None] * powers[1:] / size, np.zeros_like(size)])
     together = scene.contact.rigid & joined(before)
     for of_tip, of_low in (("u_tip", "y"), ("v_tip", "z")):
@@ -221,17 +216,12 @@ def _between(
         found[name] = linear(name, after[name])
     # What the event at the end of the step moves and takes is kinetic, or springs back with a massless tip.
     lost = after["impact_loss"] - before["impact_loss"]
-    of_tip = _impulses(after, events) * 0.5 * (after["v_tip"] + after["v_tip_after"])
+    impulses = np.array([0.0, *(event.impulse_contact for event in events)])  # of the last event up to a record
+    of_tip = impulses[after["events"].astype(int)] * 0.5 * (after["v_tip"] + after["v_tip_after"])
     of_spring = np.where(after["z_after"] != after["z"], -lost - of_tip, 0.0)
     found["beam_kinetic"] = linear("beam_kinetic", after["beam_kinetic"] + lost + of_spring)
     found["spring_kinetic"] = linear("spring_kinetic", after["spring_kinetic"] - of_spring)
     return found
-
-
-def _impulses(after: np.ndarray, events: Sequence[Event]) -> np.ndarray:
-    """Return the impulse on the tip by the last event up to the end of each step [N·s], 0 before the first."""
-    impulses = np.array([0.0, *(event.impulse_contact for event in events)])
-    return np.asarray(impulses[after["events"].astype(int)])
 
 
 def _lowest(powers: np.ndarray, below: float) -> tuple[float, int, float]:

@@ -20,6 +20,9 @@ Means = tuple[float, float]
 
 #: Largest values in (0, 1) of s²(1 − s)² and of s²(1 − s)²(2s − 1).
 _EVEN, _ODD = 1.0 / 16.0, 0.0178885438
+#: By how much the last of the moments moves a path at most, over the size of its coefficient of s⁵, 2 odd: about the
+#: error of the path, where that is not small.
+LAST_MOMENT = 0.5 * _ODD
 _EPS, _MAX_ITERATIONS = 2.0**-52, 100
 
 
@@ -48,11 +51,6 @@ class Path(NamedTuple):
     def beside_cubic(self) -> float:
         """Largest distance between path and cubic, at most."""
         return _EVEN * abs(self.even) + _ODD * abs(self.odd)
-
-    @property
-    def unsure(self) -> float:
-        """By how much the last of the moments moves the path at most: about its error, where that is not small."""
-        return _ODD * abs(self.odd)
 
     @property
     def moments_beside_cubic(self) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from io import FileIO
 from pathlib import Path
 from typing import Any
@@ -73,7 +74,7 @@ class MemoryRecorder:
         self._summary = _with_scene(summary, self.scene)
 
 
-class FileRecorder:
+class FileRecorder(AbstractContextManager["FileRecorder"]):
     """Streams what `MemoryRecorder` keeps into a `RunDirectory`, so that memory does not grow with the run.
 
     Records are appended a block at a time, after their events and shapes: a run that is killed loses no more than that,
@@ -100,9 +101,6 @@ class FileRecorder:
             self._headers = {directory.shapes: lines([SHAPE_COLUMNS]), **self._headers}
         #: Each hands what is written to the system at once, so that a killed run has it.
         self._files: dict[Path, FileIO] = {}
-
-    def __enter__(self) -> FileRecorder:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -143,19 +141,15 @@ class FileRecorder:
         steps = np.empty(0, STEP) if run.steps is None else run.steps
         shapes = np.empty((0, len(SHAPE_COLUMNS))) if run.shape_table is None else run.shape_table
         self.keep(steps, run.events, shapes)
-        columns = run.columns if self.interval is None else at_multiples(run, self.interval)
-        self._end({name: run.summary[name] for name in run.summary.keys() - {"scene", "files"}}, [columns])
+        self.finish(run.summary, run.columns if run.steps is None else None)
 
-    def finish(self, summary: Mapping[str, Any]) -> None:
-        """See `MemoryRecorder.finish`. Raises OSError."""
+    def finish(self, summary: Mapping[str, Any], columns: Mapping[str, np.ndarray] | None = None) -> None:
+        """See `MemoryRecorder.finish`; ``columns`` are those of a run without records. Raises OSError."""
         self._begin()
         steps = self.steps()
-        if self.interval is None or not len(steps):
-            self._end(summary, blocks(self.scene, steps))
-        else:
-            self._end(summary, [at_multiples(self.trajectory(), self.interval)])
-
-    def _end(self, summary: Mapping[str, Any], rows: Iterable[Mapping[str, np.ndarray]]) -> None:
+        rows: Iterable[Mapping[str, np.ndarray]] = blocks(self.scene, steps) if columns is None else [columns]
+        if self.interval is not None and len(steps):
+            rows = [at_multiples(self.trajectory(), self.interval)]
         self._close_files()
         try:
             write_rows(self.directory, rows)
@@ -192,27 +186,26 @@ class FileRecorder:
         """
         self.directory.claim()
         refuse_cut(self.directory, saved)
-        self._open()
-        for path, file in self._files.items():
-            file.truncate(saved[path.name])
+        for name, size in saved.items():
+            os.truncate(self.directory.path / name, size)
         self.directory.trajectory.unlink(missing_ok=True)
-        self._say_it_runs()
+        self._open()
 
     def _begin(self) -> None:
-        """Remove earlier results and write the files with their headers."""
+        """Remove earlier results and open the files, if that is not done."""
         if self._files:
             return
         for file in self.directory.results():
             file.unlink()
         self._open()
-        for path, header in self._headers.items():
-            _append(self._files[path], header)
-        self._say_it_runs()  # last: where there is a summary, there is a run that can be loaded
 
     def _open(self) -> None:
+        """Open the files, begin new ones with their headers, and say that the run goes on."""
         self._files = {path: path.open("ab", buffering=0) for path in self._headers}
-
-    def _say_it_runs(self) -> None:
+        for path, file in self._files.items():
+            if file.tell() == 0:
+                _append(file, self._headers[path])
+        # Last: where there is a summary, there is a run that can be loaded.
         write_summary(self.directory, _with_scene({"status": "running"}, self.scene))
 
 

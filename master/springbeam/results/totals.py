@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 
 from ..scene import Scene
 from .contact_times import foundation_contacts, kicks, tip_contacts, touches
@@ -143,20 +144,16 @@ def _contact(
     if scene.contact.lasting and scene.coupled:
         return found
     end = float(steps["time"][-1])
-    if not scene.coupled:
-        intervals = foundation_contacts(events, end)
-    else:
-        intervals = tip_contacts(events, end, free_at_end=free_at_end)
+    of_tip = tip_contacts(events, end, free_at_end=free_at_end)
+    intervals = of_tip if scene.coupled else foundation_contacts(events, end)
     lengths = [until - since for since, until in intervals]
     found |= {"contact_duration": max(lengths, default=0.0), "contact_duration_total": sum(lengths)}
     found["number_of_contacts"] = len(intervals)
     if intervals and intervals[-1][1] == end and not free_at_end:
         found["bounce_time"] = intervals[-1][0] - intervals[0][0]
-    opened = [until for _, until in intervals if until < end]
-    if opened:
-        left = [event.v_tip for event in events if event.time == opened[-1] and event.v_tip is not None]
-        if left:
-            found["rebound_velocity"] = left[-1]
+    opened = max((until for _, until in intervals if until < end), default=None)
+    if left := [event.v_tip for event in events if event.time == opened and event.v_tip is not None]:
+        found["rebound_velocity"] = left[-1]
     return found
 
 
@@ -166,38 +163,29 @@ def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tu
     ``at_events`` are the impulses [N·s] that act at each row, as of `kicks`. One at the edge of a window belongs to it
     if that makes the mean larger.
     """
-    # By columns. The first row ends no step: in its place is one without force before the run, and one follows it.
-    time, size, c, dc, ddc = (np.pad(steps[name], 1) for name in ("time", "size", *FORCE_COLUMNS))
-    time[0], time[-1], size[[1, -1]] = time[1] - 2.0 * window, time[-2] + 2.0 * window, 2.0 * window
-    c[1] = dc[1] = ddc[1] = 0.0
-    kick = np.pad(at_events, 1)
-    passed = np.cumsum(size * (c + size * (dc / 2.0 + size * ddc / 6.0)) + kick)
+    rows = steps["time"]
+    # What has been passed on up to each row, after its impulses, and the powers of the time since then up to the next
+    # row; before the run and after it there is no force.
+    begins = np.append(rows[0] - 2.0 * window, rows)
+    passed = np.zeros((4, len(begins)))
+    passed[0, 1:] = np.cumsum(impulse(steps, steps["size"]) + at_events)
+    passed[1:, 1:-1] = [steps[name][1:] / power for name, power in zip(FORCE_COLUMNS, (1.0, 2.0, 6.0), strict=True)]
 
-    def force(times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return C, Ċ and C̈/2."""
-        into = np.searchsorted(time, times)
-        tau = times - (time[into] - size[into])
-        return c[into] + tau * (dc[into] + 0.5 * tau * ddc[into]), dc[into] + tau * ddc[into], 0.5 * ddc[into]
-
-    def impulses(times: np.ndarray) -> np.ndarray:
-        """Return ∫ C dt with the impulses up to ``times`` [s], without and with those at that time, shape (2, n)."""
-        row = np.searchsorted(time, times, side="right") - 1
-        into, tau = row + 1, times - time[row]
-        found = passed[row] + tau * (c[into] + tau * (dc[into] / 2.0 + tau * ddc[into] / 6.0))
-        return np.array([found - np.where(time[row] == times, kick[row], 0.0), found])
+    def upto(times: np.ndarray, side: Literal["left", "right"], order: int = 0) -> np.ndarray:
+        """Return ∫ C dt before the impulses of ``times`` [s] (left) or after them (right), or its derivatives."""
+        row = np.searchsorted(begins, times, side) - 1
+        return np.asarray(polyval(times - begins[row], polyder(passed, order)[:, row], tensor=False))
 
     # Inside steps the mean is largest where C is the same at both edges of the window: between `edges` both forces are
     # of degree 2. The root of a τ² + b τ + c at which it falls is 2 c / (√(b² − 4 a c) − b), also where a is 0.
-    rows = steps["time"]
     edges = np.union1d(rows, rows - window)
     half = 0.5 * np.diff(edges)
     middle = edges[:-1] + half
-    c0, b, a = (late - early for late, early in zip(force(middle + window), force(middle), strict=True))
+    c, b, twice_a = (upto(middle + window, "right", order) - upto(middle, "right", order) for order in (1, 2, 3))
     with np.errstate(divide="ignore", invalid="ignore"):
-        root = 2.0 * c0 / (np.sqrt(b**2 - 4.0 * a * c0) - b)
+        root = 2.0 * c / (np.sqrt(b**2 - 2.0 * twice_a * c) - b)
     inside = np.where(np.abs(root) < half, middle + root, edges[:-1])
-    begins = np.concatenate([rows - window, rows, inside])
-    ends = np.concatenate([rows, rows + window, inside + window])
-    found = impulses(ends).max(axis=0) - impulses(begins).min(axis=0)
+    first, last = np.concatenate([rows - window, rows, inside]), np.concatenate([rows, rows + window, inside + window])
+    found = np.maximum(upto(last, "left"), upto(last, "right")) - np.minimum(upto(first, "left"), upto(first, "right"))
     at = int(np.argmax(found))
-    return max(0.0, float(found[at])) / window, max(float(begins[at]), float(rows[0]))
+    return max(0.0, float(found[at])) / window, max(float(first[at]), float(rows[0]))
