@@ -120,8 +120,8 @@ def test_a_chirp_turns_from_one_frequency_to_the_other():
     ],
 )
 def test_a_signal_with_wrong_keys_is_refused(keys, why):
-    with pytest.raises(ValueError, match=why):
-        Load(on="tip", **keys)
+    with pytest.raises(SceneError, match=rf"^scene: \[loads\.0\] .*{why}"):
+        with_changes(load_scene("soft"), loads=[{"on": "tip", **keys}])
 
 
 def test_steps_end_where_a_load_jumps_or_bends_and_none_is_a_sliver():

@@ -109,10 +109,8 @@ def trajectory_of(
     scene: Scene, steps: np.ndarray, events: list[Event], shapes: np.ndarray | None, summary: dict[str, Any]
 ) -> Trajectory:
     """Return the run that records, events and shapes amount to; parameters as of `springbeam.results.recording`."""
-    made = list(blocks(scene, steps))
-    found = {name: np.concatenate([block[name] for block in made]) for name in made[0]}
     inside = steps if steps["size"].any() else None
-    return Trajectory(scene, found, events, summary=summary, steps=inside, shape_table=shapes)
+    return Trajectory(scene, columns(scene, steps, steps[:1]), events, shapes, summary, inside)
 
 
 def normal_compliance(scene: Scene, u: np.ndarray, first: np.ndarray) -> np.ndarray:

@@ -143,7 +143,7 @@ def _contacts_and_strokes(run: Trajectory, end: float) -> Iterator[tuple[list[In
     times, passed = np.empty(0), np.empty(0)
     if run.steps is not None:
         times = run.steps["time"]
-        passed = np.abs(impulse(run.steps, run.steps["size"])) + np.abs(kicks(times, run.events))
+        passed = np.abs(impulse(run.steps)) + np.abs(kicks(times, run.events))
     yield _contacts(run, end), times, passed
     times = np.array([event.time for event in run.events])
     yield foundation_contacts(run.events, end), times, np.array([abs(e.impulse_foundation) for e in run.events])

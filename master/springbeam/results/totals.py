@@ -96,7 +96,7 @@ def totals(
         found["deepest_tip"], found["deepest_tip_time"] = extremes(scene, steps, "u_tip")[:2]
     if stop:
         found["stop_strokes"] = sum(event.kind.strikes for event in events)
-        held = impulse(steps, steps["size"], name="foundation_force").sum()
+        held = impulse(steps, "foundation_force").sum()
         found["foundation_impulse"] = held + sum(event.impulse_foundation for event in events)
         found["loss_stop"] = sum(event.energy_loss for event in events if event.kind.strikes)
     if beam and spring:
@@ -121,7 +121,7 @@ def shortest_contact(
         return inf
     held = [*tip_contacts(events, inf, free_at_end=free_at_end), *touches(events)]
     for intervals, force in ((held, "contact_force"), (foundation_contacts(events, inf), "foundation_force")):
-        passed = np.cumsum(impulse(steps, steps["size"], name=force))
+        passed = np.cumsum(impulse(steps, force))
         for since, until in intervals:
             if 0.0 < until - since < min(below, found) and until <= time[-1]:
                 first, last = np.searchsorted(time, (since, until))
@@ -136,7 +136,7 @@ def _contact(
     at_events = kicks(steps["time"], events)
     largest, since = _largest_mean(steps, at_events, window)
     found: dict[str, float | int] = {
-        "contact_impulse": (impulse(steps, steps["size"]) + at_events).sum(),
+        "contact_impulse": (impulse(steps) + at_events).sum(),
         "contact_force_max": largest,
         "contact_force_window": window,
         "contact_force_max_time": since,
@@ -168,7 +168,7 @@ def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tu
     # row; before the run and after it there is no force.
     begins = np.append(rows[0] - 2.0 * window, rows)
     passed = np.zeros((4, len(begins)))
-    passed[0, 1:] = np.cumsum(impulse(steps, steps["size"]) + at_events)
+    passed[0, 1:] = np.cumsum(impulse(steps) + at_events)
     passed[1:, 1:-1] = [steps[name][1:] / power for name, power in zip(FORCE_COLUMNS, (1.0, 2.0, 6.0), strict=True)]
 
     def upto(times: np.ndarray, side: Literal["left", "right"], order: int = 0) -> np.ndarray:

@@ -164,11 +164,9 @@ class Trajectory:
         return self.columns[name]
 
     def __getattr__(self, name: str) -> np.ndarray:
-        try:
-            columns: dict[str, np.ndarray] = self.__dict__["columns"]
-            return columns[name]
-        except KeyError:
-            raise AttributeError(name) from None
+        if name == "columns" or name not in self.columns:  # the former while it is unpickled
+            raise AttributeError(name)
+        return self.columns[name]
 
     @property
     def do_steps(self) -> int:

@@ -54,7 +54,6 @@ SIGNALS: dict[str, Signal] = {
     "ramp": Signal(("duration",), ("start",), lambda load, t: np.clip(t / load.duration, 0.0, 1.0)),
     "table": Signal(("file",), ("interpolation", "start"), lambda load, t: load.record(t)),
 }
-_OF_SIGNALS = {name for signal in SIGNALS.values() for name in signal.needs + signal.may}
 #: So many lines of a table in a step are data, and no kinks that are worth the end of one.
 LINES_IN_STEP = 4
 #: Most different places of point forces on a beam.
@@ -95,29 +94,9 @@ class Load(Table):
     interpolation: Literal["linear", "cubic"] = key("–", "between the lines of a table", "linear")
 
     @model_validator(mode="after")
-    def _keys_fit(self) -> Load:
-        needs, may, _ = SIGNALS[self.signal]
-        values = {name: getattr(self, name) for name in type(self).model_fields}
-        given = {name: value for name, value in values.items() if value != type(self).model_fields[name].default}
-        takes = ", ".join(needs + may) or "none of these keys"
-        wrong = [
-            f'{name} = {given[name]!r}: plays no part in signal = "{self.signal}"; it takes {takes}'
-            for name in given
-            if name in _OF_SIGNALS.difference(needs, may)
-        ]
-        wrong += [f'{name}: missing; signal = "{self.signal}" needs it' for name in needs if values[name] is None]
-        wrong += [
-            f'{name} = {given[name]!r}: is for on = "beam", this load is on = "{self.on}"'
-            for name in ("shape", "at")
-            if name in given and self.on != "beam"
-        ]
-        if self.shape is not None and self.at is not None:
-            wrong.append(f"at = {self.at}: a load has a shape or acts at a point; leave one of the two out")
-        if self.rise is not None and self.rise > 0.5 * (self.duration or inf):
-            wrong.append(f"rise = {self.rise}: must be at most half of duration = {self.duration}")
-        if wrong:
-            raise ValueError(wrong[0])
-        _ = self._extent  # refuses what is no table
+    def _has_its_table(self) -> Load:
+        if self.file is not None and self.signal == "table":
+            _ = self.record  # refuses what is no table
         return self
 
     @property

@@ -241,7 +241,9 @@ def told(scene: Scene, rules: Iterable[Rule], *of: Any) -> Iterator[str]:
 
 
 def told_of_loads(scene: Scene, rules: Sequence[Rule]) -> Iterator[str]:
-    """Yield what ``rules`` tell of each load of ``scene``."""
+    """Yield what ``rules`` tell of each load of ``scene``, which is ``[load]`` in their texts."""
     for number, load in enumerate(scene.loads):
-        here = [rule._replace(text=rule.text.replace("{load.", f"{{loads.{number}.")) for rule in rules]
+        name = f"loads.{number}"
+        texts = [rule.text.replace("{load.", f"{{{name}.").replace("[load]", f"[{name}]") for rule in rules]
+        here = [rule._replace(text=text) for rule, text in zip(rules, texts, strict=True)]
         yield from told(scene, here, load)
