@@ -95,11 +95,11 @@ def rows_at(run: Trajectory, times: Any) -> Trajectory:
     return Trajectory(run.scene, made, list(run.events), summary=dict(run.summary))
 
 
-def at_multiples(run: Trajectory, interval: float) -> dict[str, np.ndarray]:
-    """Return the columns of ``run`` at the multiples of ``interval`` [s] from its first to its last row."""
-    first, last = (run.time[i] / interval for i in (0, -1))
-    times = interval * np.arange(np.ceil(first * (1.0 - _SAME)), np.floor(last * (1.0 + _SAME)) + 1.0)
-    return rows_at(run, np.clip(times, run.time[0], run.time[-1])).columns
+def at_multiples(run: Trajectory, interval: float, start: float = 0.0) -> Trajectory:
+    """Return ``run`` at the multiples of ``interval`` [s] after ``start`` [s], from its first to its last row."""
+    first, last = ((run.time[i] - start) / interval for i in (0, -1))
+    times = start + interval * np.arange(np.ceil(first - _SAME * abs(first)), np.floor(last + _SAME * abs(last)) + 1.0)
+    return rows_at(run, np.clip(times, run.time[0], run.time[-1]))
 
 
 class Extremes(NamedTuple):

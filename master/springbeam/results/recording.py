@@ -149,7 +149,7 @@ class FileRecorder(AbstractContextManager["FileRecorder"]):
         steps = self.steps()
         rows: Iterable[Mapping[str, np.ndarray]] = blocks(self.scene, steps) if columns is None else [columns]
         if self.interval is not None and len(steps):
-            rows = [at_multiples(self.trajectory(), self.interval)]
+            rows = [at_multiples(self.trajectory(), self.interval).columns]
         self._close_files()
         try:
             write_rows(self.directory, rows)

@@ -28,6 +28,11 @@ class Signal(NamedTuple):
     may: tuple[str, ...]
     value: Callable[[Any, np.ndarray], Any]
 
+    @property
+    def takes(self) -> tuple[str, ...]:
+        """All keys that play a part."""
+        return self.needs + self.may
+
 
 #: By their names in a scene; what a value is before a signal begins and after its end does not count.
 SIGNALS: dict[str, Signal] = {

@@ -14,7 +14,7 @@ from .linearised import spring_frequency, spring_stiffness
 from .messages import Rule, filled, told
 from .reading import with_changes
 from .scene import Scene
-from .statics import bending_stiffness, locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
+from .statics import bending_stiffness, locking, lowest_frequency, tip_compliance, tip_inertia
 from .tables import ORDINARY_SCHEMES, Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
@@ -199,12 +199,12 @@ def force_window(scene: Scene, stiffness: float = 0.0) -> float:
         return scene.contact.force_window
     if stiffness > 0.0 and beam is not None:
         masses = [tip_inertia(beam), *([] if spring is None else [spring.mass])]
-        return WINDOW * 2.0 * pi / sqrt(stiffness * sum(1.0 / mass for mass in masses))
-    if beam is not None and beam.fidelity == "dynamic":
-        return WINDOW * 2.0 * pi / slowest_frequency(beam)
-    if (together := joined_frequency(scene)) > 0.0:
-        return WINDOW * 2.0 * pi / together
-    return WINDOW * scene.time.t_end
+        omega = sqrt(stiffness * sum(1.0 / mass for mass in masses))
+    elif beam is not None and beam.fidelity == "dynamic":
+        omega = slowest_frequency(beam)
+    else:
+        omega = joined_frequency(scene)
+    return WINDOW * (2.0 * pi / omega if omega > 0.0 else scene.time.t_end)
 
 
 def peak_force_doubt(scene: Scene) -> str | None:
@@ -363,14 +363,14 @@ def fastest_frequency(beam: Beam) -> float:
 
 def mesh_frequency(beam: Beam) -> float:
     """Return an estimate of the highest frequency of the mesh [rad/s]."""
-    bending, shear = bending_stiffness(beam), shear_stiffness(beam)
-    inertia, mass = beam.density * beam.second_moment_of_area, beam.density * beam.area
-    return sqrt(_gradient(beam) * max(bending / inertia, shear / mass) + shear / inertia)
+    shear = beam.shear_coefficient * beam.shear_modulus
+    stiffness = _gradient(beam) * max(beam.young_modulus, shear) + shear * beam.area / beam.second_moment_of_area
+    return sqrt(stiffness / beam.density)
 
 
 def shear_frequency(beam: Beam) -> float:
     """Return an estimate of the highest frequency of shear waves on the mesh [rad/s], which an impact sets off."""
-    return sqrt(_gradient(beam) * shear_stiffness(beam) / (beam.density * beam.area))
+    return sqrt(_gradient(beam) * beam.shear_coefficient * beam.shear_modulus / beam.density)
 
 
 def _gradient(beam: Beam) -> float:
@@ -387,14 +387,12 @@ def _gradient(beam: Beam) -> float:
 def modes_below(beam: Beam, omega: float) -> int:
     """Estimate how many modes are slower than ``omega`` [rad/s]: half waves of both kinds that fit into the length.
 
-    Wave numbers k of the Timoshenko beam, k² = ω² (a + b)/2 ± ω √(ω² (a − b)²/4 + ρA/EI) with a = ρ/E, b = ρA/KAG; the
+    Wave numbers k of the Timoshenko beam, k² = ω² (a + b)/2 ± ω √(ω² (a − b)²/4 + ρA/EI) with a = ρ/E, b = ρ/KG; the
     second is real above √(KAG/ρI).
     """
-    bending, shear = bending_stiffness(beam), shear_stiffness(beam)
-    inertia, mass = beam.density * beam.second_moment_of_area, beam.density * beam.area
-    a, b = inertia / bending, mass / shear
+    a, b = beam.density / beam.young_modulus, beam.density / (beam.shear_coefficient * beam.shear_modulus)
     middle = 0.5 * omega**2 * (a + b)
-    apart = omega * sqrt((0.5 * omega * (a - b)) ** 2 + mass / bending)
+    apart = omega * sqrt((0.5 * omega * (a - b)) ** 2 + beam.density * beam.area / bending_stiffness(beam))
     number = beam.length / pi * (sqrt(middle + apart) + sqrt(max(middle - apart, 0.0)))
     return int(number + 0.5)
 

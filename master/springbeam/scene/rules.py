@@ -141,8 +141,8 @@ def _given(load: Load, key: str) -> bool:
 
 def _of_signal(scene: Scene, load: Load) -> Mapping[str, Any]:
     """Return what the signal of a load takes, for the texts of rules."""
-    takes = ", ".join(SIGNALS[load.signal].needs + SIGNALS[load.signal].may)
-    return {"signal": f'signal = "{load.signal}"', "takes": takes or "none of these keys"}
+    takes = ", ".join(SIGNALS[load.signal].takes) or "none of these keys"
+    return {"signal": f'signal = "{load.signal}"', "takes": takes}
 
 
 def _tolerance(scene: Scene) -> Mapping[str, str]:
@@ -518,11 +518,11 @@ FORBIDDEN: tuple[Rule, ...] = (
 UNFIT_LOADS: tuple[Rule, ...] = (
     *(
         Rule(
-            lambda s, load, key=key: _given(load, key) and key not in SIGNALS[load.signal].needs + SIGNALS[load.signal].may,
+            lambda s, load, key=key: _given(load, key) and key not in SIGNALS[load.signal].takes,
             f"{{load.{key}}}: plays no part in {{signal}}; it takes {{takes}}",
             _of_signal,
         )
-        for key in dict.fromkeys(key for signal in SIGNALS.values() for key in signal.needs + signal.may)
+        for key in dict.fromkeys(key for signal in SIGNALS.values() for key in signal.takes)
     ),
     *(
         Rule(

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..results.dense import rows_at
+from ..results.dense import at_multiples
 from ..results.trajectory import Trajectory
 from ..scene import Load
 from .expressions import signal
@@ -51,11 +51,8 @@ def poincare(run: Trajectory, period: float, start: float = 0.0) -> tuple[np.nda
 
     The point is the tip, or the spring's top where there is no beam.
     """
-    first = np.ceil((run.time[0] - start) / period - 1e-9)
-    last = np.floor((run.time[-1] - start) / period + 1e-9)
-    times = start + period * np.arange(first, last + 1.0)
-    found = rows_at(run, np.clip(times, run.time[0], run.time[-1]))
-    return times, np.column_stack([found[name] for name in _point(run)])
+    found = at_multiples(run, period, start)
+    return found.time, np.column_stack([found[name] for name in _point(run)])
 
 
 def _point(run: Trajectory) -> tuple[str, str]:
@@ -119,11 +116,9 @@ def response(number: int, chirp: Load, time: np.ndarray, values: np.ndarray) -> 
     rate = (last - first) / duration
     driven = (time >= chirp.start) & (time <= chirp.start + duration)
     since = time[driven] - chirp.start
-    turns = (first + 0.5 * rate * since) * since + 1e-9
-    whole = np.arange(turns[-1] // _OF_CHIRP if len(turns) else 0.0)
-    begins = np.searchsorted(turns, _OF_CHIRP * np.append(whole, len(whole)))
-    # One more value, that turns without rows at the end have a place; turns of one row or none have no range.
-    values, rows = np.append(values[driven][: begins[-1]], 0.0), np.diff(begins) > 1
-    ranges = (np.maximum.reduceat(values, begins) - np.minimum.reduceat(values, begins))[:-1]
-    frequency = np.sqrt(first**2 + 2.0 * rate * _OF_CHIRP * (whole + 0.5))
-    return Response(number, frequency[rows], 0.5 * ranges[rows])
+    turns = ((first + 0.5 * rate * since) * since + 1e-9) // _OF_CHIRP
+    number_of, begins, rows = np.unique(turns, return_index=True, return_counts=True)
+    ranges = np.maximum.reduceat(values[driven], begins) - np.minimum.reduceat(values[driven], begins)
+    frequency = np.sqrt(first**2 + 2.0 * rate * _OF_CHIRP * (number_of + 0.5))
+    seen = (rows > 1) & (number_of < number_of.max(initial=0.0))  # one row has no range, and the last turns no end
+    return Response(number, frequency[seen], 0.5 * ranges[seen])

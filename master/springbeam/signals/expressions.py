@@ -7,12 +7,12 @@ outside: no attributes, no statements, no files.
 from __future__ import annotations
 
 import ast
-import importlib
 import os
 import re
 import sys
 from collections.abc import Callable, Iterable
-from typing import Any
+from pkgutil import resolve_name
+from typing import Any, cast
 
 import numpy as np
 from asteval import Interpreter, get_ast_names
@@ -90,17 +90,15 @@ def function_of(text: str) -> Callable[[Trajectory], Any] | None:
     """
     if _FUNCTION.fullmatch(text) is None:
         return None
-    module, _, name = text.partition(":")
     if (here := os.getcwd()) not in sys.path:
         sys.path.append(here)
     try:
-        found = getattr(importlib.import_module(module), name)
+        found: Any = resolve_name(text)
     except (ImportError, AttributeError) as error:
         raise SceneError(f"{text}: {error}") from error
     if not callable(found):
         raise SceneError(f"{text}: is a {type(found).__name__}, not a function of a run")
-    function: Callable[[Trajectory], Any] = found
-    return function
+    return cast(Callable[[Trajectory], Any], found)
 
 
 def _interpreter() -> Interpreter:
