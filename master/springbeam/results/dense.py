@@ -140,13 +140,12 @@ def between_rows(scene: Scene, steps: np.ndarray) -> float:
     tells: what it adds to the curve is 0.8 to 2 times the error where that is above a percent, and more of it below.
     """
     found = 0.0
-    for position in ("u_tip", "y"):
-        places = steps[f"{position}_after"]
-        way = float(np.abs(places - places[:1]).max(initial=0.0))
-        rounding = _ROUNDING * float(np.abs(places).max(initial=0.0))
-        for _, curves in _curves(scene, steps) if way > 0.0 else ():
-            unsure = LAST_MOMENT * float(np.abs(curves[position][_DEGREE]).max())
-            found = max(found, (unsure - rounding) / way)
+    for _, curves in _curves(scene, steps):
+        for position in ("u_tip", "y"):
+            places = steps[f"{position}_after"]
+            unsure = LAST_MOMENT * np.abs(curves[position][_DEGREE]).max() - _ROUNDING * np.abs(places).max()
+            if (way := np.abs(places - places[0]).max()) > 0.0:
+                found = max(found, float(unsure / way))
     return found
 
 

@@ -73,8 +73,8 @@ def joined(steps: np.ndarray) -> np.ndarray:
 
 def impulse(steps: np.ndarray, name: str = "contact_force") -> np.ndarray:
     """Return ∫ C dτ [N·s] over each step, or that of the force N of the foundation."""
-    size = steps["size"]
-    return np.asarray(size * (steps[name] + size * (steps[f"{name}_rate"] / 2.0 + size * steps[f"{name}_rate_2"] / 6.0)))
+    size, c, dc, ddc = (steps[part] for part in ("size", name, f"{name}_rate", f"{name}_rate_2"))
+    return np.asarray(size * (c + size * (dc / 2.0 + size * ddc / 6.0)))
 
 
 def force(steps: np.ndarray, tau: np.ndarray, name: str = "contact_force") -> np.ndarray:
