@@ -90,10 +90,8 @@ def not_resolved(
     H
         Steps of one length that make waves as late as those of the run [s]; needed if these follow from tolerances.
     """
-    # Steps that follow from tolerances are judged by what they add up to: by their own error they follow the ends.
-    of_steps = _OF_STEPS[-1:] if scene.coupling.adaptive else _OF_STEPS
-    seen = _Seen(misplaced, shortest_contact, left_out, between_rows, H)
-    return next(told(scene, (*of_steps, _OF_LOADS, *_OF_CONTACT, _OF_CURVES), seen), None)
+    causes = _OF_ALL_STEPS if scene.coupling.adaptive else (*_OF_EQUAL_STEPS, *_OF_ALL_STEPS)
+    return next(told(scene, causes, _Seen(misplaced, shortest_contact, left_out, between_rows, H)), None)
 
 
 def lateness(scene: Scene, turn: float) -> float:
@@ -257,7 +255,7 @@ def _rounded_down(size: float) -> str:
 # -- what is told ---------------------------------------------------------------------------------------------------
 
 #: How steps of one length may fail; the first that holds is told.
-_OF_STEPS = (
+_OF_EQUAL_STEPS = (
     Rule(
         _too_fast,
         "not resolved: the slowest oscillation of the {name} turns {turn:.3g} rad in a macro step. Velocities, forces "
@@ -274,22 +272,25 @@ _OF_STEPS = (
         f"{STABLE:g} rad the scheme may be unstable and miss short contacts; take a macro_step of {{size:.2g}} s, or "
         'scheme = "energy"',
     ),
+)
+#: How steps may fail, also those that follow from tolerances: these are judged by what they add up to, since by their
+#: own error they follow the ends.
+_OF_ALL_STEPS = (
     Rule(
         _waves_lag,
         "not resolved: generalized-α lets {waves} lag by {lag:.2g} rad at the end; "
         "coupling.macro_step <= {size} resolves them, beam.alpha_b > 0 lets them die out, and "
         'beam.integrator = "modal" is exact',
     ),
-)
-#: How steps may miss loads whose frequencies the scene does not give.
-_OF_LOADS = Rule(
-    lambda s, seen: seen.left_out > LEFT_OUT,
-    "not resolved: what the steps leave out of the tables of loads moves an end by about {far:.2g} % of its way, since "
-    "a mode of it turns far in a step; {remedy}",
-    lambda s, seen: {"far": 100.0 * seen.left_out, "remedy": _shorter(s, (seen.left_out / LEFT_OUT) ** (1.0 / 3.0))},
-)
-#: How steps may miss what joins the ends.
-_OF_CONTACT = (
+    Rule(  # loads whose frequencies the scene does not give
+        lambda s, seen: seen.left_out > LEFT_OUT,
+        "not resolved: what the steps leave out of the tables of loads moves an end by about {far:.2g} % of its way, "
+        "since a mode of it turns far in a step; {remedy}",
+        lambda s, seen: {
+            "far": 100.0 * seen.left_out,
+            "remedy": _shorter(s, (seen.left_out / LEFT_OUT) ** (1.0 / 3.0)),
+        },
+    ),
     Rule(
         _law_missed,
         "not resolved: the forces of the steps differ from the contact law, which moves an end by {far} of its way. "
@@ -308,14 +309,15 @@ _OF_CONTACT = (
             "size": _rounded_down(seen.shortest_contact / SHORT),
         },
     ),
-)
-#: How rows that are right may hide what the ends do between them. It falls no slower than with H where twice as many
-#: steps follow what turned by π.
-_OF_CURVES = Rule(
-    lambda s, seen: seen.between_rows > BETWEEN_ROWS,
-    "not resolved: between the rows an end may be off by {far:.2g} % of its way, since it moves to and fro within a "
-    "step; {remedy}",
-    lambda s, seen: {"far": 100.0 * seen.between_rows, "remedy": _shorter(s, 2.0 * seen.between_rows / BETWEEN_ROWS)},
+    Rule(  # rows that are right; it falls no slower than with H where twice as many steps follow what turned by π
+        lambda s, seen: seen.between_rows > BETWEEN_ROWS,
+        "not resolved: between the rows an end may be off by {far:.2g} % of its way, since it moves to and fro within "
+        "a step; {remedy}",
+        lambda s, seen: {
+            "far": 100.0 * seen.between_rows,
+            "remedy": _shorter(s, 2.0 * seen.between_rows / BETWEEN_ROWS),
+        },
+    ),
 )
 _MESH_DECIDES = Rule(
     _settling,

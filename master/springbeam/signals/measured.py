@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.signal import correlate, correlation_lags
+from scipy.signal import argrelextrema, correlate, correlation_lags
 
 from ..results.dense import rows_at
 from ..results.trajectory import Trajectory, columns_of
@@ -133,8 +133,8 @@ def time_shifts(run: Trajectory, measured: Measured) -> tuple[list[float], float
         square = correlate(a**2, other) - 2.0 * correlate(a, b) + correlate(one, b**2)
         total = total + square / common / (float(np.var(b)) or 1.0)
     total = np.where(common >= 0.5 * min(len(ours), len(theirs)), total, np.inf)
-    beside = np.minimum(np.append(np.inf, total[:-1]), np.append(total[1:], np.inf))
-    lowest = np.flatnonzero((total <= beside) & np.isfinite(total))
+    (lowest,) = argrelextrema(total, np.less_equal)
+    lowest = lowest[np.isfinite(total[lowest])]
     lags = correlation_lags(len(ours), len(theirs))[lowest[np.argsort(total[lowest])]]
     return (begin - first + step * lags).tolist(), step
 
