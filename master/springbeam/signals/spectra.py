@@ -186,9 +186,8 @@ class Spectra:
     power: Mapping[str, PowerSpectrum]
     without_peak: Mapping[str, str]  #: why signals with accelerations of rigid impacts have no peak
     responses: Mapping[str, list[Response]]  #: to each chirp
-    points: tuple[np.ndarray, np.ndarray] | None  #: `poincare` once a period of the drive
+    points: tuple[np.ndarray, np.ndarray] | None  #: `poincare` once a period of the drive, if there is one
     settled: Settled | None
-    driven: bool
     quality: float
 
     def in_words(self) -> Iterator[tuple[str, str]]:
@@ -213,7 +212,7 @@ class Spectra:
         if self.settled is not None:
             of = "the drive's" if self.settled.multiple == 1 else f"{self.settled.multiple} of the drive's"
             yield "motion", f"periodic from {self.settled.since:.6g} s on, period {self.settled.period:.6g} s, {of}"
-        elif self.driven:
+        elif self.points is not None:
             yield "motion", "not periodic within the run: not settled yet, or chaotic"
 
 
@@ -261,6 +260,5 @@ def spectra(
         responses={what: found for what in wanted if (found := responses(run, what))},
         points=poincare(run, 1.0 / drive.frequency, drive.start) if drive and drive.frequency else None,
         settled=tail,
-        driven=drive is not None,
         quality=quality,
     )
