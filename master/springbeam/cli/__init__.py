@@ -16,6 +16,7 @@ from typing import Annotated
 
 import typer
 
+from ..studies.tables import Findings
 from . import checks, look, run, scenes, studies
 from .common import STOPPED, Command
 
@@ -72,7 +73,7 @@ def _common(
         typer.echo("springbeam --help lists all commands, springbeam COMMAND --help their options.")
 
 
-_COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
+_COMMANDS: dict[str, tuple[Callable[..., Findings], ...]] = {
     "Scenes": (scenes.scenes, scenes.keys, scenes.new),
     "Run": (run.run, studies.resume, studies.sweep),
     "Look": (look.report, look.animate, look.export, look.compare, look.spectrum, studies.fit),

@@ -23,18 +23,8 @@ from ..bodies.archive import own_fmu
 from ..bodies.protocol import FmuError
 from ..scene import Beam, Scene, Spring, load_scene
 from ..scene.partners import kind_of
-from ..studies.tables import number, table
-from .common import (
-    BAD_INPUT,
-    DISAGREES,
-    JsonOption,
-    SettingsOption,
-    bad_input_reported,
-    console_for,
-    fail,
-    print_json,
-    say,
-)
+from ..studies.tables import Findings, number, table
+from .common import BAD_INPUT, DISAGREES, JsonOption, SettingsOption, console_for
 
 _PACKAGES = (
     *("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "plotly", "pebble", "pyarrow"),
@@ -48,7 +38,7 @@ def doctor(
     ] = None,
     settings: SettingsOption = None,
     as_json: JsonOption = False,
-) -> None:
+) -> Findings:
     """Show versions, and whether the FMUs are found and can be loaded here. Exit code 1 if they cannot.
 
     With a scene, examine the FMUs of others that it names, and show what they can do and what that allows. Exit code 2
@@ -59,9 +49,7 @@ def doctor(
     from ..bodies.fmu_bodies import FmuBeam, FmuSpring
 
     if scene is not None:
-        with bad_input_reported():
-            _examine(load_scene(scene, settings or ()), as_json)
-        return
+        return _examine(load_scene(scene, settings or ()))
     installed = {package.name.lower(): package.version for package in metadata.distributions()}
     versions = {name: installed.get(name) for name in _PACKAGES}
     fmus = {
@@ -87,9 +75,8 @@ def doctor(
         ("ffmpeg", document["ffmpeg"] or "not found: springbeam animate then writes GIFs only, no MP4"),
         *((fmu["file"], f"{fmu['state']}\n{'':<12}{fmu['error'] or fmu['path']}") for fmu in fmus.values()),
     ]
-    say(document, [], [(f"{name:<12}", text) for name, text in lines], as_json=as_json)
-    if any(fmu["error"] is not None for fmu in fmus.values()):
-        raise typer.Exit(DISAGREES)
+    failed = any(fmu["error"] is not None for fmu in fmus.values())
+    return Findings(document, (), [(f"{name:<12}", text) for name, text in lines], code=DISAGREES if failed else 0)
 
 
 def _loaded(name: str, make: Callable[[], OwnBody]) -> dict[str, Any]:
@@ -106,8 +93,8 @@ def _loaded(name: str, make: Callable[[], OwnBody]) -> dict[str, Any]:
     return found
 
 
-def _examine(scene: Scene, as_json: bool) -> None:
-    """Print what the bodies of ``scene`` can do; end the command if the scene cannot be run with them."""
+def _examine(scene: Scene) -> Findings:
+    """Return what the bodies of ``scene`` can do; it is an error if the scene cannot be run with them."""
     from ..bodies.factory import findings
     from ..bodies.gate import OFFERED, refusals
 
@@ -115,26 +102,23 @@ def _examine(scene: Scene, as_json: bool) -> None:
     for name, body in {"beam": scene.upper, "spring": scene.lower}.items():
         if name not in found:
             if body is not None:
-                shown.append(Text(f"[{name}] {kind_of(body).replace('_', ' ')}: everything is offered"))
+                shown.append(f"[{name}] {kind_of(body).replace('_', ' ')}: everything is offered")
             continue
         finding, given = found[name], scene.foreign[name]
         mass = "(measured)" if given.mass is None else f"measured, {given.mass:.9g} kg given"
         shown.append(Text(f"[{name}] {given.fmu}", style="bold"))
-        shown.append(Text(f"mass that a force or an impulse meets: {finding.mass:.9g} kg {mass}"))
+        shown.append(f"mass that a force or an impulse meets: {finding.mass:.9g} kg {mass}")
         names, told = ("", "capability", "shown by", "what is offered"), asdict(finding.abilities)
         rows = [
             ("yes", key, shown_by, having) if told[key] > 0 else ("no", key, shown_by, lacking)
             for key, shown_by, having, lacking in OFFERED
         ]
         shown.append(table(names, rows, words=names))
-    faults = [fault for finding in found.values() for fault in finding.faults]
     refused = refusals(scene, {table: finding.abilities for table, finding in found.items()})
-    bodies = {name: asdict(finding) for name, finding in found.items()}
-    say({"bodies": bodies, "refused": refused}, shown, as_json=as_json)
-    if faults or refused:
-        fail(BAD_INPUT, "\n".join([*faults, *refused]))
-    if not as_json:
-        typer.echo("The checks found nothing wrong, and the scene can be run.")
+    document = {"bodies": {name: asdict(finding) for name, finding in found.items()}, "refused": refused}
+    if faults := [*(fault for finding in found.values() for fault in finding.faults), *refused]:
+        return Findings(document, shown, code=BAD_INPUT, error="\n".join(faults))
+    return Findings(document, [*shown, "The checks found nothing wrong, and the scene can be run."])
 
 
 if TYPE_CHECKING:
@@ -145,24 +129,20 @@ if TYPE_CHECKING:
 _COLUMNS = ("quantity", "exact", "computed", "error", "bound", "")
 
 
-def verify(as_json: JsonOption = False) -> None:
+def verify(as_json: JsonOption = False) -> Findings:
     """Check the FMUs against exact solutions. Exit code 1 if a check fails.
 
     Example: springbeam verify
     """
     from ..studies.verify import SECTIONS
 
-    with bad_input_reported():
-        found = report(SECTIONS, console_for(silent=as_json))
+    found = report(SECTIONS, console_for(silent=as_json))
     passed = all(check.passed for checks in found.values() for check in checks)
-    if as_json:
-        described = [
-            {"title": title, "checks": [{**asdict(c), "error": c.error, "passed": c.passed} for c in checks]}
-            for title, checks in found.items()
-        ]
-        print_json({"passed": passed, "sections": described})
-    if not passed:
-        raise typer.Exit(DISAGREES)
+    described = [
+        {"title": title, "checks": [{**asdict(c), "error": c.error, "passed": c.passed} for c in checks]}
+        for title, checks in found.items()
+    ]
+    return Findings({"passed": passed, "sections": described}, code=0 if passed else DISAGREES)
 
 
 def report(sections: Iterable[Section], console: Console) -> dict[str, list[Check]]:

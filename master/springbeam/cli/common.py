@@ -1,5 +1,8 @@
 """Arguments, exit codes and errors that all commands use.
 
+A command returns `Findings`. `Command` does the rest for all of them: bad input and an interruption are one error,
+and what was found is said as ``--json`` or ``--quiet`` asks for. A command need not look at these two itself.
+
 Results go to stdout, progress and errors to stderr. ``--json`` puts one JSON document on stdout and nothing else,
 ``--quiet`` only the path of the results. Colours are for terminals, and NO_COLOR turns them off (rich sees to both).
 """
@@ -9,7 +12,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -22,9 +25,10 @@ from typer.core import TyperCommand
 
 from ..bodies.protocol import FmuError
 from ..results.directory import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory
-from ..results.files import as_json
+from ..results.files import as_json as json_of
 from ..run.checkpoint import CheckpointRefused
 from ..scene import SceneError, scene_keys, shipped_scenes
+from ..studies.tables import Findings
 
 DISAGREES = 1
 BAD_INPUT = 2
@@ -87,9 +91,11 @@ class Command(TyperCommand):
                 parameter.metavar = ""
         return parameters
 
-    def invoke(self, ctx: Any) -> Any:
+    def invoke(self, ctx: Any) -> None:
         with interruptible():
-            return super().invoke(ctx)
+            with bad_input_reported():
+                found: Findings = super().invoke(ctx)
+            say(found, quiet=ctx.params.get("quiet", False), as_json=ctx.params.get("as_json", False))
 
 
 def console_for(*, silent: bool) -> Console:
@@ -105,33 +111,24 @@ def progress_bar(*columns: ProgressColumn, quiet: bool) -> Progress:
     )
 
 
-def print_json(document: Any) -> None:
-    """Print ``document`` as JSON; NaN and infinity, as in a run that stopped, become strings."""
-    typer.echo(as_json(document).decode())
+def say(found: Findings, *, quiet: bool, as_json: bool) -> None:
+    """Say what a command has found: one JSON document, or with ``quiet`` only the place, or all for a reader.
 
-
-def say(
-    document: Any,
-    shown: Iterable[Any],
-    files: Iterable[tuple[str, Any]] = (),
-    *,
-    where: Path | None = None,
-    quiet: bool = False,
-    as_json: bool = False,
-) -> None:
-    """Say what a command has found: one JSON ``document``, or with ``quiet`` only ``where``, or all for a reader.
-
-    That is what is ``shown``, tables and lines, and the ``files`` with the words before them.
+    Ends the command with its code and error if it has any. In JSON, NaN and infinity become strings.
     """
     if as_json:
-        print_json(document)
-    elif quiet and where is not None:
-        typer.echo(where)
+        typer.echo(json_of(found.document).decode())
+    elif quiet and found.where is not None:
+        typer.echo(found.where)
     console = console_for(silent=quiet or as_json)
-    for part in shown:
-        console.print(part)
-    for word, file in files:
-        console.print(Text(f"{word:<10}{file}"), soft_wrap=True)
+    for part in found.shown:
+        console.print(Text(part) if isinstance(part, str) else part)
+    for word, file in found.files:
+        console.print(Text(f"{word:<10}{file}" if word else str(file)), soft_wrap=True)
+    if found.error:
+        fail(found.code, found.error)
+    if found.code:
+        raise typer.Exit(found.code)
 
 
 def results_directory(path: Path) -> Path:

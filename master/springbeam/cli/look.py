@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn
-from rich.text import Text
 
 from ..results.directory import ANIMATIONS, REPORT
 from ..results.files import load_trajectory
 from ..results.totals import LOSS_NAMES, TOTALS, totals
 from ..results.trajectory import Trajectory
 from ..scene import Scene
-from ..studies.tables import table, write_csv
+from ..studies.tables import Findings, table, write_csv
 from .common import (
     BAD_INPUT,
     ForceOption,
@@ -25,11 +25,9 @@ from .common import (
     NoPlotsOption,
     QuietOption,
     RunArgument,
-    bad_input_reported,
     fail,
     progress_bar,
     results_directory,
-    say,
 )
 
 
@@ -39,18 +37,17 @@ def report(
         Path | None, typer.Option("--out", "-o", metavar="FILE", help=f"The file to write. Default: DIR/{REPORT}")
     ] = None,
     force: ForceOption = False,
-) -> None:
+) -> Findings:
     """Write a run as one HTML page: motion with a time slider, charts, numbers, the scene. It needs no network.
 
     Example: springbeam report results/soft
     """
-    with bad_input_reported():
-        trajectory = load_trajectory(results_directory(directory))
-        target = _free(out or directory / REPORT, force)
-        from ..pictures.report import page  # plotly takes a second to load
+    trajectory = load_trajectory(results_directory(directory))
+    target = _free(out or directory / REPORT, force)
+    from ..pictures.report import page  # plotly takes a second to load
 
-        target.write_text(page(trajectory), encoding="utf-8")
-    typer.echo(target)
+    target.write_text(page(trajectory), encoding="utf-8")
+    return Findings(files=[("", target)])
 
 
 def export(
@@ -59,17 +56,14 @@ def export(
         Literal["csv", "parquet"],
         typer.Option("--format", help="csv: trajectory.csv anew. parquet: rows, events and shapes."),
     ] = "csv",
-) -> None:
+) -> Findings:
     """Write the tables of a run from its records (steps.bin), also of one that was killed or still runs.
 
     Example: springbeam export results/soft --format parquet
     """
     from ..results.files import export as write
 
-    with bad_input_reported():
-        files = write(results_directory(directory), form)
-    for file in files:
-        typer.echo(file)
+    return Findings(files=[("", file) for file in write(results_directory(directory), form)])
 
 
 def animate(
@@ -86,26 +80,25 @@ def animate(
     fps: Annotated[int, typer.Option("--fps", metavar="N", min=1, max=50, help="Frames per second.")] = 20,
     force: ForceOption = False,
     quiet: QuietOption = False,
-) -> None:
+) -> Findings:
     """Write a run as an animation: beam and spring above their positions over time.
 
     Example: springbeam animate results/soft --out soft.mp4
     """
-    with bad_input_reported():
-        trajectory = load_trajectory(results_directory(directory))
-        target = _free(out or directory / ANIMATIONS[0], force)
-        from ..pictures.animation import AnimationError
-        from ..pictures.animation import animate as write
+    trajectory = load_trajectory(results_directory(directory))
+    target = _free(out or directory / ANIMATIONS[0], force)
+    from ..pictures.animation import AnimationError
+    from ..pictures.animation import animate as write
 
-        def progress(times: Sequence[float]) -> Iterable[float]:
-            with progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), quiet=quiet) as bar:
-                yield from bar.track(times)
+    def progress(times: Sequence[float]) -> Iterable[float]:
+        with progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), quiet=quiet) as bar:
+            yield from bar.track(times)
 
-        try:
-            write(trajectory, target, seconds=seconds, fps=fps, progress=progress)
-        except AnimationError as error:
-            fail(BAD_INPUT, str(error))
-    typer.echo(target)
+    try:
+        write(trajectory, target, seconds=seconds, fps=fps, progress=progress)
+    except AnimationError as error:
+        fail(BAD_INPUT, str(error))
+    return Findings(files=[("", target)])
 
 
 def _free(path: Path, force: bool) -> Path:
@@ -130,7 +123,7 @@ def compare(
     no_plots: NoPlotsOption = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
-) -> None:
+) -> Findings:
     """Compare runs: the keys that differ, the results that matter, and their motions and forces in one picture.
 
     Beside a file of measurements: how far the run is from them.
@@ -140,56 +133,63 @@ def compare(
     measured = runs[-1].is_file()
     if len(runs) < 2 or (measured and len(runs) > 2) or (not measured and (names or shift is not None)):
         fail(BAD_INPUT, "compare takes runs; or one run and a file of measurements, with --map and --shift of these")
+    trajectories = [load_trajectory(results_directory(run)) for run in runs[: 1 if measured else None]]
     if measured:
-        _beside_measured(runs[0], runs[1], names or [], shift, None if no_plots else out, quiet=quiet, as_json=as_json)
-        return
-    with bad_input_reported():
-        trajectories = [load_trajectory(results_directory(run)) for run in runs]
-        names = [str(run) for run in runs]
-        keys, results = differing_keys([run.scene for run in trajectories]), results_of(trajectories)
-        picture = None if no_plots else out
-        if picture is not None:
-            from ..pictures.timeline import DPI, draw_compared  # matplotlib takes a second to load
+        found, draw = _beside_measured(trajectories[0], runs[1], names or [], shift)
+    else:
+        found, draw = _beside_one_another([str(run) for run in runs], trajectories)
+    if no_plots:
+        return replace(found, document={**found.document, "picture": None})
+    out.parent.mkdir(parents=True, exist_ok=True)
+    draw(out)
+    return replace(found, document={**found.document, "picture": out}, files=[("picture", out)], where=out)
 
-            out.parent.mkdir(parents=True, exist_ok=True)
-            draw_compared(dict(zip(names, trajectories, strict=True))).savefig(picture, dpi=DPI)
-    document = {"runs": names, "keys": keys, "results": results, "picture": picture}
+
+#: What was found, and what draws it into a file; matplotlib takes a second to load.
+_Compared = tuple[Findings, Callable[[Path], object]]
+
+
+def _beside_one_another(names: list[str], runs: list[Trajectory]) -> _Compared:
+    """Compare runs."""
+
+    def draw(path: Path) -> None:
+        from ..pictures.timeline import DPI, draw_compared
+
+        draw_compared(dict(zip(names, runs, strict=True))).savefig(path, dpi=DPI)
+
+    keys, results = differing_keys([run.scene for run in runs]), results_of(runs)
     titles = {"keys that differ": keys, "results": results}
     shown = [table(("", *names), _rows(found), title) for title, found in titles.items()]
-    say(document, shown, [("picture", picture)] * (picture is not None), where=picture, quiet=quiet, as_json=as_json)
+    return Findings({"runs": names, "keys": keys, "results": results}, shown), draw
 
 
-def _beside_measured(
-    directory: Path, file: Path, names: list[str], shift: float | None, out: Path | None, *, quiet: bool, as_json: bool
-) -> None:
-    """Show how far a run is from measured curves."""
+def _beside_measured(run: Trajectory, file: Path, names: list[str], shift: float | None) -> _Compared:
+    """Compare a run with measured curves."""
     from ..signals.expressions import Expression
     from ..signals.measured import model, read_measured, residuals, time_shift
     from ..signals.spectra import without_peak
     from ..studies.fit import mapping
 
-    with bad_input_reported():
-        run = load_trajectory(results_directory(directory))
-        measured = read_measured(file, run.scene, mapping(names))
-        moved = time_shift(run, measured) if shift is None else shift
-        found = residuals(run, measured, moved)
-        if out is not None:
-            from ..pictures.plots import draw_measured
+    measured = read_measured(file, run.scene, mapping(names))
+    moved = time_shift(run, measured) if shift is None else shift
+    found = residuals(run, measured, moved)
 
-            out.parent.mkdir(parents=True, exist_ok=True)
-            covered, curves = model(run, measured, moved)
-            pairs = {name: (curve, measured.values[name][covered]) for name, curve in curves.items()}
-            draw_measured(measured.time[covered] + moved, pairs, out)
+    def draw(path: Path) -> None:
+        from ..pictures.plots import draw_measured
+
+        covered, curves = model(run, measured, moved)
+        pairs = {name: (curve, measured.values[name][covered]) for name, curve in curves.items()}
+        draw_measured(measured.time[covered] + moved, pairs, path)
+
     rows = [
         (row.signal, str(row.points), f"{row.rms:.4g}", f"{row.relative:.2%}", f"{row.largest:.4g}", f"{row.at:.6g}")
         for row in found
     ]
     columns = ("curve", "points", "rms", "of its spread", "largest", "at t [s]")
-    shown = [table(columns, rows), f"shift     {moved:.6g} s" + (", found by correlation" if shift is None else "")]
-    columns_taken = [column for name in measured.values for column in Expression(name).names]
-    shown += [why] if (why := without_peak(run, columns_taken)) else []
-    document = {"shift": moved, "residuals": [row._asdict() for row in found], "picture": out}
-    say(document, shown, [("picture", out)] * (out is not None), where=out, quiet=quiet, as_json=as_json)
+    by_what = ", found by correlation" * (shift is None)
+    taken = [column for name in measured.values for column in Expression(name).names]
+    shown = [table(columns, rows), f"shift     {moved:.6g} s{by_what}", *filter(None, [without_peak(run, taken)])]
+    return Findings({"shift": moved, "residuals": [row._asdict() for row in found]}, shown), draw
 
 
 def differing_keys(scenes: list[Scene]) -> dict[str, list[Any]]:
@@ -260,43 +260,40 @@ def spectrum(
     no_plots: NoPlotsOption = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
-) -> None:
+) -> Findings:
     """Find spectra of a run: shock response, power, and the points and the period of a driven motion.
 
     Example: springbeam spectrum results/soft --of a_tip --quality 25
     """
     from ..signals.spectra import spectra
 
-    with bad_input_reported():
-        trajectory = load_trajectory(results_directory(run))
-        found = spectra(trajectory, of or (), low, high, quality, since, segments)
-        directory = out or run.with_name(f"{run.resolve().name}-spectrum")
-        directory.mkdir(parents=True, exist_ok=True)
-        tables = {f"shock-{end}": shock._asdict() for end, shock in found.shock.items()}
-        for number, (what, power) in enumerate(found.power.items()):
-            tables[f"power-{what if what.isidentifier() else number}"] = power._asdict()
-        swept = {(what, chirp.load): chirp for what, several in found.responses.items() for chirp in several}
-        for (what, load), chirp in swept.items():
-            name = f"response-{what if what.isidentifier() else 'formula'}-load-{load}"
-            tables[name] = {"frequency": chirp.frequency, "amplitude": chirp.amplitude}
-        if found.points is not None:
-            times, points = found.points
-            tables["poincare"] = {"time": times, "position": points[:, 0], "velocity": points[:, 1]}
-        files = []
-        for name, columns in tables.items():
-            rows = [dict(zip(columns, row, strict=True)) for row in np.transpose(list(columns.values())).tolist()]
-            files.append(write_csv(directory / f"{name}.csv", rows))
-        if not no_plots:
-            from ..pictures.plots import draw_spectra
+    trajectory = load_trajectory(results_directory(run))
+    found = spectra(trajectory, of or (), low, high, quality, since, segments)
+    directory = out or run.with_name(f"{run.resolve().name}-spectrum")
+    directory.mkdir(parents=True, exist_ok=True)
+    tables = {f"shock-{end}": shock._asdict() for end, shock in found.shock.items()}
+    for number, (what, power) in enumerate(found.power.items()):
+        tables[f"power-{what if what.isidentifier() else number}"] = power._asdict()
+    swept = {(what, chirp.load): chirp for what, several in found.responses.items() for chirp in several}
+    for (what, load), chirp in swept.items():
+        name = f"response-{what if what.isidentifier() else 'formula'}-load-{load}"
+        tables[name] = {"frequency": chirp.frequency, "amplitude": chirp.amplitude}
+    if found.points is not None:
+        times, points = found.points
+        tables["poincare"] = {"time": times, "position": points[:, 0], "velocity": points[:, 1]}
+    files = []
+    for name, columns in tables.items():
+        rows = [dict(zip(columns, row, strict=True)) for row in np.transpose(list(columns.values())).tolist()]
+        files.append(write_csv(directory / f"{name}.csv", rows))
+    if not no_plots:
+        from ..pictures.plots import draw_spectra
 
-            files.append(directory / "spectrum.png")
-            shocks = {f"shock at the {end}": (s.frequency, s.maximax) for end, s in found.shock.items()}
-            powers = {f"power of {what}": (p.frequency[1:], p.density[1:]) for what, p in found.power.items()}
-            answers = {
-                f"{what} to load {load}, {c.way}": (c.frequency, c.amplitude) for (what, load), c in swept.items()
-            }
-            once = None if found.points is None else found.points[1]
-            draw_spectra(shocks, powers, answers, once, trajectory.scene.title or str(run), files[-1])
+        files.append(directory / "spectrum.png")
+        shocks = {f"shock at the {end}": (s.frequency, s.maximax) for end, s in found.shock.items()}
+        powers = {f"power of {what}": (p.frequency[1:], p.density[1:]) for what, p in found.power.items()}
+        answers = {f"{what} to load {load}, {c.way}": (c.frequency, c.amplitude) for (what, load), c in swept.items()}
+        once = None if found.points is None else found.points[1]
+        draw_spectra(shocks, powers, answers, once, trajectory.scene.title or str(run), files[-1])
     settled = None if found.settled is None else {**found.settled._asdict(), "period": found.settled.period}
     document = {
         "directory": directory,
@@ -306,5 +303,5 @@ def spectrum(
         "highest": {what: power.highest for what, power in found.power.items()},
         "settled": settled,
     }
-    lines = [Text(f"{what:<20} {words}") for what, words in found.in_words()]
-    say(document, lines, [("results", file) for file in files], where=directory, quiet=quiet, as_json=as_json)
+    lines = [f"{what:<20} {words}" for what, words in found.in_words()]
+    return Findings(document, lines, [("results", file) for file in files], directory)

@@ -11,7 +11,6 @@ from time import monotonic
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
@@ -26,7 +25,7 @@ from ..run.checkpoint import Checkpoint
 from ..run.outcome import Progress
 from ..scene import Scene, load_scene
 from ..scene.suspicions import implausible
-from ..studies.tables import table
+from ..studies.tables import Findings, table
 from .common import (
     BAD_INPUT,
     STOPPED,
@@ -36,11 +35,8 @@ from .common import (
     QuietOption,
     SceneArgument,
     SettingsOption,
-    bad_input_reported,
     cause_of,
-    console_for,
     fail,
-    print_json,
     progress_bar,
 )
 
@@ -93,33 +89,24 @@ def run(
     force: ForceOption = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
-) -> None:
+) -> Findings:
     """Run a scene; write its results, events and pictures into a directory.
 
     Example: springbeam run soft --set coupling.macro_step=5e-4 --out results/fine
     """
-    with bad_input_reported():
-        what = load_scene(scene, settings or (), accuracy)
-        _refuse_options(what, checkpoint, interval)
-        for line in () if quiet or as_json else implausible(what):
-            typer.echo(f"warning: {line}", err=True)
-        made = picked(what, mesh)
-        what = what if made is None else made.scene
-        default = Path("results") / Path(scene).stem
-        numbered = out is None and not force
-        directory = (
-            RunDirectory.create_numbered(default) if numbered else RunDirectory.create(out or default, replace=force)
-        )
-    carry_out(
-        what,
-        directory,
-        seconds=checkpoint,
-        no_plots=no_plots,
-        quiet=quiet,
-        as_json=as_json,
-        made=made,
-        interval=interval,
-    )
+    what = load_scene(scene, settings or (), accuracy)
+    _refuse_options(what, checkpoint, interval)
+    for line in () if quiet or as_json else implausible(what):
+        typer.echo(f"warning: {line}", err=True)
+    made = picked(what, mesh)
+    what = what if made is None else made.scene
+    default = Path("results") / Path(scene).stem
+    if out is None and not force:
+        directory = RunDirectory.create_numbered(default)
+    else:
+        directory = RunDirectory.create(out or default, replace=force)
+    recorder, silent = FileRecorder(what, directory, interval), quiet or as_json
+    return carry_out(recorder, seconds=checkpoint, made=made, no_plots=no_plots, silent=silent)
 
 
 def _refuse_options(scene: Scene, checkpoint: float | None, interval: float | None) -> None:
@@ -150,86 +137,55 @@ def picked(scene: Scene, mesh: bool = False) -> Trajectory | None:
 
 
 def carry_out(
-    scene: Scene,
-    directory: RunDirectory,
+    recorder: FileRecorder,
     *,
     seconds: float | None,
     start: Checkpoint | None = None,
-    no_plots: bool,
-    quiet: bool,
-    as_json: bool,
     made: Trajectory | None = None,
-    interval: float | None = None,
-) -> None:
-    """Run ``scene`` into ``directory``, from ``start`` if given, and report; see `springbeam.run.runner.run`.
+    no_plots: bool,
+    silent: bool,
+) -> Findings:
+    """Run the scene of ``recorder``, from ``start`` if given, or write a run that is ``made``, and draw it.
 
-    A run that is already ``made`` is only written; ``interval`` as of `FileRecorder`.
-    """
-    console = console_for(silent=quiet or as_json)
-    recorder = FileRecorder(scene, directory, interval)
-    try:
-        with bad_input_reported():
-            error = _run_into(recorder, seconds, start, made, quiet=quiet)
-    finally:
-        if not recorder.begun:
-            directory.discard()
-    report(console, directory, scene)
-    if not no_plots and (trouble := _draw(console, directory)) is not None:
-        error = error or f"{trouble}; what was computed is in {directory.path}"
-    if as_json:
-        print_json({"directory": directory.path, **load_summary(directory.path)})
-    elif quiet:
-        typer.echo(directory.path)
-    if error is not None:
-        fail(STOPPED, error)
-
-
-def _draw(console: Console, directory: RunDirectory) -> str | None:
-    """Draw the pictures; return why there are none, or ``None``."""
-    from ..pictures.plots import plot_run  # matplotlib takes a second to load
-
-    try:
-        pictures = plot_run(load_trajectory(directory.path), directory.path)
-    except (KeyboardInterrupt, OSError) as error:
-        return f"no pictures: {cause_of(error, directory.path)}"
-    if pictures:
-        console.print(Text(f"pictures  {directory.path / '*.png'} ({len(pictures)})"), soft_wrap=True)
-    return None
-
-
-def _run_into(
-    recorder: FileRecorder,
-    seconds: float | None,
-    start: Checkpoint | None,
-    made: Trajectory | None,
-    *,
-    quiet: bool,
-) -> str | None:
-    """Run the scene, or write a run that is ``made``, and return why it stopped early, or ``None``.
-
-    The results are closed and can be loaded either way. Raises what keeps the run from recording anything.
+    ``seconds`` as of `springbeam.run.runner.run`. Raises what keeps the run from recording anything.
     """
     from ..run.outcome import RunStopped
     from ..run.runner import run as run_scene
 
-    t_end = recorder.scene.time.t_end
+    directory, t_end, error = recorder.directory, recorder.scene.time.t_end, ""
     try:
-        with _progress(t_end, quiet=quiet) as progress, recorder:
+        with _progress(t_end, quiet=silent) as progress, recorder:
             if made is not None:
                 recorder.write(made)
             else:
                 run_scene(recorder.scene, recorder, progress, seconds=seconds, start=start)
-        return None
-    except (RunStopped, OSError, FmuError, KeyboardInterrupt) as error:
-        if not recorder.begun and not isinstance(error, RunStopped):
+    except (RunStopped, OSError, FmuError, KeyboardInterrupt) as stopped:
+        if not recorder.begun and not isinstance(stopped, RunStopped):
             raise
-        directory, cause = recorder.directory, cause_of(error, recorder.directory.path)
+        cause = cause_of(stopped, directory.path)
         begun = "; a run begun with --checkpoint SECONDS can go on after it has ended early"
         again = f"; springbeam resume {directory.path} goes on from the last checkpoint"
         how = again if directory.checkpoint.exists() else begun * (seconds is None and made is None)
-        what = cause if isinstance(error, KeyboardInterrupt) else f"the run stopped early: {cause}"
+        what = cause if isinstance(stopped, KeyboardInterrupt) else f"the run stopped early: {cause}"
         where = f"(reached t = {recorder.time:.9g} s of {t_end:g} s)"
-        return f"{what} {where}; what was computed is in {directory.path}{how}"
+        error = f"{what} {where}; what was computed is in {directory.path}{how}"
+    finally:
+        if not recorder.begun:
+            directory.discard()
+    files: list[tuple[str, Any]] = [("results", directory.path)]
+    if not no_plots:
+        from ..pictures.plots import plot_run  # matplotlib takes a second to load
+
+        try:
+            if pictures := plot_run(load_trajectory(directory.path), directory.path):
+                files.append(("pictures", f"{directory.path / '*.png'} ({len(pictures)})"))
+        except (KeyboardInterrupt, OSError) as trouble:
+            lost = f"no pictures: {cause_of(trouble, directory.path)}; what was computed is in {directory.path}"
+            error = error or lost
+    summary = load_summary(directory.path)
+    shown = list(_in_words(recorder.scene, summary, load_events(directory.path)))
+    document = {"directory": directory.path, **summary}
+    return Findings(document, shown, files, directory.path, STOPPED if error else 0, error)
 
 
 @contextmanager
@@ -252,23 +208,19 @@ def _progress(t_end: float, *, quiet: bool) -> Iterator[Progress]:
 # -- in words ----------------------------------------------------------------------------------------------------------
 
 
-def report(console: Console, directory: RunDirectory, scene: Scene) -> None:
-    """Print what a run has come to: its events, totals, residuals and warnings."""
-    summary, events = load_summary(directory.path), load_events(directory.path)
-    console.print(Text(scene.title or "(untitled scene)", style="bold"))
-    kinds = Counter(event.kind for event in events)
+def _in_words(scene: Scene, summary: Mapping[str, Any], events: list[Event]) -> Iterator[str | Text | Table]:
+    """Yield what a run has come to: its events, totals, residuals and warnings."""
+    yield Text(scene.title or "(untitled scene)", style="bold")
     if events:
-        console.print(_event_table(events[:_FIRST_EVENTS], len(events) - _FIRST_EVENTS, scene))
-        counts = ", ".join(f"{number} {kind}" for kind, number in kinds.most_common())
-        console.print(f"events    {counts}")
-        console.print("          (on the tip, of the stop: impulses, upward; lost: energy that the event takes)")
+        yield _event_table(events[:_FIRST_EVENTS], len(events) - _FIRST_EVENTS, scene)
+        kinds = Counter(event.kind for event in events)
+        yield f"events    {', '.join(f'{number} {kind}' for kind, number in kinds.most_common())}"
+        yield "          (on the tip, of the stop: impulses, upward; lost: energy that the event takes)"
     results = Table.grid(padding=(0, 2))
     for words, value in in_words(summary):
         results.add_row(Text(words), Text(value))
-    console.print(results)
-    for line in _lines(summary):
-        console.print(Text(line))
-    console.print(Text(f"results   {directory.path}"), soft_wrap=True)
+    yield results
+    yield from _lines(summary)
 
 
 def _lines(summary: Mapping[str, Any]) -> Iterator[str]:

@@ -12,42 +12,33 @@ from typing import Annotated, Any
 import typer
 from rich.text import Text
 
+from ..results.files import as_json as json_of
 from ..scene import load_scene, shipped_scenes
 from ..scene.messages import MODELS
-from ..studies.tables import number, table
-from .common import (
-    BAD_INPUT,
-    JsonOption,
-    SceneArgument,
-    SettingsOption,
-    bad_input_reported,
-    fail,
-    print_json,
-    say,
-)
+from ..studies.tables import Findings, number, table
+from .common import BAD_INPUT, JsonOption, SceneArgument, SettingsOption, fail
 
 
 def _complete_table(incomplete: str) -> list[str]:
     return [name for name in MODELS if name and name.startswith(incomplete)]
 
 
-def scenes(as_json: JsonOption = False) -> None:
+def scenes(as_json: JsonOption = False) -> Findings:
     """List the scenes that come with the package.
 
     Example: springbeam scenes
     """
     listed: list[dict[str, Any]] = []
-    with bad_input_reported():
-        for name, path in shipped_scenes().items():
-            scene = load_scene(path)
-            parts = {"beam": scene.upper, "spring": scene.lower, "stop": scene.stop}
-            contents = [part for part, there in parts.items() if there is not None]
-            listed.append({
-                "name": name, "contains": contents, "t_end": scene.time.t_end, "title": scene.title, "file": path
-            })  # fmt: skip
+    for name, path in shipped_scenes().items():
+        scene = load_scene(path)
+        parts = {"beam": scene.upper, "spring": scene.lower, "stop": scene.stop}
+        contents = [part for part, there in parts.items() if there is not None]
+        listed.append({
+            "name": name, "contains": contents, "t_end": scene.time.t_end, "title": scene.title, "file": path
+        })  # fmt: skip
     rows = [(row["name"], ", ".join(row["contains"]), f"{row['t_end']:g}", row["title"]) for row in listed]
     shown = table(("scene", "contains", "t_end [s]", "title"), rows, words=("contains", "title"))
-    say(listed, [shown, ""], [("files:", path.parent)], as_json=as_json)
+    return Findings(listed, [shown, ""], [("files:", path.parent)])
 
 
 def keys(
@@ -64,7 +55,7 @@ def keys(
         bool, typer.Option("--metrics", help="List the numbers of a run that sweep and converge know instead.")
     ] = False,
     as_json: JsonOption = False,
-) -> None:
+) -> Findings:
     """List every key of a scene with unit, allowed values, default and meaning.
 
     Example: springbeam keys beam
@@ -72,39 +63,33 @@ def keys(
     from ..scene import messages
 
     if schema:
-        print_json(messages.schema())
-        return
+        found = messages.schema()
+        return Findings(found, files=[("", json_of(found).decode())])
     if metrics:
         from ..studies.metrics import METRICS, heading
 
-        if as_json:
-            print_json([{"name": name, "unit": m.unit, "meaning": m.words} for name, m in METRICS.items()])
-        for name, m in () if as_json else METRICS.items():
-            typer.echo(f"{heading(name)}: {m.words}")
-        return
-    found = messages.listed()
+        listed = [{"name": name, "unit": m.unit, "meaning": m.words} for name, m in METRICS.items()]
+        return Findings(listed, files=[("", f"{heading(name)}: {m.words}") for name, m in METRICS.items()])
+    known = messages.listed()
     if what is not None:
         wanted = re.sub(r"\.\d+", "", what)  # loads.0.frequency is a key of loads
-        found = [key for key in found if wanted in (key.table, f"{key.table}.{key.name}".lstrip("."))]
-        if not found:
+        known = [key for key in known if wanted in (key.table, f"{key.table}.{key.name}".lstrip("."))]
+        if not known:
             fail(BAD_INPUT, f"{what}: no table and no key; springbeam keys lists all")
     shown: list[Any] = []
-    for name, group in groupby(found, lambda key: key.table):
+    for name, group in groupby(known, lambda key: key.table):
         title = f"\n{messages.heading(name)}  {messages.about(name)}" if name else messages.heading(name)
         shown.append(Text(title, style="bold"))
         for key in group:
             unit = "" if key.unit == "–" else f" [{key.unit}]"
             left_out = key.default if key.default.startswith("needed") else f"default: {key.default}"
-            shown += [
-                Text(f"{key.name}{unit}: {key.meaning}"),
-                Text(f"    {key.allowed}; {left_out}", style="dim"),
-            ]
-    say([key._asdict() for key in found], shown, as_json=as_json)
+            shown += [f"{key.name}{unit}: {key.meaning}", Text(f"    {key.allowed}; {left_out}", style="dim")]
+    return Findings([key._asdict() for key in known], shown)
 
 
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="The file is NAME.toml; it must not be there yet.")],
-) -> None:
+) -> Findings:
     """Write a commented scene to start from: an aluminium beam above a rubber bumper above a stop.
 
     Example: springbeam new my_scene
@@ -112,11 +97,10 @@ def new(
     from ..scene.messages import beginning
 
     path = Path(name).with_suffix(".toml")
-    with bad_input_reported():
-        if path.exists():
-            fail(BAD_INPUT, f"{path}: already there; give another NAME")
-        path.write_text(beginning(path.stem), encoding="utf-8")
-    typer.echo(f"{path}: a scene to change; springbeam predict checks its values")
+    if path.exists():
+        fail(BAD_INPUT, f"{path}: already there; give another NAME")
+    path.write_text(beginning(path.stem), encoding="utf-8")
+    return Findings(files=[("", f"{path}: a scene to change; springbeam predict checks its values")])
 
 
 #: A mesh that is so much too stiff is said to lock.
@@ -127,26 +111,25 @@ def predict(
     scene: SceneArgument,
     settings: SettingsOption = None,
     as_json: JsonOption = False,
-) -> None:
+) -> Findings:
     """Predict, without a run, frequencies, stable macro steps, whether the motion is resolved, and the best scheme.
 
     Example: springbeam predict soft --set coupling.macro_step=4e-3
     """
     from ..studies.stability.predict import predict as prediction_of
 
-    with bad_input_reported():
-        what = load_scene(scene, settings or ())
-        p = prediction_of(what)
+    what = load_scene(scene, settings or ())
+    p = prediction_of(what)
     shown: list[Any] = [Text(what.title or "(untitled scene)", style="bold")]
-    shown += [Text(f"{name:<10}{text}") for name, text in _lines(p)]
+    shown += [f"{name:<10}{text}" for name, text in _lines(p)]
     if p["schemes"]:
         names = ("scheme", "degree", "spectral radius − 1", "critical H [s]", "")
         shown.append(table(names, [_scheme(**s, threshold=p["threshold"]) for s in p["schemes"]], words=("",)))
-    shown += [Text(f"note      {note}") for note in p["notes"]]
+    shown += [f"note      {note}" for note in p["notes"]]
     if p["auto"] is not None:
         scheme, degree, because = p["auto"]
-        shown.append(Text(f'fits      {scheme} {degree}, which coupling.scheme = "auto" takes: {because}'))
-    say(p, shown, as_json=as_json)
+        shown.append(f'fits      {scheme} {degree}, which coupling.scheme = "auto" takes: {because}')
+    return Findings(p, shown)
 
 
 def _lines(p: dict[str, Any]) -> Iterator[tuple[str, str]]:

@@ -10,18 +10,18 @@ import inspect
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
-from rich.text import Text
 
 from ..results.directory import ResultsExist, RunDirectory
+from ..results.recording import FileRecorder
 from ..scene import load_scene
+from ..studies.tables import Findings
 from .common import (
     STOPPED,
     ForceOption,
@@ -32,14 +32,12 @@ from .common import (
     QuietOption,
     SceneArgument,
     SettingsOption,
-    bad_input_reported,
     cause_of,
     complete_key,
     console_for,
     fail,
     progress_bar,
     results_directory,
-    say,
 )
 from .run import carry_out as carry_out_run
 from .run import picked, picked_in_words
@@ -73,19 +71,19 @@ class Frame:
     ] = None
 
 
-def study_command(*of_workers: str) -> Callable[[Callable[..., Study]], Callable[..., None]]:
+def study_command(*of_workers: str) -> Callable[[Callable[..., Study]], Callable[..., Findings]]:
     """Return what makes a command of a function that returns a study: with its options, then those of `Frame`.
 
     ``of_workers`` names the options of workers that the command offers.
     """
 
-    def decorate(make: Callable[..., Study]) -> Callable[..., None]:
+    def decorate(make: Callable[..., Study]) -> Callable[..., Findings]:
         own, frame = (inspect.signature(what, eval_str=True).parameters for what in (make, Frame))
         shared = {name: p for name, p in frame.items() if name in of_workers or name not in ("workers", "scheduler")}
 
-        def command(**given: Any) -> None:
-            taken = {name: given.pop(name) for name in shared}
-            carry_out(lambda: make(**given), given.get("scene"), Frame(**taken))
+        def command(**given: Any) -> Findings:
+            frame = Frame(**{name: given.pop(name) for name in shared})
+            return carry_out(make(**given), given.get("scene"), frame)
 
         command.__name__, command.__doc__ = make.__name__, make.__doc__
         parameters = [p.replace(kind=p.KEYWORD_ONLY) for p in (own | shared).values()]
@@ -95,34 +93,27 @@ def study_command(*of_workers: str) -> Callable[[Callable[..., Study]], Callable
     return decorate
 
 
-def carry_out(make: Callable[[], Study], scene: str | None, frame: Frame) -> None:
-    """Compute what of a study is not yet in its directory, write its files, and show what was found.
+def carry_out(study: Study, scene: str | None, frame: Frame) -> Findings:
+    """Compute what of a study is not yet in its directory, write its files, and return what was found.
 
-    ``make`` returns the study, and may raise what bad input raises. The directory is ``out``, else
-    ``results/SCENE-KIND``, or with -2, -3, … behind it where another study is.
+    The directory is ``out``, else ``results/SCENE-KIND``, or with -2, -3, … behind it where another study is.
     """
     from ..studies.study import troubles
 
-    console = console_for(silent=frame.quiet or frame.as_json)
-    with bad_input_reported():
-        study = make()
-        study.cases()
-        records = _opened(study, study.kind if scene is None else f"{Path(scene).stem}-{study.kind}", frame)
-        directory = records.path.parent
-        with _going_on(records, len(study.cases())):
-            computed = _computed(study, records, console, frame)
-            files = study.write(computed, directory, pictures=not frame.no_plots)
-        found = study.findings(computed)
-    say(
-        {"directory": directory, "files": files, **found.document},
-        [*map(Text, study.remarks), *found.shown, *map(Text, troubles(computed))],
-        [("results", file) for file in files],
+    study.cases()
+    records = _opened(study, study.kind if scene is None else f"{Path(scene).stem}-{study.kind}", frame)
+    directory = records.path.parent
+    with _going_on(records, len(study.cases())):
+        computed = _computed(study, records, frame)
+        files = study.write(computed, directory, pictures=not frame.no_plots)
+    found = study.findings(computed)
+    return replace(
+        found,
+        document={"directory": directory, "files": files, **found.document},
+        shown=[*study.remarks, *found.shown, *troubles(computed)],
+        files=[("results", file) for file in files],
         where=directory,
-        quiet=frame.quiet,
-        as_json=frame.as_json,
     )
-    if found.code:
-        raise typer.Exit(found.code)
 
 
 def _opened(study: Study, default: str, frame: Frame) -> Records:
@@ -153,18 +144,17 @@ def _going_on(records: Records, total: int) -> Iterator[None]:
         fail(STOPPED, cause_of(error, directory) + there * bool(records.by_name))
 
 
-def _computed(study: Study, records: Records, console: Console, frame: Frame) -> dict[str, Row]:
+def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
     """Return all records, and show meanwhile how far it is."""
     from ..studies.study import dask_cluster, record_all
 
     total, there = len(study.cases()), len(records.by_name)
     if there == total:
         return record_all(study, records)
-    console.print(Text(study.announced.format(total)))
-    if there:
-        console.print(f"{there} of {total} records are there")
-    columns = BarColumn(bar_width=20), MofNCompleteColumn(), TimeRemainingColumn()
-    bar = progress_bar(*columns, quiet=frame.quiet or frame.as_json)
+    silent = frame.quiet or frame.as_json
+    known = f"\n{there} of {total} records are there" * bool(there)
+    console_for(silent=silent).print(f"{study.announced.format(total)}{known}")
+    bar = progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), TimeRemainingColumn(), quiet=silent)
     task = bar.add_task("", total=total, completed=there)
     processes = (frame.workers or os.cpu_count() or 1) if study.parallel else 0
     with records, dask_cluster(frame.scheduler) if frame.scheduler else nullcontext() as cluster, bar:
@@ -363,7 +353,7 @@ def resume(
     no_plots: NoPlotsOption = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
-) -> None:
+) -> Findings:
     """Go on with a run or a study that was killed or stopped.
 
     A run needs --checkpoint; its results are those of a run that was never stopped, to the last bit. A study (sweep,
@@ -374,19 +364,9 @@ def resume(
     from ..run.runner import last_checkpoint
     from ..studies.study import study_in
 
-    with bad_input_reported():
-        study = study_in(directory)
-        start = None if study is not None else last_checkpoint(results_directory(directory))
-    if start is not None:
-        carry_out_run(
-            start.scene,
-            RunDirectory(directory),
-            seconds=start.seconds,
-            start=start,
-            interval=start.interval,
-            no_plots=no_plots,
-            quiet=quiet,
-            as_json=as_json,
-        )
-    elif study is not None:
-        carry_out(lambda: study, None, Frame(directory, False, no_plots, quiet, as_json))
+    study = study_in(directory)
+    if study is not None:
+        return carry_out(study, None, Frame(directory, False, no_plots, quiet, as_json))
+    start = last_checkpoint(results_directory(directory))
+    recorder, silent = FileRecorder(start.scene, RunDirectory(directory), start.interval), quiet or as_json
+    return carry_out_run(recorder, seconds=start.seconds, start=start, no_plots=no_plots, silent=silent)

@@ -16,8 +16,8 @@ from scipy.optimize import brentq
 
 from ..scene import Scene, SceneError
 from .metrics import Metric, heading, metrics_of
-from .study import Findings, Pictures, Row, Study
-from .tables import number, table
+from .study import Pictures, Row, Study
+from .tables import Findings, number, table
 
 #: Quantities that are compared unless others are asked for, those that a scene has.
 QUANTITIES = (

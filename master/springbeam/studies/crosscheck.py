@@ -15,8 +15,8 @@ from ..results.contact_times import contact_changes
 from ..results.trajectory import Event, Trajectory, columns_of
 from ..scene import Scene
 from .comparison import SHORT, Verdict, away_from, compare, macro_points, quantities, sample
-from .study import Findings, Pictures, Row, Study
-from .tables import number, table
+from .study import Pictures, Row, Study
+from .tables import Findings, number, table
 
 #: Exit codes of the command.
 CODES: dict[Verdict, int] = {"agrees": 0, "differs": 1, "not comparable": 4}
@@ -69,7 +69,7 @@ class Crosscheck(Study):
         over = " over the run that was asked for" * (verdict == "not comparable")
         looks = {"agrees": "bold green", "differs": "bold red", "not comparable": "bold"}
         shown.append(Text(f"{verdict}{over}", style=looks[verdict]))
-        return Findings({name: found for name, found in record.items() if name != "runs"}, shown, CODES[verdict])
+        return Findings({name: found for name, found in record.items() if name != "runs"}, shown, code=CODES[verdict])
 
     def draw(self, records: Mapping[str, Row]) -> Pictures:
         """Draw both motions, forces and impulses."""

@@ -25,8 +25,8 @@ from ..signals.expressions import signal
 from ..signals.measured import Measured, read_measured, time_shifts
 from .accuracy import simulate
 from .design import design, parse_axis
-from .study import Findings, Row, Study
-from .tables import number, table
+from .study import Row, Study
+from .tables import Findings, number, table
 
 _CASE = "fit"
 #: The unknown that moves the clock of the measurement [s], beside keys.
@@ -131,7 +131,7 @@ class Fit(Study):
         ]
         shown += [Text(f"not determined: {why}", style="bold red") for why in record["undetermined"]]
         return Findings({name: record[name] for name in ("keys", "left", "undetermined")}, shown,
-                        1 if record["undetermined"] else 0)  # fmt: skip
+                        code=1 if record["undetermined"] else 0)  # fmt: skip
 
 
 def mapping(names: Sequence[str]) -> dict[str, str]:

@@ -22,7 +22,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
 from importlib import import_module, metadata
 from itertools import islice
 from pathlib import Path
@@ -42,7 +41,7 @@ from ..scene import Scene, SceneError, load_scene, with_changes
 from ..scene.scene import split_key
 from .accuracy import simulate
 from .metrics import Metric, costs
-from .tables import write_csv, write_parquet
+from .tables import Findings, write_csv, write_parquet
 
 FILE = "study.jsonl"
 #: Where `study_in` finds each kind.
@@ -65,15 +64,6 @@ Report = Callable[[Row], None]
 _AHEAD_ON_CLUSTER, _AHEAD = 256, 2
 #: The matrices are small: more threads of a worker only wait for each other.
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-
-
-@dataclass(frozen=True)
-class Findings:
-    """What the records of a study say."""
-
-    document: dict[str, Any]  #: for programs (``--json``)
-    shown: list[Any]  #: tables and lines for a terminal
-    code: int = 0  #: exit code of the command
 
 
 class Study(BaseModel, ABC):

@@ -23,8 +23,8 @@ from ..scene import Load, Scene, SceneError
 from ..scene.messages import unit_of
 from .design import Axis, Sampling, design, parse_axis
 from .metrics import PRINCIPAL, USUAL, Metric, heading, metrics_of
-from .study import Findings, Pictures, Row, Study
-from .tables import table, write_csv
+from .study import Pictures, Row, Study
+from .tables import Findings, table, write_csv
 
 STATUSES = ("done", "stopped", "refused", "lost")
 #: How many rows are shown on the terminal; the files have all.

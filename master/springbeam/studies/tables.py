@@ -1,14 +1,27 @@
-"""Tables of what was found: for a terminal, all of one look, and as CSV and Parquet files."""
+"""What was found: for programs, for a terminal as tables of one look, and as CSV and Parquet files."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 from rich.text import Text
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a command or a study has found."""
+
+    document: Any = None  #: for programs (``--json``)
+    shown: Sequence[Any] = ()  #: tables and lines for a terminal
+    files: Sequence[tuple[str, Any]] = ()  #: where files are, each with a word before it
+    where: Path | None = None  #: the place of all of them (``--quiet``)
+    code: int = 0  #: exit code of the command
+    error: str = ""  #: why, in words
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str = "", words: Collection[str] = ()) -> Table:

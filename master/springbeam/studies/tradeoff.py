@@ -27,8 +27,8 @@ from .comparison import SHORT_SHARE, comparable_until
 from .design import RIGID, SOFT
 from .metrics import costs, errors, motion_errors, worst
 from .rivals import TOLERANCES, Rival
-from .study import Findings, Pictures, Row, Study
-from .tables import number, table
+from .study import Pictures, Row, Study
+from .tables import Findings, number, table
 
 #: A run that takes longer than this is given up, and finer ones of its family are not begun [s]; quick: ten times less.
 _LIMIT = 10.0

@@ -40,8 +40,8 @@ from ...scene import Scene, SceneError, scene_from_dict, with_changes
 from ...scene.resolution import with_scheme_chosen
 from ..comparison import PERTURBATION, initial_speed
 from ..metrics import motion_errors, worst
-from ..study import Findings, Pictures, Row, Study
-from ..tables import table
+from ..study import Pictures, Row, Study
+from ..tables import Findings, table
 from .cells import COUPLINGS, SLICES, UNITS, sampled_cells, scene_dict, slice_cells
 
 #: In the order in which pictures and tables show them; the last must stay empty.
@@ -107,7 +107,7 @@ class Grid(Study):
         classes = Counter(record["kind"] for record in records.values())
         told = {"cells": len(records), "classes": classes, "resolved": resolved, "compared": len(errors)}
         shown = [self._classes(records), Text(beside), *garbage]
-        return Findings({**told, "garbage": bad}, shown, 1 if bad else 0)
+        return Findings({**told, "garbage": bad}, shown, code=1 if bad else 0)
 
     def _classes(self, records: Mapping[str, Row]) -> Table:
         """Return a row per coupling, with the largest residual of the runs that were done."""
