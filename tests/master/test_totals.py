@@ -148,6 +148,15 @@ def test_a_window_over_steps_of_different_curvature_begins_where_both_its_ends_h
     assert numbers["contact_force_max_time"] == pytest.approx(0.5 - 0.2, rel=1e-13)
 
 
+@pytest.mark.parametrize("force", [0.1, 0.7, 1e6 / 3.0])
+def test_of_windows_with_one_mean_the_first_is_told(force):
+    """Whatever rounding makes of a force that is constant from 0.3 on, in steps that are no binary fractions."""
+    ends = np.unique(np.append(0.3, np.linspace(0.0, 1.7, 38)))
+    numbers = found(steps_with(lambda t: (force if t >= 0.3 else 0.0, 0.0, 0.0), ends), window=0.19)
+    assert numbers["contact_force_max"] == pytest.approx(force, rel=1e-12)
+    assert numbers["contact_force_max_time"] == pytest.approx(0.3, rel=1e-12)
+
+
 def test_words_say_what_is_not_zero_and_any_count_and_the_window_beside_the_peak():
     words = dict(in_words({**dict.fromkeys(TOTALS, 0.0), "contact_force_max": 3.0, "contact_force_window": 0.5}))
     counts = {"contacts": "0", "strokes on the foundation": "0"}

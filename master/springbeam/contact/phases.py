@@ -76,6 +76,7 @@ def meeting(kind: str, v: float, z: float, tip_mass: float, mass: float) -> Impa
 
 def rebound(velocity: float, mass: float, restitution: float) -> tuple[float, float]:
     """Impulse −(1+e) m w [N·s] that reverses w to −e w, and its loss ½ m w² (1 − e²) [J]."""
+    # Taken from 0, the impulse on nothing is 0 and not −0.
     return 0.0 - (1.0 + restitution) * mass * velocity, 0.5 * mass * velocity**2 * (1.0 - restitution**2)
 
 

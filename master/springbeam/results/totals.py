@@ -54,6 +54,8 @@ LOSS_NAMES = {
 }
 #: Numbers of `TOTALS` that say something only beside others.
 _BESIDE = ("contact_force_window", "contact_force_max_time", "deepest_tip_time")
+#: Impulses that differ by less than this share of all that has been passed on are one: well above what rounding leaves.
+_ALIKE = 1e-13
 
 
 def in_words(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -158,7 +160,7 @@ def _contact(
 
 
 def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tuple[float, float]:
-    """Return the largest mean of C [N] over windows of ``window`` [s], wherever they begin, and when that begins [s].
+    """Return the largest mean of C [N] over windows of ``window`` [s], wherever they begin, and when the first begins.
 
     ``at_events`` are the impulses [N·s] that act at each row, as of `kicks`. One at the edge of a window belongs to it
     if that makes the mean larger.
@@ -187,5 +189,6 @@ def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tu
     inside = np.where(np.abs(root) < half, middle + root, edges[:-1])
     first, last = np.concatenate([rows - window, rows, inside]), np.concatenate([rows, rows + window, inside + window])
     found = np.maximum(upto(last, "left"), upto(last, "right")) - np.minimum(upto(first, "left"), upto(first, "right"))
-    at = int(np.argmax(found))
-    return max(0.0, float(found[at])) / window, max(float(first[at]), float(rows[0]))
+    largest = found.max()
+    since = first[found >= largest - _ALIKE * np.abs(passed[0]).max()].min()  # of a constant force all are alike
+    return max(0.0, float(largest)) / window, max(float(since), float(rows[0]))

@@ -253,9 +253,10 @@ def judged(run: Trajectory, cause: str = "") -> Row:
     if len(run.time) == 0:
         return ended("stopped", cause) | counts
     # The scale is the largest energy so far [J], as in `springbeam.run.ledger.errors`.
-    mechanical = sum(np.abs(run[name]) for name in ("e_beam", "e_spring", "e_contact") if name in run.columns)
+    stored = {name: np.abs(run[name]) for name in ("e_beam", "e_spring", "e_contact") if name in run.columns}
     if run.scene.spring is not None:
-        mechanical = np.maximum(mechanical, 0.5 * run.scene.spring.mass * run.z**2)
+        stored["e_spring"] = np.maximum(stored["e_spring"], 0.5 * run.scene.spring.mass * run.z**2)
+    mechanical = sum(stored.values())
     scale, overlap = np.maximum.accumulate(np.maximum(mechanical, abs(run.e_total[0]))), _overlap(run)
     relative = np.divide(run.energy_residual, scale, out=np.zeros_like(scale), where=scale > 0.0)
     measured = {"residual": float(np.abs(relative).max()), "overlap": overlap}
