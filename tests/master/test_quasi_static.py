@@ -34,7 +34,7 @@ def test_statics_are_those_of_a_mesh_that_holds_them():
     assert statics.load_energy(BEAM) == pytest.approx(load @ by_load, rel=1e-12)
     at_rest = QuasiStaticBeam(BEAM, 0, statics.tip_load_deflection(BEAM), 0.0).energies()
     assert at_rest.potential == pytest.approx(0.5 * load @ by_load, rel=1e-12)
-    sampler = d.deflection_sampler()
+    sampler = d.interpolated()
     np.testing.assert_allclose(statics.tip_force_shape(BEAM, SHAPE_POINTS), sampler @ by_force, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(statics.load_shape(BEAM, SHAPE_POINTS), sampler @ by_load, rtol=1e-11, atol=1e-15)
     shape = by_force / by_force[d.tip]

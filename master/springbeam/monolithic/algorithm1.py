@@ -299,5 +299,5 @@ class _Algorithm:
         newton |= {"solves": len(solves["spring"]), "time_per_step": seconds / steps}
         summary: dict[str, Any] = {"reference": "algorithm1", "newton": newton, "steps_apart": int(np.sum(cases == 11))}
         extra = ("case", "e_injected_beam", "e_injected_spring")
-        shapes = np.hstack([q @ d.deflection_sampler().T, (q + alpha * v) @ inner_forces(self.beam, d).T])
+        shapes = np.hstack([q @ d.interpolated().T, (q + alpha * v) @ inner_forces(self.beam, d).T])
         return finished(self.scene, columns, shapes, self.events, summary, extra)

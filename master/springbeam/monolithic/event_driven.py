@@ -136,7 +136,7 @@ class _Run:
                 happened.append(state.time)
                 if len(happened) > _MOST_EVENTS or happened[-1 - _AT_ONCE] == state.time:
                     raise ReferenceFailure(f"{len(state.events)} events by t = {state.time:.9g} s: they do not end")
-        self.system.loads.whole()
+        self.system.loads.smooth_from(np.inf)
         counts = {**self._counts, "events": len(state.events)}
         wall_time = clock.perf_counter() - began
         return self.rows.trajectory({"reference": "event_driven", "wall_time": wall_time, "counts": counts})
@@ -155,11 +155,11 @@ class _Run:
             target = min(self._due[0], end) if self._due else end
             segment = propagator.advance(max(target - state.time, 1e-16 * self.t_end))
             self._counts["steps"] += 1
-            event, reach = first_event(s, state.phase, watched, segment) or (None, segment.size)
+            event, reach = first_event(s, state.phase, watched, segment) or (None, segment.nodes[-1])
             state.time = begin + propagator.elapsed if event is None else state.time + reach
             if event is None and abs(state.time - target) <= 1e-14 * self.t_end:
                 state.time = target  # the sum is off by rounding
-            state.X = segment.state(reach)
+            state.X = segment.states[-1].copy() if event is None else segment.inside(reach)
             state.X[s.T] = state.time
             self._record_due()
             if event is not None:
@@ -171,9 +171,8 @@ class _Run:
         start, samples = self.state.time, sample_times
         if samples is None:
             H = self.system.scene.coupling.macro_step or (self.t_end - start) / _SAMPLES
-            count = max(int(np.floor((self.t_end - start) / H * (1.0 + 1e-12))), 0)
-            samples = start + H * np.arange(count + 1)
-            samples = np.append(samples, self.t_end) if self.t_end - samples[-1] > 1e-9 * H else samples
+            whole = max(int((self.t_end - start) / H * (1.0 - 1e-9)), 0)  # of those before the end
+            samples = np.unique([*(start + H * np.arange(whole + 1)), self.t_end])
         times = np.sort(np.asarray(samples, dtype=float))
         within = times[(times >= start) & (times <= self.t_end * (1.0 + 1e-15))]
         if not len(within):
@@ -206,7 +205,7 @@ def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
         x[: s.r] = slope * s.beam.slope_shape
         x_dot[: s.r] = (rate + perturbation * inertia) * s.beam.slope_shape
         if scene.beam.approach == "elastic":
-            s.settle(Phase("free"), X)
+            s.synchronise(Phase("free"), X)
     X[s.T] = time
     return time, X
 
@@ -261,9 +260,9 @@ def _crossing(s: HybridSystem, phase: Phase, watch: Watch, segment: Segment, val
     """Return where a function, whose ``values`` at the nodes are given, first falls through zero."""
 
     def g(tau: float) -> float:
-        return float(watch.function(s.motion(phase, segment.state(tau))))
+        return float(watch.function(s.motion(phase, segment.inside(tau))))
 
-    turns, there = _turns(segment.size, values)
+    turns, there = _turns(segment.nodes[-1], values)
     close = np.abs(there) <= _CLOSE * np.ptp(values)
     there[close] = [g(tau) for tau in turns[close]]
     order = np.argsort(np.r_[segment.nodes, turns])

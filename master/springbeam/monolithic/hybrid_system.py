@@ -19,6 +19,7 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 import numpy as np
+import scipy.linalg
 
 from ..scene import Beam, Scene, Spring, Stop
 from .laws import Motion, Phase, law_of
@@ -32,13 +33,16 @@ class ReferenceFailure(RuntimeError):
     """The reference cannot go on; the message says why and at which time."""
 
 
-class Oscillating(NamedTuple):
-    """The coordinates that move in a phase, ẍ + c ẋ + ω² x = constant + loads, before what joins or holds them."""
+class Held(NamedTuple):
+    """The constraints of a phase: rows g, at right angles, with g·x = level, g·ẋ = 0, and how each moves x."""
 
-    moving: slice  #: of x
-    omega2: np.ndarray
-    c: np.ndarray
-    constant: np.ndarray
+    rows: np.ndarray  #: (k, n)
+    along: np.ndarray  #: (k, n): what x changes by where g·x changes by 1; −along·p is the force along g
+    levels: np.ndarray  #: (k,)
+
+    def hold(self, x: np.ndarray, levels: np.ndarray | float) -> None:
+        """Bring x, of shape (..., n), in place to where g·x are ``levels``."""
+        x += (levels - x @ self.rows.T) @ self.along
 
 
 class HybridSystem:
@@ -79,6 +83,12 @@ class HybridSystem:
         self.between = self.tip if self.alone else self.tip - self.top
         #: What an impulse of 1 N·s adds to the velocity of the tip, and to that between the ends [1/kg].
         self.tip_mobility, self.mobility = float(self.tip @ self.tip), float(self.between @ self.between)
+        #: y where nothing moves it.
+        self.floor = self.stop.position * self.scene.elastic_stop
+        #: What counts of ẋ²/2 as kinetic energy.
+        self.inertia = np.ones(self.n)
+        #: Strain energy [J] under the constant loads that x does not tell.
+        self._hidden = 0.0
         self.size = 2 * self.n + 3
         self.A, self.V = slice(0, self.n), slice(self.n, 2 * self.n)
         self.D, self.W, self.T = 2 * self.n, 2 * self.n + 1, 2 * self.n + 2
@@ -87,31 +97,38 @@ class HybridSystem:
 
     def joined(self, phase: Phase) -> bool:
         """Whether u = y holds as a constraint."""
-        return self.alone or self.law.holds(phase.contact)
+        return self.alone or (self.law.rigid and phase.contact != "free")
 
-    def row(self, phase: Phase) -> np.ndarray | None:
-        """Return g of the constraint g·x = const that joins or holds the tip; ``None`` without one."""
-        if not self.joined(phase):
-            return None
-        return self.tip if phase.seated else None if self.alone else self.between
+    def pressed(self, phase: Phase) -> bool:
+        """Whether the law's energies count."""
+        return not self.law.rigid and phase.contact != "free"
 
-    def oscillating(self, phase: Phase) -> Oscillating:
-        """Return what moves in a phase: all but a spring that is seated."""
-        moving = slice(0, self.r if phase.seated else self.n)
-        return Oscillating(moving, self.omega2[moving], self.c[moving], self.load[moving])
+    def held(self, phase: Phase, level: float | None = None) -> Held:
+        """Return what joins or holds the ends; the top, and the tip that is joined to it, at ``level`` [m] if given."""
+        joined = self.joined(phase)
+        if phase.seated or level is not None:
+            found = [self.tip] * joined + [self.top] * self.has_spring
+        else:
+            found = [self.between] * (joined and not self.alone)
+        rows = np.reshape(found, (len(found), self.n))
+        levels = np.full(len(rows), self.stop.position * phase.seated if level is None else level)
+        return Held(rows, rows / np.sum(rows**2, axis=1, keepdims=True), levels)
 
-    def fixed(self, phase: Phase) -> bool:
-        """Whether the top stands on the foundation, y = φ."""
-        return self.scene.elastic_stop or (phase.seated and self.has_spring)
+    def space(self, phase: Phase) -> np.ndarray:
+        """Return the directions in which x can move, orthonormal, (n, p)."""
+        rows = self.held(phase).rows
+        return scipy.linalg.null_space(rows) if len(rows) else np.eye(self.n)
+
+    def oscillating(self, phase: Phase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return ω² and c [1/s², 1/s] and the constant loads of the coordinates in a phase."""
+        return self.omega2, self.c, self.load
 
     # Motion ---------------------------------------------------------------------------------------------------------
 
     def ends(self, phase: Phase, X: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return u, v, y and z of states of shape (..., 2n + 3)."""
         x, x_dot = X[..., self.A], X[..., self.V]
-        y, z = x @ self.top, x_dot @ self.top
-        if self.fixed(phase):
-            y = np.full_like(y, self.stop.position)
+        y, z = x @ self.top + self.floor, x_dot @ self.top
         return (y, z, y, z) if self.joined(phase) else (x @ self.tip, x_dot @ self.tip, y, z)
 
     def motion(self, phase: Phase, X: np.ndarray) -> Motion:
@@ -122,19 +139,16 @@ class HybridSystem:
             own = own + self.loads.values(X[..., self.T]) @ self.patterns
         if self.spring.cubic_stiffness:
             own = own - (self.spring.cubic_stiffness * y**3)[..., None] * self.top
-        C = self.contact_force(phase, own, y - u, z - v)
-        a, N = own + C[..., None] * self.between, np.zeros_like(u)
+        held, C, N = self.held(phase), np.zeros_like(u), np.zeros_like(u)
+        if self.joined(phase) and len(held.rows):
+            C = -own @ held.along[0]
+        elif self.law.acts(phase.contact) and not self.alone:
+            C = self.law.force(y - u, z - v)
+        a = own + C[..., None] * self.between
         if phase.seated:
             N = C - self.mass * (own @ self.top)
             a[..., self.r :] = 0.0
         return Motion(u, v, y, z, C, N, a, a @ self.top)
-
-    def contact_force(self, phase: Phase, own: np.ndarray, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        """Return C [N] from the forces that act on x without it, and from the penetration and its rate."""
-        row = self.row(phase)
-        if row is not None:
-            return np.asarray(-(own @ row) / (row @ row))
-        return self.law.force(p, rate) if self.law.acts(phase.contact) and not self.alone else np.zeros_like(p)
 
     def load_power(self, X: np.ndarray) -> np.ndarray:
         """Return the power of the loads that vary [W] on states of shape (..., 2n + 3)."""
@@ -143,41 +157,26 @@ class HybridSystem:
     def dissipation_rate(self, phase: Phase, X: np.ndarray) -> np.ndarray:
         """Return ẋᵀ c ẋ, and what the law takes [W]."""
         rate = np.asarray(X[..., self.V] ** 2 @ self.c)
-        if not (self.law.damping and self.law.counts(phase.contact)):
-            return rate
-        u, v, y, z = self.ends(phase, X)
-        return np.asarray(rate + self.law.dissipation(phase.contact, y - u, z - v))
-
-    def place(self, phase: Phase, X: np.ndarray, level: float) -> None:
-        """Put the spring's top, and the tip that is joined to it, at a height [m], in place."""
-        X[..., self.r : self.n] = self.root_mass * level
-        if self.joined(phase):
-            X[..., self.A] += (level - X[..., self.A] @ self.tip)[..., None] * (self.tip / (self.tip @ self.tip))
+        if self.law.damping and self.pressed(phase):
+            u, v, y, z = self.ends(phase, X)
+            rate = rate + self.law.dissipation(phase.contact, y - u, z - v)
+        return rate
 
     def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """Remove from X, in place, what rounding leaves of the constraint, y = u or, seated, y = φ; return X."""
-        row = self.row(phase)
-        if phase.seated:
-            self.place(phase, X, self.stop.position)
-            X[..., self.n + self.r : 2 * self.n] = 0.0
-        elif row is not None:
-            X[..., self.A] -= (X[..., self.A] @ row)[..., None] * (row / (row @ row))
-        if row is not None:
-            X[..., self.V] -= (X[..., self.V] @ row)[..., None] * (row / (row @ row))
+        """Remove from X, in place, what rounding or an impact leaves of a constraint; return X."""
+        held = self.held(phase)
+        held.hold(X[..., self.A], held.levels)
+        held.hold(X[..., self.V], 0.0)
         return X
-
-    def settle(self, phase: Phase, X: np.ndarray) -> float:
-        """Bring what has no inertia to its place in a phase that begins; return the energy [J] that this takes."""
-        return 0.0
 
     # What rows show -------------------------------------------------------------------------------------------------
 
     def shapes(self, states: np.ndarray) -> np.ndarray | None:
         """Return deflections, bending moments and shear forces at `SHAPE_POINTS`, shape (k, 63), of k states.
 
-        They are in m, N·m and N; ``None`` without a beam.
+        They are in m, N·m and N; ``None`` without modes of a beam.
         """
-        if self.beam is None:
+        if self.beam is None or self.scene.massless:  # whose coordinate is that of the tip alone
             return None
         a, v = states[:, : self.r], states[:, self.n : self.n + self.r]
         return np.hstack([a @ self.beam.sampler.T, (a + self.alpha_b * v) @ self.beam.inner.T])
@@ -186,13 +185,13 @@ class HybridSystem:
         """Return energies [J] of states of shape (k, 2n + 3); ``e_load`` is minus the work of the loads."""
         x, x_dot = X[..., self.A], X[..., self.V]
         u, _, y, _ = self.ends(phase, X)
-        linear = 0.5 * (x_dot**2 + self.omega2 * x**2)
+        linear = 0.5 * (self.inertia * x_dot**2 + self.omega2 * x**2)
         return {
-            "e_beam": np.sum(linear[..., : self.r], axis=-1),
+            "e_beam": np.sum(linear[..., : self.r], axis=-1) + self._hidden,
             "e_spring": np.sum(linear[..., self.r :], axis=-1) + 0.25 * self.spring.cubic_stiffness * y**4,
-            "e_contact": self.law.potential(y - u) if self.law.counts(phase.contact) else np.zeros_like(y),
+            "e_contact": self.law.potential(y - u) if self.pressed(phase) else np.zeros_like(y),
             "e_dissipated": X[..., self.D],
-            "e_load": -(x @ self.load) - X[..., self.W],
+            "e_load": -(x @ self.load) - X[..., self.W] - 2.0 * self._hidden,
         }
 
     def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
@@ -228,58 +227,41 @@ class QuasiStaticSystem(HybridSystem):
             scene, ModalBeam(np.sqrt(k) * one, one, k * rest * one, length, shape, shape, shape, scene.beam.alpha_b)
         )
         self.tip_mobility = self.mobility = np.inf
-        self._rest = rest
-        #: Strain energy [J] under the loads that the tip's deflection does not tell.
+        self._rest, self.inertia = rest, np.array([0.0, 1.0])
         self._hidden = stored - 0.5 * k * rest**2
 
-    def row(self, phase: Phase) -> None:
-        """Return nothing: no force is needed to take along what has no mass."""
-
-    def oscillating(self, phase: Phase) -> Oscillating:
-        """Return the spring, which bears the beam while it is joined, or beside it a tip that relaxes."""
-        moving, omega2, c, load = super().oscillating(phase)
+    def held(self, phase: Phase, level: float | None = None) -> Held:
+        """Return what holds the ends: a tip that has no mass is moved without a force, or rests by itself."""
+        rows, along, levels = super().held(phase, level)
         if self.joined(phase):
-            borne = (part[:1] / self.mass for part in (self.omega2, self.c, self.load * self.root_mass))
-            return Oscillating(
-                slice(1, moving.stop), *(own[1:] + more for own, more in zip((omega2, c, load), borne, strict=True))
-            )
-        relaxation = 1.0 / self.alpha_b if self.alpha_b else 0.0
-        return Oscillating(moving, np.append(0.0, omega2[1:]), np.append(relaxation, c[1:]), np.append(0.0, load[1:]))
+            along[0] = self.tip
+        elif not self.alpha_b:
+            rows, along = (np.vstack([self.tip, part]) for part in (rows, along))
+            levels = np.append(self._rest, levels)
+        return Held(rows, along, levels)
 
-    def contact_force(self, phase: Phase, own: np.ndarray, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        return -own[..., 0] * self.joined(phase)
+    def space(self, phase: Phase) -> np.ndarray:
+        """Return the directions in which u and y can move, with a unit of √m y where they are joined."""
+        return super().space(phase) * (np.sqrt(1.0 + 1.0 / self.mass) if self.joined(phase) else 1.0)
+
+    def oscillating(self, phase: Phase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        if self.joined(phase) or not self.alpha_b:
+            return super().oscillating(phase)
+        omega2, c, load = (own[1:] for own in super().oscillating(phase))
+        return np.append(0.0, omega2), np.append(1.0 / self.alpha_b, c), np.append(0.0, load)
 
     def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """Put the tip of X, in place, where the phase has it, on the spring or relaxing by itself; return X."""
+        """Hold X, in place, where the phase has it, or let its tip relax by itself; return X."""
         super().synchronise(phase, X)
-        u, v = X[..., self.A], X[..., self.V]
-        if self.joined(phase):
-            u[..., 0], v[..., 0] = u[..., 1] / self.root_mass, v[..., 1] / self.root_mass
-        elif self.alpha_b > 0.0:
-            v[..., 0] = (self._rest - u[..., 0]) / self.alpha_b
-        else:
-            u[..., 0], v[..., 0] = self._rest, 0.0
+        if self.alpha_b and not self.joined(phase):
+            X[..., self.n] = (self._rest - X[..., 0]) / self.alpha_b
         return X
-
-    def settle(self, phase: Phase, X: np.ndarray) -> float:
-        before = X[0] - self._rest
-        after = self.synchronise(phase, X)[0] - self._rest
-        return 0.5 * float(self.omega2[0] * (before**2 - after**2)) if phase.contact == "free" else 0.0
 
     def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
         """Return the noise of any pair, and what the rounding of an event's time makes of a place, and of the force."""
         moved = NOISE * abs(float(X[self.T])) * float(np.abs(X[self.V]) @ (self.tip + self.top))
         force = NOISE * float(self.omega2[0] * abs(X[0]) + self.c[0] * abs(X[self.n]) + abs(self.load[0]))
         return super().noise(unit, X) + {"m": moved, "m/s": 0.0, "N": float(self.omega2[0]) * moved + force}[unit]
-
-    def shapes(self, states: np.ndarray) -> None:
-        """Return nothing: the unknowns are those of the tip alone."""
-
-    def energies(self, X: np.ndarray, phase: Phase) -> dict[str, np.ndarray]:
-        found = super().energies(X, phase)
-        found["e_beam"] = found["e_beam"] - 0.5 * X[..., self.n] ** 2 + self._hidden
-        found["e_load"] = found["e_load"] - 2.0 * self._hidden
-        return found
 
 
 def _statics(beam: Beam) -> tuple[float, float, float]:

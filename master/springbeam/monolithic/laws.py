@@ -71,25 +71,15 @@ class Law:
     rigid = False
     #: Where a run starts; a law that starts elsewhere than in `free` joins the ends for good.
     start: Contact = "free"
-    #: Whether `force` is k p + c ṗ with the scene's stiffness and damping.
-    linear = False
 
     def __init__(self, scene: Scene) -> None:
         contact = scene.contact
         self.stiffness, self.exponent, self.damping = contact.stiffness, contact.exponent, contact.damping
         self.equilibrium = 0.0 if scene.spring is None else scene.spring.equilibrium
 
-    def holds(self, contact: Contact) -> bool:
-        """Return whether u = y holds as a constraint."""
-        return self.rigid and contact != "free"
-
-    def counts(self, contact: Contact) -> bool:
-        """Return whether `potential` and `dissipation` count."""
-        return not self.rigid and contact != "free"
-
     def acts(self, contact: Contact) -> bool:
         """Return whether C is `force`."""
-        return self.counts(contact) and contact != "slack"
+        return not self.rigid and contact in ("touch", "tied")
 
     def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """Return C [N] at penetrations p [m] with rates ṗ [m/s]."""
@@ -167,7 +157,6 @@ class Link(Law):
     """An elastic link with a damper, C = λ_nc p + c ṗ for either sign of p."""
 
     start = "tied"
-    linear = True
 
     def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
         return np.asarray(self.stiffness * p + self.damping * rate)

@@ -69,8 +69,10 @@ class SemiDiscreteBeam:
         """e, with eᵀq = u(L)."""
         return np.asarray(np.eye(1, self.size, self.tip)[0])
 
-    def interpolated(self, fractions: np.ndarray, of_u: int, *, slopes: bool = False) -> sp.csr_matrix:
-        """Return the (k, 2N) matrix that takes q to θ or, with ``of_u`` = 1, u at k ``fractions`` of the length.
+    def interpolated(
+        self, fractions: np.ndarray = SHAPE_POINTS, of_u: int = 1, *, slopes: bool = False
+    ) -> sp.csr_matrix:
+        """Return the (k, 2N) matrix that takes q to u or, with ``of_u`` = 0, θ at k ``fractions`` of the length.
 
         Or to their slopes [1/m]. Where two elements meet they are those of the one towards the tip, of whose error
         they have the order.
@@ -82,13 +84,9 @@ class SemiDiscreteBeam:
         rows = np.arange(len(fractions))[:, None]
         return _scatter(rows, 2 * nodes + of_u, values[:, None, :], self.size + 2)[:, 2:]
 
-    def deflection_sampler(self, fractions: np.ndarray = SHAPE_POINTS) -> sp.csr_matrix:
-        """Return the (k, 2N) matrix that takes q to u at k ``fractions`` of the length."""
-        return self.interpolated(fractions, 1)
-
     def nodal(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Return the load vector, (2N,), of ``forces`` [N] at the places ``x`` [m] of the beam, both (k,)."""
-        return np.asarray(self.deflection_sampler(x / self.length).T @ forces)
+        return np.asarray(self.interpolated(x / self.length).T @ forces)
 
 
 def inner_forces(beam: Beam, mesh: SemiDiscreteBeam) -> sp.csr_matrix:
@@ -246,7 +244,7 @@ def modal_beam(beam: Beam) -> ModalBeam:
         tip=basis[discrete.tip].copy(),
         load=basis.T @ discrete.nodal(*constant_forces(beam)),
         slope_shape=basis.T @ (discrete.M @ discrete.slope_shape),
-        sampler=discrete.deflection_sampler() @ basis,
+        sampler=discrete.interpolated() @ basis,
         inner=inner_forces(beam, discrete) @ basis,
         basis=basis,
         alpha=beam.alpha_b,
@@ -331,14 +329,10 @@ class Loads:
         return len(self._loads)
 
     def smooth_from(self, time: float) -> float:
-        """Let `values` be smooth up to when a load jumps or bends next; return that [s]."""
+        """Let `values` be smooth up to when a load jumps or bends after ``time`` [s]; return that, or infinity [s]."""
         kink = next((kink for kink in self.kinks if kink > time), np.inf)
         self._until = np.nextafter(kink, 0.0)
         return kink
-
-    def whole(self) -> None:
-        """Let `values` be those of the signals at any time."""
-        self._until = np.inf
 
     def values(self, times: np.ndarray) -> np.ndarray:
         """Return the loads, each in its unit, at ``times`` [s] of shape (...), shape (..., loads)."""

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..results.trajectory import Event, EventKind
 from .hybrid_system import HybridSystem
-from .laws import Contact, Phase, Watch
+from .laws import Phase, Watch
 
 
 class HybridState:
@@ -51,13 +51,10 @@ class HybridState:
     def happen(self, event: Watch) -> None:
         """Apply what happens where a watched function has become negative."""
         if event.level is not None:
-            self.system.place(self.phase, self.X, event.level)
-        if event.name == "meet":
-            self._meet()
-        elif event.name == "stop":
-            self._hit_stop()
-        elif event.name == "unseat":
-            self._unseat()
+            self._place(event.level)
+        own = {"meet": self._meet, "stop": self._hit_stop, "unseat": self._unseat}
+        if event.name in own:
+            own[event.name]()
         else:
             self._go_on(event.name)
         self.system.synchronise(self.phase, self.X)
@@ -65,93 +62,79 @@ class HybridState:
     def start(self) -> None:
         """Make first contact, and its impact, where tip and obstacle touch at the start or are joined from there on."""
         s, X = self.system, self.X
-        m = s.motion(self.phase, X)
-        noise = s.noise("m", X)
+        m, noise = s.motion(self.phase, X), s.noise("m", X)
         if s.law.start != "free":
-            if self.phase.contact == "free":
-                self._meet()
-        elif s.scene.coupled and float(m.u - m.y) <= noise:
-            if m.v <= m.z:
-                self._meet()
-        elif (
-            s.alone
-            and s.scene.stop is not None
-            and m.u - s.stop.position <= noise
-            and (float(m.v), float(m.z_dot)) < (0.0, 0.0)  # onto it
-        ):
-            self._hit_stop()
+            meets = self.phase.contact == "free"
+        else:
+            meets = s.scene.coupled and float(m.u - m.y) <= noise and float(m.v) <= float(m.z)
+        if meets:
+            self._meet()
+        elif s.alone and s.scene.stop is not None:
+            onto_it = (float(m.v), float(m.z_dot)) < (0.0, 0.0)
+            if m.u - s.stop.position <= noise and onto_it:
+                self._hit_stop()
 
     # Contact --------------------------------------------------------------------------------------------------------
 
-    def _after(self, happened: str) -> tuple[Contact, str | None]:
+    def _go_on(self, happened: str, before: float | None = None, impulse: float = 0.0) -> None:
+        """Begin the phase that follows; ``before`` is the energy [J] before an impact."""
         s, X = self.system, self.X
-        return s.law.after(happened, s.motion(Phase("tied"), X), s.noise("m", X))
-
-    def _go_on(self, happened: str) -> None:
-        contact, kind = self._after(happened)
+        if s.scene.massless and before is None:  # a tip that is let go may jump
+            before = self._mechanical_energy()
+        contact, kind = s.law.after(happened, s.motion(Phase("tied"), X), s.noise("m", X))
         self.phase = Phase(contact, self.phase.seated)
-        lost = self.system.settle(self.phase, self.X)
+        s.synchronise(self.phase, X)
         if kind is not None:
-            self._emit(kind, energy_loss=lost)
+            lost = 0.0 if before is None else before - self._mechanical_energy()
+            self._emit(kind, impulse_contact=impulse, energy_loss=lost)
 
     def _meet(self) -> None:
         s, X = self.system, self.X
         if not s.law.rigid:
             self._go_on("meet")
             return
-        m, before = s.motion(self.phase, X), self._mechanical_energy()
-        impulse = 0.0
+        m, before, impulse = s.motion(self.phase, X), self._mechanical_energy(), 0.0
         if s.scene.contact.impact == "tip":
             X[s.n + s.r] = s.root_mass * m.v
         else:
             impulse = float(m.z - m.v) / s.mobility
-            X[s.V] += s.between * impulse
-        was_seated = self.phase.seated
-        contact, kind = self._after("meet")
-        self.phase = Phase(contact)
+        was_seated, self.phase = self.phase.seated, Phase("tied")
         s.synchronise(self.phase, X)
-        assert kind is not None
-        self._emit(kind, impulse_contact=impulse, energy_loss=before - self._mechanical_energy())
+        self._go_on("meet", before, impulse)
         if was_seated:  # the spring already stands on the foundation
             self._hit_stop()
-        elif contact == "touch" and float(s.motion(self.phase, X).C) < -s.noise("N", X):
+        elif self.phase.contact == "touch" and float(s.motion(self.phase, X).C) < -s.noise("N", X):
             self._go_on("separate")
 
     # Foundation -----------------------------------------------------------------------------------------------------
 
     def _hit_stop(self) -> None:
         """Apply Newton's impact law on the foundation, and seat what has bounced for the last time."""
-        s, e = self.system, self.system.stop.restitution
-        free_phase, seated_phase = Phase(self.phase.contact), Phase(self.phase.contact, seated=True)
-        s.place(self.phase, self.X, s.stop.position)
-        before, arriving = self._mechanical_energy(), s.motion(self.phase, self.X)
-        velocity = self.X[s.V].copy()
-        self._bounce(e)
-        m = s.motion(free_phase, self.X)
+        s, X, e, contact = self.system, self.X, self.system.stop.restitution, self.phase.contact
+        self._place(s.stop.position)
+        before, arriving, velocity = self._mechanical_energy(), s.motion(self.phase, X), X[s.V].copy()
+        self.phase = Phase(contact)
+        held = s.held(self.phase, s.stop.position)
+        held.hold(X[s.V], -e * (velocity @ held.rows.T))
+        m = s.motion(self.phase, X)
         seats = e == 0.0 or 0.5 * float(m.z) ** 2 <= -float(m.z_dot) * self.seat_height()
         if seats:
-            self.X[s.V], e = velocity, 0.0
-            self._bounce(e)
+            X[s.V], e, self.phase = velocity, 0.0, Phase(contact, seated=True)
+        s.synchronise(self.phase, X)
         on_tip = -(1.0 + e) * float(arriving.v) / s.tip_mobility if s.joined(self.phase) else 0.0
-        self.phase = seated_phase if seats else free_phase
-        if seats:
-            s.synchronise(self.phase, self.X)
         self._emit(
             "seated" if seats else "stop_impact",
             impulse_contact=on_tip,
             impulse_foundation=on_tip - (1.0 + e) * s.mass * float(arriving.z),
             energy_loss=before - self._mechanical_energy(),
         )
-        if seats and s.motion(self.phase, self.X).N < 0.0:
+        if seats and s.motion(self.phase, X).N < 0.0:
             self._unseat()
 
-    def _bounce(self, e: float) -> None:
-        """Turn the velocity of the top, and of the tip that is joined to it, into −e times what it is."""
-        s, x_dot = self.system, self.X[self.system.V]
-        x_dot[s.r :] *= -e
-        if s.joined(self.phase):
-            x_dot -= s.tip * ((1.0 + e) * float(x_dot @ s.tip) / float(s.tip @ s.tip))
-        s.settle(self.phase, self.X)
+    def _place(self, level: float) -> None:
+        """Put the top, and the tip that is joined to it, at a height [m]."""
+        held = self.system.held(self.phase, level)
+        held.hold(self.X[self.system.A], held.levels)
 
     def _unseat(self) -> None:
         self.phase = Phase(self.phase.contact)
@@ -170,8 +153,8 @@ class HybridState:
     # All events -----------------------------------------------------------------------------------------------------
 
     def _mechanical_energy(self) -> float:
-        e = self.system.energies(self.X[None], self.phase)
-        return float(e["e_beam"][0] + e["e_spring"][0])
+        e = self.system.energies(self.X, self.phase)
+        return float(e["e_beam"] + e["e_spring"] + e["e_load"])
 
     def _emit(self, kind: str, **values: float) -> None:
         s = self.system

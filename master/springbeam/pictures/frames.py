@@ -157,13 +157,13 @@ def frames_of(trajectory: Trajectory) -> Frames | None:
     elif "u_tip" in trajectory.columns:
         # A body that is not our beam is a level bar at the height of its end.
         deflection = np.repeat(trajectory["u_tip"][:, None], len(SHAPE_POINTS), axis=1)
-    known = np.searchsorted(time, rows[-1:].max(initial=-np.inf), side="right")  # a killed run may have a shape more
-    time, deflection = time[:known], None if deflection is None else deflection[:known]
-    if len(time) < 2 or time[-1] <= time[0]:
+    known = time[: np.searchsorted(time, rows[-1:].max(initial=-np.inf), side="right")]  # one killed may have one more
+    if len(known) < 2 or known[-1] <= known[0]:
         return None
-    if len(time) > MOST_FRAMES:
-        some = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], MOST_FRAMES)))
-        time, deflection = time[some], None if deflection is None else deflection[some]
+    some = np.arange(len(known))
+    if len(known) > MOST_FRAMES:
+        some = np.unique(np.searchsorted(known, np.linspace(known[0], known[-1], MOST_FRAMES)))
+    time, deflection = time[some], None if deflection is None else deflection[some]
     row = np.searchsorted(rows, time, side="right") - 1
     y = trajectory["y"][row] if "y" in trajectory.columns else None
     moving = [part for part in (deflection, y) if part is not None]

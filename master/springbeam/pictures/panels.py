@@ -35,12 +35,14 @@ from .drawing import (
     readable_unit,
 )
 
-#: Heading, quantity, unit and words of what the beam feels.
-_OF_THE_BEAM = {
-    "clamp_force": ("Force of the clamp", "force", "N", "of the clamp, upward"),
-    "clamp_moment": ("Moment of the clamp", "moment", "N·m", "of the clamp, counter-clockwise"),
-    "bending_stress": ("Bending stress", "stress", "Pa", "largest along the beam"),
-}
+#: Name, heading, quantity, unit, columns and height of the panels that show what the bodies feel.
+_FELT: tuple[tuple[str, str, str, str, dict[str, Look], float], ...] = (
+    ("accelerations", "Accelerations", "acceleration", "m/s²", ACCELERATIONS, 1.6),
+    ("clamp-force", "Force of the clamp", "force", "N", {"clamp_force": Look(BLUE, "of the clamp, upward")}, 1.2),
+    ("clamp-moment", "Moment of the clamp", "moment", "N·m",
+     {"clamp_moment": Look(BLUE, "of the clamp, counter-clockwise")}, 1.2),
+    ("bending-stress", "Bending stress", "stress", "Pa", {"bending_stress": Look(BLUE, "largest along the beam")}, 1.2),
+)  # fmt: skip
 #: Quantity, unit, and columns or fields of events of the panels in which runs are compared.
 _COMPARED = (
     ("position", "m", ("u_tip", "y")),
@@ -94,15 +96,16 @@ def panels(trajectory: Trajectory) -> list[Panel]:
     """Return all panels that the run has something to show for."""
     if not drawable(trajectory):
         return []
+    gap = Look(BLUE, "u(t, L) − y" if "y" in trajectory.columns else "u(t, L) − φ")
     found = [
         positions(trajectory),
         enlarged(trajectory),
-        velocities(trajectory),
+        Panel("velocities", "Velocities", "velocity", "m/s", _curves(trajectory, VELOCITIES)),
         forces(trajectory),
         impulses(trajectory),
         *loads(trajectory),
         *inside(trajectory),
-        gap(trajectory),
+        Panel("gap", "Gap", "gap", "m", _curves(trajectory, {"gap": gap})),
         energies(trajectory),
         residual(trajectory),
     ]
@@ -124,11 +127,6 @@ def enlarged(trajectory: Trajectory) -> Panel:
         name: Look(POSITIONS[name].colour, f"{POSITIONS[name].words}, enlarged") for name in much_smaller(trajectory)
     }
     return Panel("positions-enlarged", "The smaller one, enlarged", "position", "m", _curves(trajectory, looks), 1.2)
-
-
-def velocities(trajectory: Trajectory) -> Panel:
-    """Return the velocities of tip and spring top."""
-    return Panel("velocities", "Velocities", "velocity", "m/s", _curves(trajectory, VELOCITIES))
 
 
 def forces(trajectory: Trajectory) -> Panel:
@@ -163,11 +161,10 @@ def loads(trajectory: Trajectory) -> list[Panel]:
 def inside(trajectory: Trajectory) -> list[Panel]:
     """Return accelerations, what the clamp does to the beam, and the largest stress along it."""
     run = trajectory.felt()
-    found = [Panel("accelerations", "Accelerations", "acceleration", "m/s²", _curves(run, ACCELERATIONS))]
-    for column, (heading, quantity, unit, words) in _OF_THE_BEAM.items():
-        curves = _curves(run, {column: Look(BLUE, words)})
-        found.append(Panel(column.replace("_", "-"), heading, quantity, unit, curves, 1.2))
-    return found
+    return [
+        Panel(name, heading, quantity, unit, _curves(run, looks), height)
+        for name, heading, quantity, unit, looks, height in _FELT
+    ]
 
 
 def impulses(trajectory: Trajectory) -> Panel:
@@ -179,12 +176,6 @@ def impulses(trajectory: Trajectory) -> Panel:
         # Impulses of rounding size would stretch the axis over the ones that matter.
         panel.logarithmic = 0.3 * max(least, 1e-8 * most), 3.0 * most
     return panel
-
-
-def gap(trajectory: Trajectory) -> Panel:
-    """Return the gap above the spring, or above the foundation."""
-    look = Look(BLUE, "u(t, L) − y" if "y" in trajectory.columns else "u(t, L) − φ")
-    return Panel("gap", "Gap", "gap", "m", _curves(trajectory, {"gap": look}))
 
 
 def energies(trajectory: Trajectory) -> Panel:

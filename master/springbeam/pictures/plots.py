@@ -7,7 +7,6 @@ printer.
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -35,7 +34,7 @@ from .drawing import (
     readable_unit,
 )
 from .panels import panels
-from .timeline import DPI, REMARK, STYLE, TITLE_WIDTH, WIDTH, figure_for, line_style, timeline
+from .timeline import DPI, REMARK, STYLE, blank, figure_for, line_style, rows_of_axes, timeline
 
 _SHAPES_EARLY, _SHAPES_LATER = 20, 24
 #: Power below this share of the highest line is not drawn.
@@ -44,6 +43,7 @@ _FLOOR = 1e-12
 _CLOCK = ListedColormap(matplotlib.colormaps["cividis"](np.linspace(0.0, 0.9, 256)), "clock")
 
 
+@matplotlib.rc_context(STYLE)
 def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
     """Draw the pictures `springbeam.results.directory.PICTURES` that the scene has something to show for.
 
@@ -61,19 +61,18 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
     """
     written = []
     for name, file in zip(_NAMES, PICTURES, strict=True):
-        with matplotlib.rc_context(STYLE):
-            if (figure := _drawn(trajectory, name)) is not None:
-                written.append(Path(directory) / file)
-                figure.savefig(written[-1], dpi=DPI)
+        if (figure := _drawn(trajectory, name)) is not None:
+            written.append(Path(directory) / file)
+            figure.savefig(written[-1], dpi=DPI)
     return written
 
 
+@matplotlib.rc_context(STYLE)
 def figure_of(trajectory: Trajectory, picture: str) -> Figure:
     """Return the picture of that name; see `springbeam.Trajectory.plot`."""
     if picture not in _NAMES:
         raise ValueError(f"no picture {picture!r}; there are {', '.join(_NAMES)}")
-    with matplotlib.rc_context(STYLE):
-        figure = _drawn(trajectory, picture)
+    figure = _drawn(trajectory, picture)
     if figure is None:
         raise ValueError(f"the run has nothing to show of {picture!r}")
     return figure
@@ -190,6 +189,7 @@ _OVER_TIME = {
 _NAMES = [Path(file).stem[2:] for file in PICTURES]
 
 
+@matplotlib.rc_context(STYLE)
 def draw_spectra(
     shock: Mapping[str, tuple[np.ndarray, np.ndarray]],
     power: Mapping[str, tuple[np.ndarray, np.ndarray]],
@@ -216,31 +216,29 @@ def draw_spectra(
         ({} if points is None else {"points": points.T}, position, velocity, False, dots),
     ]
     groups = [group for group in groups if group[0]]
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 0.6 + 2.4 * len(groups)), layout="constrained")
-        axes = figure.subplots(len(groups), 1, squeeze=False)[:, 0]
-        for ax, (curves, across, up, logarithmic, look) in zip(axes, groups, strict=True):
-            for k, (name, (x, y)) in enumerate(curves.items()):
-                seen = y > _FLOOR * y.max(initial=0.0) if logarithmic else slice(None)
-                dashes = {"dashes": (4, k)} if logarithmic and k else {}
-                ax.plot(x[seen], y[seen], color=COLOURS[k % len(COLOURS)], label=name, **look, **dashes)
-            scale = "log" if logarithmic else "linear"
-            ax.set(xlabel=across, ylabel=up, xscale=scale, yscale=scale)
-            ax.legend()
-            ax.grid(alpha=0.3)
-        figure.suptitle(textwrap.fill(title, TITLE_WIDTH), fontsize=10.0, x=0.01, ha="left")
-        figure.savefig(path, dpi=DPI)
+    figure = blank(title, 0.6 + 2.4 * len(groups))
+    axes = rows_of_axes(figure, [2.4] * len(groups), sharex=False)
+    for ax, (curves, across, up, logarithmic, look) in zip(axes, groups, strict=True):
+        for k, (name, (x, y)) in enumerate(curves.items()):
+            seen = y > _FLOOR * y.max(initial=0.0) if logarithmic else slice(None)
+            dashes: dict[str, Any] = {"dashes": (4, k)} if logarithmic and k else {}
+            ax.plot(x[seen], y[seen], color=COLOURS[k % len(COLOURS)], label=name, **look, **dashes)
+        scale = "log" if logarithmic else "linear"
+        ax.set(xlabel=across, ylabel=up, xscale=scale, yscale=scale)
+        ax.legend()
+        ax.grid(alpha=0.3)
+    figure.savefig(path, dpi=DPI)
 
 
+@matplotlib.rc_context(STYLE)
 def draw_measured(time: np.ndarray, curves: Mapping[str, tuple[np.ndarray, np.ndarray]], path: Path) -> None:
     """Draw what a run gives beside what was measured, by name, at ``time`` [s]; shapes (n,)."""
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 0.6 + 2.0 * len(curves)), layout="constrained")
-        axes = figure.subplots(len(curves), 1, sharex=True, squeeze=False)[:, 0]
-        for ax, (name, (ours, theirs)) in zip(axes, curves.items(), strict=True):
-            ax.plot(time, theirs, ".", color=BLACK, markersize=2.5, label="measured")
-            ax.plot(time, ours, color=BLUE, label="run")
-            ax.set_ylabel(name)
-            ax.legend()
-        axes[-1].set_xlabel("time t [s]")
-        figure.savefig(path, dpi=DPI)
+    figure = blank("", 0.6 + 2.0 * len(curves))
+    axes = rows_of_axes(figure, [2.0] * len(curves))
+    for ax, (name, (ours, theirs)) in zip(axes, curves.items(), strict=True):
+        ax.plot(time, theirs, ".", color=BLACK, markersize=2.5, label="measured")
+        ax.plot(time, ours, color=BLUE, label="run")
+        ax.set_ylabel(name)
+        ax.legend()
+    axes[-1].set_xlabel("time t [s]")
+    figure.savefig(path, dpi=DPI)

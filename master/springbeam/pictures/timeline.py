@@ -46,8 +46,8 @@ STYLE: dict[Any, Any] = {
 }
 REMARK: dict[str, Any] = {"fontsize": 7.0, "style": "italic", "color": GREY}
 DPI = 160
-WIDTH = 8.2  # inches
-TITLE_WIDTH = 110  # characters
+_WIDTH = 8.2  # inches
+_TITLE_WIDTH = 110  # characters
 _MARK_HEIGHT, _MARK_ROW = 1.045, 0.04
 _KEY_COLUMNS = 4
 
@@ -70,8 +70,7 @@ def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Fig
 
 def _painted(figure: Figure, panels: Sequence[Panel], clock: Unit) -> list[Axes]:
     """Return the axes of ``panels``, one below the other over a common time axis in the unit ``clock``."""
-    heights = [panel.height for panel in panels]
-    axes: list[Axes] = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0].tolist()
+    axes = rows_of_axes(figure, [panel.height for panel in panels])
     for ax, panel in zip(axes, panels, strict=True):
         paint(ax, panel, clock)
         ax.label_outer()
@@ -151,18 +150,30 @@ def line_style(look: Look) -> dict[str, Any]:
 
 def figure_for(trajectory: Trajectory, title: str, height: float) -> Figure:
     """Return an empty figure of ``height`` [inch] with title, scene and, where the motion is not resolved, its mark."""
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    scene = textwrap.fill(trajectory.scene.title, TITLE_WIDTH)
-    figure.suptitle(f"{title}\n{scene}" if scene else title, fontsize=10.0, x=0.01, ha="left")
+    figure = blank(f"{title}\n{trajectory.scene.title}", height)
     figure.text(0.99, 0.985, mark(trajectory), fontsize=8.0, weight="bold", color=VERMILLION, ha="right", va="top")
     return figure
 
 
+def blank(title: str, height: float) -> Figure:
+    """Return an empty figure of ``height`` [inch] with a title, whose long lines are wrapped."""
+    figure = Figure(figsize=(_WIDTH, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    wrapped = [textwrap.fill(line, _TITLE_WIDTH) for line in title.splitlines() if line]
+    figure.suptitle("\n".join(wrapped), fontsize=10.0, x=0.01, ha="left")
+    return figure
+
+
+def rows_of_axes(figure: Figure, heights: Sequence[float], *, sharex: bool = True) -> list[Axes]:
+    """Return new axes of ``figure``, one below the other, as high as ``heights`` [inch]."""
+    grid = figure.subplots(len(heights), 1, sharex=sharex, squeeze=False, height_ratios=heights)
+    return list(grid[:, 0])
+
+
+@matplotlib.rc_context(STYLE)
 def draw_compared(runs: Mapping[str, Trajectory]) -> Figure:
     """Return the figure of runs by their names, in the panels that any of them has something to show for."""
     panels = compared(runs)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 0.6 + sum(panel.height for panel in panels)), layout="constrained")
-        _painted(figure, panels, Unit(1.0, "s"))
+    figure = blank("", 0.6 + sum(panel.height for panel in panels))
+    _painted(figure, panels, Unit(1.0, "s"))
     return figure

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 
 from ..monolithic.event_driven import initial
 from ..monolithic.hybrid_system import HybridSystem, ReferenceFailure
-from ..monolithic.laws import Phase, Watch
+from ..monolithic.laws import Link, Phase, Watch
 from ..monolithic.transitions import HybridState
 from ..scene import Scene
 
@@ -107,11 +107,11 @@ class _Phase:
     """The equations of one phase of contact, and the functions that end it."""
 
     def __init__(self, s: HybridSystem, phase: Phase) -> None:
-        self._system, self._phase, self._row = s, phase, s.row(phase)
+        self._system, self._phase, self._held = s, phase, s.held(phase)
         self._soft = s.scene.coupled and not s.joined(phase) and s.law.acts(phase.contact)
         self._damped, self._hardening = bool(np.any(s.c)), s.spring.cubic_stiffness / s.spring.mass**2
         self.jacobian: Callable[[float, np.ndarray], np.ndarray] | None = None
-        if not self._soft or s.law.linear:  # linear but for the cubic spring
+        if not self._soft or isinstance(s.law, Link):  # linear but for the cubic spring
             units, self.jacobian, top = np.eye(2 * s.n + 2 * s.alone), self._jacobian, s.n - 1
             self._linear = np.transpose([0.5 * (self.rhs(0.0, unit) - self.rhs(0.0, -unit)) for unit in units])
             two = 2.0 * units[top]
@@ -134,12 +134,8 @@ class _Phase:
         if len(s.loads):
             p += s.loads.values(np.array(time)) @ s.patterns
         if self._soft:
-            level = s.stop.position if s.fixed(self._phase) else x @ s.top
-            p += s.between * float(s.law.force(level - x @ s.tip, x_dot @ (s.top - s.tip)))
-        elif self._row is not None:
-            p -= self._row * (self._row @ p / (self._row @ self._row))
-        if self._phase.seated:
-            p[s.r :] = 0.0
+            p += s.between * float(s.law.force(s.floor + x @ (s.top - s.tip), x_dot @ (s.top - s.tip)))
+        p -= (self._held.rows @ p) @ self._held.along
         return np.concatenate((x_dot, p, (X[-1], s.tip @ p) if s.alone else ()))
 
     def _jacobian(self, time: float, X: np.ndarray) -> np.ndarray:
