@@ -38,15 +38,15 @@ def integrated_anew(scene, patch, t_end):
 
     def noted(self, *arguments):
         segment = step(self, *arguments)
-        if segment is not None:
-            first, last = kept.get(self.phase, ((self, segment), (self, segment)))
-            kept[self.phase] = first, max(last, (self, segment), key=lambda step: step[1].size)
+        phase = self.form.phase
+        first, last = kept.get(phase, ((self, segment), (self, segment)))
+        kept[phase] = first, max(last, (self, segment), key=lambda step: step[1].nodes[-1])
         return segment
 
     patch.setattr(ExponentialPropagator, "_step", noted)
     run = simulate(scene, sample_times=np.linspace(0.0, t_end, 31), t_end=t_end)
     for propagator, segment in (one for some in kept.values() for one in some):
-        s, phase = propagator.system, propagator.phase
+        s, phase = propagator.form.system, propagator.form.phase
 
         def slope(_, X, s=s, phase=phase):
             m = s.motion(phase, X)
@@ -54,7 +54,7 @@ def integrated_anew(scene, patch, t_end):
 
         options = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-18}
         begin, end = segment.states[0], segment.states[-1]
-        found = s.synchronise(phase, solve_ivp(slope, (0.0, segment.size), begin, **options).y[:, -1].copy())
+        found = s.synchronise(phase, solve_ivp(slope, (0.0, segment.nodes[-1]), begin, **options).y[:, -1].copy())
         energy = sum(np.abs(part) for part in s.energies(np.stack([begin, end]), phase).values()).max()
         for parts in (s.A, s.V):
             error, size = np.abs(found - end)[parts], np.abs([begin, end])[:, parts]

@@ -1,7 +1,7 @@
 """Event-driven reference: the pair as one system, integrated from event to event.
 
 Each phase is one constraint-eliminated ODE (`hybrid_system`) under the scene's law (`laws`), integrated between events
-that are located to rounding (`location`); impacts and phase changes are applied there (`transitions`). It shares no
+that are located to rounding; impacts and phase changes are applied there (`transitions`). It shares no
 code with the coupled simulation.
 
 With ``contact.impact = "rest"`` tip and spring keep different velocities, which the rigid tie u = y cannot: the

@@ -256,9 +256,3 @@ def near_levels(scene: Scene, moving: Sequence[np.ndarray]) -> dict[str, float]:
     low, high = min(float(np.min(part)) for part in moving), max(float(np.max(part)) for part in moving)
     reach = 1.5 * (high - low)
     return {symbol: height for symbol, height in heights.items() if low - reach <= height <= high + reach}
-
-
-def much_smaller(trajectory: Trajectory) -> list[str]:
-    """Return the one of two `POSITIONS` whose motion cannot be seen beside the other's, if it moves at all."""
-    ranges = {name: float(np.ptp(trajectory[name])) for name in present(trajectory, POSITIONS)}
-    return [name for name, size in ranges.items() if 0.0 < size < 0.02 * max(ranges.values())]

@@ -29,7 +29,6 @@ from .drawing import (
     Unit,
     decimated,
     drawable,
-    much_smaller,
     near_levels,
     present,
     readable_unit,
@@ -52,6 +51,8 @@ _COMPARED = (
     ("impulse, tip", "N·s", ("impulse_contact",)),
     ("impulse, foundation", "N·s", ("impulse_foundation",)),
 )
+#: A motion smaller than this share of another cannot be seen beside it.
+_SEEN_BESIDE = 0.02
 #: How the first column of such a panel is drawn, and the second.
 _COMPARED_LINES = (Line(1.4), Line(0.8, dashed=True))
 
@@ -123,8 +124,11 @@ def positions(trajectory: Trajectory) -> Panel:
 
 def enlarged(trajectory: Trajectory) -> Panel:
     """Return a panel of its own for the one of two positions whose motion is lost beside the other's."""
+    ranges = {name: float(np.ptp(trajectory[name])) for name in present(trajectory, POSITIONS)}
     looks = {
-        name: Look(POSITIONS[name].colour, f"{POSITIONS[name].words}, enlarged") for name in much_smaller(trajectory)
+        name: Look(POSITIONS[name].colour, f"{POSITIONS[name].words}, enlarged")
+        for name, size in ranges.items()
+        if 0.0 < size < _SEEN_BESIDE * max(ranges.values())
     }
     return Panel("positions-enlarged", "The smaller one, enlarged", "position", "m", _curves(trajectory, looks), 1.2)
 

@@ -102,10 +102,8 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
     steps = np.diff(times)
     some = steps > 1e-6 * np.max(steps)  # between rows of one event Δu is rounding
     middles, velocities = 0.5 * (times[1:] + times[:-1])[some], np.diff(shapes, axis=0)[some] / steps[some, None]
-    figure, axes = _side_by_side(trajectory, "(A) The beam right after first contact", 2)
-    _curves(axes[0], trajectory, times, shapes, "deflection u", "m")
-    _key(axes[1], _curves(axes[1], trajectory, middles, velocities, "mean velocity Δu/Δt", "m/s"))
-    return figure
+    drawn = {"deflection u": ("m", times, shapes), "mean velocity Δu/Δt": ("m/s", middles, velocities)}
+    return _side_by_side(trajectory, "(A) The beam right after first contact", drawn)[0]
 
 
 def _shapes_later(trajectory: Trajectory) -> Figure | None:
@@ -127,22 +125,28 @@ def _later(trajectory: Trajectory, title: str, quantities: Mapping[str, tuple[st
     times, since = _since_contact(trajectory)
     if len(times) < _SHAPES_EARLY:
         return None
-    figure, axes = _side_by_side(trajectory, title, len(quantities))
     some = np.unique(np.searchsorted(times, np.linspace(times[0], times[-1], _SHAPES_LATER)))
-    for ax, (what, (unit, values)) in zip(axes, quantities.items(), strict=True):
+    drawn = {what: (unit, times[some], values[since][some]) for what, (unit, values) in quantities.items()}
+    figure, axes = _side_by_side(trajectory, title, drawn)
+    for ax, (_, values) in zip(axes, quantities.values(), strict=True):
         found = values[since]
-        lines = _curves(ax, trajectory, times[some], found[some], what, unit)
         ends = np.transpose([found.max(axis=0), found.min(axis=0)])
-        factor, x = readable_unit([found[some]], unit).factor, length_along(trajectory.scene)[1] * SHAPE_POINTS
+        factor, x = readable_unit([found[some]], "").factor, length_along(trajectory.scene)[1] * SHAPE_POINTS
         ax.plot(x, factor * ends, color=BLACK, lw=0.8, ls=":")
         ax.set_title("dotted: envelope of all", **REMARK)
-    _key(axes[-1], lines)
     return figure
 
 
-def _side_by_side(trajectory: Trajectory, title: str, number: int) -> tuple[Figure, list[Axes]]:
+def _side_by_side(
+    trajectory: Trajectory, title: str, quantities: Mapping[str, tuple[str, np.ndarray, np.ndarray]]
+) -> tuple[Figure, list[Axes]]:
+    """Draw curves along the beam, unit, times and values of each quantity; the key shows which time each colour is."""
     figure = figure_for(trajectory, title, 3.6)
-    return figure, figure.subplots(1, number, squeeze=False)[0].tolist()
+    axes: list[Axes] = list(figure.subplots(1, len(quantities), squeeze=False)[0])
+    for ax, (what, (unit, times, values)) in zip(axes, quantities.items(), strict=True):
+        lines = _curves(ax, trajectory, times, values, what, unit)
+    figure.colorbar(lines, ax=axes[-1], label=lines.get_label(), pad=0.05, aspect=30)
+    return figure, axes
 
 
 def _curves(
@@ -164,11 +168,6 @@ def _curves(
         ax.annotate(symbol, (1.0, readable.factor * height), xycoords=("axes fraction", "data"), fontsize=8.0,
                     xytext=(3.0, 0.0), textcoords="offset points", va=level_side(symbol, near))  # fmt: skip
     return lines
-
-
-def _key(ax: Axes, lines: LineCollection) -> None:
-    """Show beside curves which time each colour is."""
-    ax.figure.colorbar(lines, ax=ax, label=lines.get_label(), pad=0.05, aspect=30)
 
 
 #: What draws the pictures along the beam, (A), (B) and (G), and titles and panels of those over time.

@@ -42,11 +42,6 @@ class Chart:
     heading: str
     figure: go.Figure
 
-    @property
-    def points(self) -> int:
-        """The most rows that any curve shows."""
-        return max((len(curve.x) for curve in self.figure.data), default=0)
-
 
 def charts(trajectory: Trajectory) -> list[Chart]:
     """Return the charts over time that the run has something to show for, in the order of the page."""
