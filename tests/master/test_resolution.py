@@ -16,12 +16,6 @@ from springbeam.run.observed import least_momentum
 from springbeam.run.stepping import Pair
 from springbeam.scene import load_scene, shipped_scenes, with_changes
 from springbeam.scene.resolution import (
-    LAG,
-    MISPLACED,
-    MISPLACED_TIED,
-    SHORT,
-    SMOOTH_LAG,
-    WAVE_LAG,
     fastest_frequency,
     impact_frequency,
     lateness,
@@ -42,11 +36,14 @@ def test_the_slowest_frequency_is_that_of_the_mesh(name):
 
 
 def test_the_fastest_frequency_is_the_meshs_or_that_of_the_last_mode_kept():
-    beam = PAIR.beam
-    assert fastest_frequency(beam) == pytest.approx(modal_beam(beam).omega[-1], rel=1e-3)
+    for mass in ("averaged", "consistent"):
+        beam = PAIR.beam.model_copy(update={"mass_matrix": mass})
+        omega = modal_beam(beam).omega
+        assert fastest_frequency(beam) == pytest.approx(omega[-1], rel=1e-3)
     fewer = beam.model_copy(update={"n_modes": 10})
-    omega = modal_beam(beam).omega
     assert omega[8] < fastest_frequency(fewer) < omega[10]
+    every = fewer.model_copy(update={"integrator": "generalized_alpha"})
+    assert fastest_frequency(every) == fastest_frequency(beam)
 
 
 @pytest.mark.parametrize(("turn", "resolved"), [(0.98, True), (1.02, False)])
@@ -55,10 +52,14 @@ def test_one_radian_of_the_slowest_oscillation_is_the_limit(turn, resolved):
     assert (not_resolved(scene) is None) is resolved
     lone = {
         "time": {"t_end": 9.0},
-        "spring": {"mass": 4.0, "linear_stiffness": 1.0},
+        "spring": {"mass": 4.0, "linear_stiffness": 1.0, "damping": 3.0},
         "coupling": {"macro_step": 2.0 * turn},
     }
-    assert (not_resolved(scene_from_dict(lone), 0.0) is None) is resolved
+    told = not_resolved(scene_from_dict(lone))
+    assert told is None if resolved else "macro_step <= 1.9e+00 s resolves it" in told
+    swept = {"on": "tip", "signal": "chirp", "frequency": 10.0, "frequency_end": 20.0, "duration": 0.6}
+    driven = with_changes(PAIR, loads=[swept], coupling={"macro_step": turn / (40.0 * np.pi)})
+    assert (not_resolved(driven) is None) is resolved
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])
@@ -68,7 +69,7 @@ def test_the_shortest_contact_of_a_tie_has_a_limit_from_degree_1_on(degree, shar
     agreeing = {"coupling": {"scheme": "hermite", "degree": 2}}, {"beam": {"fidelity": "quasi_static"}}
     for tables in ({"coupling": {"degree": degree}}, *agreeing):
         given = with_changes(PAIR, **tables)
-        told = not_resolved(given, shortest_contact=SHORT * PAIR.coupling.H / share)
+        told = not_resolved(given, shortest_contact=PAIR.coupling.H / share)
         assert (told is None) is (resolved or given.coupling.degree == 0)
 
 
@@ -138,14 +139,17 @@ STIFF = with_changes(
 @pytest.mark.parametrize("degree", [0, 1, 2])
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
 def test_ends_that_the_law_would_have_elsewhere_are_said(degree, share, resolved):
-    for scene, limits in ((STIFF, MISPLACED), (PAIR, MISPLACED_TIED)):
+    """Soft ones and tied ones, by degree; of what measured loads leave out, and between the rows, 1 % is allowed."""
+    for seen in ("left_out", "between_rows"):
+        assert (not_resolved(STIFF, **{seen: 0.01 * share}) is None) is resolved
+    for scene, limits in ((STIFF, (0.006, 0.002, 0.001)), (PAIR, (0.0025, 0.002, 0.001))):
         told = not_resolved(with_changes(scene, coupling={"degree": degree}), share * limits[degree])
         assert (told is None) is resolved
         assert resolved or ("a higher coupling.degree" in told) is (degree < 2)
 
 
 def test_what_resolves_ends_that_are_elsewhere_is_said():
-    adaptive, off = {"coupling": {"relative_tolerance": 1e-3}}, 2.0 * max(MISPLACED)
+    adaptive, off = {"coupling": {"relative_tolerance": 1e-3}}, 0.012
     for scene in (STIFF, PAIR):
         assert not_resolved(with_changes(scene, **adaptive), off).endswith("; smaller tolerances resolve it")
     kept = not_resolved(with_changes(PAIR, contact={"impact": "rest"}), off)
@@ -176,17 +180,19 @@ def test_steps_of_the_midpoint_rule_may_lag_behind_what_an_impact_sets_off(share
         assert (not_resolved(given) is None) is resolved
         assert not_resolved(with_changes(given, **other)) is None
 
-    for alpha in (0.0, 0.01):
+    for alpha in (0.01, 0.0):
         midpoint = {"n_elements": 10, "alpha_b": alpha, "integrator": "generalized_alpha"}
-        waves = impact_frequency(with_changes(PAIR, beam=midpoint).beam)
-        said(waves, WAVE_LAG, {"beam": {"integrator": "modal"}}, beam=midpoint)
+        waves = impact_frequency(with_changes(PAIR, beam=midpoint).beam) if alpha == 0.0 else 0.15 / alpha
+        said(waves, 1.0, {"beam": {"integrator": "modal"}}, beam=midpoint)
         soft = {"contact": {"law": "compliance"}, "loads": [{"on": "tip", "signal": "harmonic", "frequency": 20.0}]}
         slow = min(40.0 * np.pi, waves)
-        said(slow, SMOOTH_LAG, {"beam": {"integrator": "modal"}}, beam=midpoint, **soft)
+        said(slow, 0.01, {"beam": {"integrator": "modal"}}, beam=midpoint, **soft)
         bent = {**midpoint, "approach": "elastic", "initial_deflection_slope": 0.01}
-        said(waves, WAVE_LAG, {"beam": {"integrator": "modal"}}, beam=bent, contact={"law": "compliance"})
+        said(waves, 1.0, {"beam": {"integrator": "modal"}}, beam=bent, contact={"law": "compliance"})
+    # ρ∞ = ½ lags by 1 + 4.5 ((1 − ρ∞)/(1 + ρ∞))² = 1.5 times as much.
+    said(waves, 1.0 / 1.5, {"beam": {"integrator": "modal"}}, beam={**midpoint, "rho_inf": 0.5})
     together = ((3.0 + 1.0 / tip_compliance(PAIR.beam)) / PAIR.spring.mass) ** 0.5
-    said(together, LAG, {"coupling": {"degree": 2}}, beam={"fidelity": "quasi_static"})
+    said(together, 0.015, {"coupling": {"degree": 2}}, beam={"fidelity": "quasi_static"})
 
 
 @pytest.mark.parametrize("start", [{}, {"initial_velocity_slope": 0.0, "initial_deflection_slope": 0.03}])
@@ -210,7 +216,7 @@ def test_a_beam_that_lags_behind_its_own_waves_is_said(start, rho_inf):
         assert far > 0.03
     far, told = off(macro_step=float(warning.split("macro_step <= ")[1].split()[0]))
     assert not told
-    assert far < 0.01
+    assert 5e-4 < far < 0.01
 
 
 def test_what_rows_that_are_right_hide_between_them_is_said():

@@ -11,13 +11,13 @@ from commands import printed
 from scenes import scene_from_dict
 
 from springbeam import SceneError, load_scene, simulate, with_changes
-from springbeam.signals.driven import responses, settled
+from springbeam.signals.driven import poincare, responses, settled
 from springbeam.signals.spectra import power_spectrum, sampled, shock_of_run, shock_spectrum, spectra
 from springbeam.studies.metrics import METRICS
 from springbeam.studies.study import record_all, troubles
 from springbeam.studies.sweep import Sweep
 
-MASS, STIFFNESS, DAMPING, FORCE, DRIVE = 0.2, 800.0, 1.2, 3.0, 7.0
+MASS, STIFFNESS, DAMPING, FORCE, DRIVE, START = 0.2, 800.0, 1.2, 3.0, 7.0, 0.05
 
 
 def oscillator(t_end=8.0, **load):
@@ -34,7 +34,7 @@ def oscillator(t_end=8.0, **load):
 
 @pytest.fixture(scope="module")
 def driven():
-    return simulate(oscillator())
+    return simulate(with_changes(oscillator(start=START), spring={"initial_velocity": 4.0}))
 
 
 def test_the_settled_amplitude_is_that_of_the_frequency_response(driven):
@@ -43,8 +43,9 @@ def test_the_settled_amplitude_is_that_of_the_frequency_response(driven):
     found = settled(driven)
     assert found.multiple == 1
     assert found.period == pytest.approx(1.0 / DRIVE, rel=1e-12)
-    # The transient e^{−DAMPING t/2 MASS} has fallen to 1 % of the range of the motion.
-    assert 0.5 < found.since < 2.5
+    # The transient e^{−DAMPING t/2 MASS} has fallen to 1 % of the range of the motion; whole periods of the drive.
+    assert 2.0 < found.since < 2.5
+    assert (found.since - START) * DRIVE == pytest.approx(round((found.since - START) * DRIVE), abs=1e-9)
     assert METRICS["settled_y"](driven) == pytest.approx(exact, rel=1e-3)
     assert METRICS["settled_a_y"](driven) == pytest.approx(exact * rate**2, rel=1e-3)
     assert METRICS["max_y"](driven) > 1.05 * exact
@@ -197,10 +198,14 @@ def test_the_shock_of_a_stiff_mount_is_that_of_its_base():
 
 
 def test_a_rigid_impact_has_no_peak_acceleration_and_a_soft_one_has():
-    rigid = spectra(simulate(load_scene("soft", ["time.t_end=0.1"])))
+    run = simulate(load_scene("soft", ["time.t_end=0.1"]))
+    times, points = poincare(run, 0.02, 0.05)  # of the tip, in the phase of what begins at 0.05 s
+    assert times == pytest.approx([0.01, 0.03, 0.05, 0.07, 0.09])
+    assert np.array_equal(points[:, 0], run.at(times)["u_tip"])
+    rigid = spectra(run)
     assert rigid.jumps["tip"] > 0.1
     assert any("there is no peak acceleration" in words for _, words in rigid.in_words())
-    of_tip = spectra(simulate(load_scene("soft", ["time.t_end=0.1"])), of=["a_tip/g"])
+    of_tip = spectra(run, of=["a_tip/g"])
     assert any("of what lies between the impacts: a_tip has no peak" in words for _, words in of_tip.in_words())
     soft = spectra(simulate(load_scene("pulse", ["time.t_end=0.02"])))
     assert soft.jumps == {"tip": 0.0, "spring": 0.0}
