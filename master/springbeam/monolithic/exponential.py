@@ -96,7 +96,7 @@ class LinearForm:
             found.append(-self.damping * z - spring.cubic_stiffness * y**3)
         if self.of_law:
             found.append(self.system.law.force(y - u, z - v))
-        return np.reshape(found, (len(found), len(xi))).T
+        return np.asarray(np.reshape(found, (len(found), len(xi))).T)
 
     def longest_step(self, X: np.ndarray) -> float:
         """Return the step [s] that resolves the free motion from X, but for amplitudes as small as rounding."""

@@ -34,7 +34,8 @@ class HybridState:
         m = system.motion(self.phase, X)
         if not (system.law.rigid and abs(float(m.v - m.z)) > system.noise("m/s", X)):
             self.phase = Phase(system.law.start)
-            system.synchronise(self.phase, X)
+            if not system.scene.static:  # then it is what the ends joined have
+                system.synchronise(self.phase, X)
         if system.scene.static and not system.law.rigid and m.u < m.y and self.phase.contact == "free":
             self.phase = Phase("touch")
 
