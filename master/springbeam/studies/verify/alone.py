@@ -1,4 +1,4 @@
-"""What a check is, and each FMU alone: statics, frequencies, mesh, energy of the beam; Duffing and escape of a spring.
+"""What a check is, and each FMU alone: statics and frequencies of the beam; a Duffing spring.
 
 The beam has ρA = ρI = L = 1, EI = KAG = κ, unless a function says otherwise; SI units.
 """
@@ -18,14 +18,13 @@ from scipy.linalg import expm, hankel, svd
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from ...bodies.fmu_bodies import FmuBeam, FmuSpring
-from ...bodies.protocol import NO_FORCE, FmuError, StepRefused
+from ...bodies.fmu_bodies import FmuBeam
+from ...bodies.protocol import NO_FORCE, StepRefused
 from ...run.outcome import RunStopped
 from ...run.runner import simulate
 from ...scene import Beam, Scene, Spring, scene_from_dict
 
 EPS = float(np.finfo(float).eps)
-UNIT_FORCE = (1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -121,68 +120,21 @@ def static_deflection(kag: float, variant: str) -> Iterator[Check]:
     yield Check(name, share, deflection / true, (2 * n) ** 2 * EPS * share, reason)
 
 
-@section("Beam: clamped–free frequencies", (1.0,), (3.6e10,))
-def frequencies(kappa: float) -> Iterator[Check]:
-    """Clamped–free frequencies over √κ, of 8 elements of degree 8, from the motion of the tip."""
-    root, n, degree = sqrt(kappa), 8, 8
-    mesh = {"n_elements": n, "element_degree": degree, "n_modes": 6}
-    beam = Beam.with_ones(young_modulus=kappa, shear_modulus=kappa, **mesh)
-    measured = _measured_frequencies(beam, 0.1 / root) / root
-    for i, w in enumerate(clamped_free_frequencies()[:6], 1):
-        yield Check(
-            f"κ = {kappa:g}: ω{i}",
-            w,
-            _nearest(measured, w),
-            (2 * n * degree) ** 2 * EPS * w,
-            "rounding: ε N², N unknowns",
-        )
+def _bar(unknowns: int, mass_matrix: str, dispersed: Callable[[float], float]) -> tuple[Any, ...]:
+    """Return a case of `frequencies`: a bar of c = 1 (θ kept at rest by a huge ρI) on linear elements.
 
-
-#: How a bar of c = 1 is discretised, and the ω h of its wave that turns by kh over h.
-_BARS: dict[str, tuple[dict[str, Any], Callable[[float], float]]] = {
-    "consistent mass": ({"n_elements": 50}, lambda kh: sqrt(6.0 * (1.0 - cos(kh)) / (2.0 + cos(kh)))),
-    "averaged mass": (
-        {"n_elements": 50, "mass_matrix": "averaged"},
-        lambda kh: sqrt(12.0 * (1.0 - cos(kh)) / (5.0 + cos(kh))),
-    ),
-}
-
-
-@section("Beam: frequencies of a bar on 50 linear elements", *((name,) for name in _BARS))
-def bar_frequencies(name: str) -> Iterator[Check]:
-    """A clamped–free bar (θ kept at rest by a huge ρI), k = (j − ½)π, whose waves the mesh disperses.
-
-    Consistent mass: ω h/c = √(6(1 − cos kh)/(2 + cos kh)), too fast by (kh)²/24 of it; averaged mass:
-    √(12(1 − cos kh)/(5 + cos kh)), too slow by (kh)⁴/480.
+    ``dispersed`` is the ω h of a wave that turns by kh over h; k = (j − ½)π.
     """
-    n, rigid, stiff = 50, 1e14, 1e3
-    beam, dispersed = _BARS[name]
-    bar = Beam.with_ones(n_modes=6, second_moment_of_area=rigid, young_modulus=stiff, **beam)
-    measured = _measured_frequencies(bar, 0.1)
-    for j in (1, 3, 6):
-        w = n * dispersed((j - 0.5) * pi / n)
-        reason = "rounding: ε N² in an eigenproblem of N = 2n unknowns"
-        yield Check(f"{name}: ω{j} [rad/s]", w, _nearest(measured, w), (2 * n) ** 2 * EPS * w, reason)
+    n, mesh = unknowns // 2, {"n_elements": unknowns // 2, "mass_matrix": mass_matrix}
+    exact = {j: n * dispersed((j - 0.5) * pi / n) for j in (1, 3, 6)}
+    return f"bar, {mass_matrix} mass", {**mesh, "second_moment_of_area": 1e14, "young_modulus": 1e3}, 0.1, exact
 
 
-@section("Beam: energy of a step under a constant force", *product(("modal", "generalized_alpha"), (0.0, 1e-4)))
-def beam_energy(integrator: str, alpha: float) -> Iterator[Check]:
-    """E(t+H) − E(t) = C·(u_tip(t+H) − u_tip(t)) − dissipation for every step under a constant force."""
-    n, kappa, size = 50, 1e4, 0.02
-    reason = "largest in 200 steps over the largest energy, κ = 1e4, H = 0.02 s. Rounding: sums of 2n terms, 2nε"
-    stiff = Beam.with_ones(young_modulus=kappa, shear_modulus=kappa, n_elements=n, initial_velocity_slope=1.0)
-    beam = stiff.model_copy(update={"integrator": integrator, "alpha_b": alpha})
-    violation = scale = 0.0
-    with closing(FmuBeam(beam, 0.0, 0.0)) as body:
-        for step in range(200):
-            u, e = body.motion().displacement, body.energies()
-            body.advance(step * size, size, UNIT_FORCE)
-            du, after = body.motion().displacement - u, body.energies()
-            scale = max(scale, e.kinetic + e.potential)
-            change = after.kinetic + after.potential - e.kinetic - e.potential
-            violation = max(violation, abs(change + after.dissipated - e.dissipated - du))
-    name = "midpoint" if integrator == "generalized_alpha" else "modal"
-    yield Check(f"{name}, α_b = {alpha:g} s", 0.0, violation / scale, 2 * n * EPS, reason)
+def _stiff(kappa: float) -> tuple[Any, ...]:
+    """Return a case of `frequencies`: EI = KAG = κ on 8 elements of degree 8, exact to rounding."""
+    exact = {i: sqrt(kappa) * w for i, w in enumerate(clamped_free_frequencies()[:6], 1)}
+    mesh = {"n_elements": 8, "element_degree": 8, "young_modulus": kappa, "shear_modulus": kappa}
+    return f"κ = {kappa:g}", mesh, 0.1 / sqrt(kappa), exact
 
 
 @lru_cache(maxsize=1)
@@ -234,8 +186,23 @@ def _measured_frequencies(beam: Beam, size: float) -> np.ndarray:
     return np.asarray(np.abs(np.angle(turns)) / size)
 
 
-def _nearest(values: np.ndarray, to: float) -> float:
-    return float(values[np.argmin(np.abs(values - to))])
+@section(
+    "Beam: clamped–free frequencies, from the motion of the tip",
+    *(_stiff(kappa) for kappa in (1.0, 3.6e10)),
+    _bar(100, "consistent", lambda kh: sqrt(6.0 * (1.0 - cos(kh)) / (2.0 + cos(kh)))),
+    _bar(100, "averaged", lambda kh: sqrt(12.0 * (1.0 - cos(kh)) / (5.0 + cos(kh)))),
+)
+def frequencies(name: str, beam: dict[str, Any], size: float, exact: dict[int, float]) -> Iterator[Check]:
+    """Clamped–free frequencies of the beam, and of a bar, whose waves the mesh disperses.
+
+    Consistent mass: ω h/c = √(6(1 − cos kh)/(2 + cos kh)), too fast by (kh)²/24 of it; averaged mass:
+    √(12(1 − cos kh)/(5 + cos kh)), too slow by (kh)⁴/480.
+    """
+    mesh = Beam.with_ones(n_modes=6, **beam)
+    measured = _measured_frequencies(mesh, size)
+    for i, w in exact.items():
+        nearest = float(measured[np.argmin(np.abs(measured - w))])
+        yield Check(f"{name}: ω{i} [rad/s]", w, nearest, mesh.unknowns**2 * EPS * w, "rounding: ε N², N unknowns")
 
 
 IDA = "IDA: BDF of order ≤ 5 takes some ε^(−1/6) internal steps a radian, each of error ε: ωT·ε^(5/6)"
@@ -265,28 +232,6 @@ def duffing(k1: float, k2: float, amplitude: float) -> Iterator[Check]:
     run = simulate(scene_of(period, period / 20.0, spring=spring))
     yield Check(f"{name}: y(T) [m]", amplitude, float(run.y[-1]), relative * amplitude, IDA)
     yield Check(f"{name}: ẏ(T) [m/s]", 0.0, float(run.z[-1]), relative * amplitude * 2.0 * pi / period, IDA)
-
-
-@section("Spring: escape of a softening spring", (-1e-11, 0.0), (1e-11, 1.0))
-def escape(beyond: float, escapes: float) -> Iterator[Check]:
-    """From rest at the hilltop √(k1/|k2|) of its potential, ``beyond`` it by this share, a softening spring leaves.
-
-    A little inside it comes back.
-    """
-    k1, k2 = 3.0, -0.2
-    start = sqrt(k1 / -k2) * (1.0 + beyond)
-    furthest = 0.0
-    try:
-        with closing(
-            FmuSpring(Spring.with_ones(linear_stiffness=k1, cubic_stiffness=k2, equilibrium=start), 0.0)
-        ) as body:
-            for second in range(20):
-                body.advance(float(second), 1.0, NO_FORCE)
-                furthest = max(furthest, abs(body.motion().displacement))
-    except (StepRefused, FmuError):
-        furthest = 2.0 * start
-    left = float(furthest > start * (1.0 + ida_error(20.0 * sqrt(k1))))
-    yield Check(f"escapes from rest at {start:.11f} m", escapes, left, 0.0, "yes or no: 1e-11 of √(k1/|k2|)")
 
 
 def ida_error(radians: float) -> float:
