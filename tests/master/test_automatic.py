@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from springbeam import load_scene, simulate, with_changes
-from springbeam.scene.linearised import spring_frequency
+from springbeam.scene.linearised import contact_energy, spring_frequency, spring_stiffness
 from springbeam.scene.resolution import STABLE, choice, mesh_frequency, slowest_frequency, with_scheme_chosen
+from springbeam.scene.statics import tip_compliance
 
 PAIR = load_scene("soft")
 
@@ -31,6 +32,46 @@ def test_the_bound_is_on_the_fastest_frequency(share, expected):
     spring = with_changes(PAIR, **stiff)
     assert spring_frequency(spring) == 1e4 > mesh_frequency(PAIR.beam)
     assert choice(auto(spring, coupling={"macro_step": share * STABLE / 1e4}))[:2] == expected
+
+
+LONG, HARD = with_changes(PAIR, beam={"length": 2.0}), {"cubic_stiffness": 400.0}
+PUSHES = [{"on": "spring", "amplitude": amplitude} for amplitude in (1.0, -2.0)]
+BENT = {"initial_deflection_slope": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("changes", "energy"),
+    [
+        ({}, 8.0 / 6.0),  # of u̇ = −x, ρA L³/6
+        # Straight and not turned: KAG L/2 of the slope squared; undeformed it comes as a straight line to Ψ = −0.4.
+        ({"beam": {**BENT, "approach": "elastic"}}, 8.0 / 6.0 + 100.0 * 0.1**2),
+        ({"beam": BENT, "spring": {"equilibrium": -0.4}, "stop": None}, 8.0 / 6.0 + 100.0 * 0.2**2 + 0.24 - 1.28e-3),
+        ({"beam": {"initial_velocity_slope": 0.0}, "spring": {"initial_velocity": -2.0, "external_force": -3.0}}, 2.0),
+        ({"beam": None, "spring": {"equilibrium": 0.1, "external_force": -3.0}}, 0.015 - 5e-6),
+        # Loads that begin at once: 2 F²/k of the spring, and of a tip force that bends the beam as far.
+        ({"beam": None, "loads": PUSHES}, 2.0 * 3.0**2 / 3.0),
+        ({"loads": [{"on": "beam", "at": 0.5}]}, 8.0 / 6.0 + 2.0 * 0.3125**2 * tip_compliance(LONG.beam)),
+        ({"loads": [{"on": "beam", "shape": [0.0, 1.0]}]}, 8.0 / 6.0 + 2.0 * 0.55**2 * tip_compliance(LONG.beam)),
+    ],
+)
+def test_the_energy_at_first_contact_is_that_by_hand(changes, energy):
+    assert contact_energy(with_changes(LONG, **changes)) == pytest.approx(energy, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("spring", "stop", "depth"),
+    [
+        ({"equilibrium": 0.1}, PAIR.stop, 0.0),  # softening, at rest
+        ({**HARD, "equilibrium": 0.1}, PAIR.stop, 0.1),
+        ({**HARD, "equilibrium": 0.01}, PAIR.stop, 0.015),
+        # ½ k1 y² + ¼ k2 y⁴ = ½ m v² of the spring, without the beam
+        ({**HARD, "initial_velocity": np.sqrt(3.0 * 0.2**2 + 200.0 * 0.2**4)}, None, 0.2),
+    ],
+)
+def test_a_spring_is_as_stiff_as_where_it_goes(spring, stop, depth):
+    lone = with_changes(PAIR, beam=None, spring=spring, stop=stop)
+    cubic = spring.get("cubic_stiffness", 0.0)
+    assert spring_stiffness(lone) == pytest.approx(3.0 + 3.0 * cubic * depth**2, rel=1e-9)
 
 
 @pytest.mark.parametrize(("turn", "expected"), [(0.99, ("energy", 2)), (1.01, ("energy", 0))])

@@ -184,9 +184,10 @@ def test_a_table_may_name_its_units_and_be_parted_by_semicolons(text):
 
 
 def test_a_table_ends_with_its_last_line_and_a_ramp_stays():
-    Path("record.csv").write_text("time [ms],acceleration [g]\n0,1\n10,2\n")
+    Path("record.csv").write_text("time [ms],acceleration [g]\n0,1\n10,-2\n")
     table = Load(on="base", signal="table", file="record.csv")
-    assert table.value([-1e-9, 0.0, 0.01, 0.010001]) == pytest.approx([0.0, 9.80665, 2.0 * 9.80665, 0.0])
+    assert table.value([-1e-9, 0.0, 0.01, 0.010001]) == pytest.approx([0.0, 9.80665, -2.0 * 9.80665, 0.0])
+    assert table.peak == pytest.approx(2.0 * 9.80665)
     ramp = Load(on="tip", signal="ramp", duration=0.01, amplitude=3.0)
     assert ramp.value([-1e-9, 0.005, 0.01, 7.0]) == pytest.approx([0.0, 1.5, 3.0, 3.0])
 
@@ -204,6 +205,7 @@ AS_MANY = "there must be as many as the first line, and two at least, with , or 
         ("0,1,2\n1,2,3\n", "3 columns; a table has two, time and value"),
         ("0 1\n1 2\n", f"line 1: 1 columns; {AS_MANY}"),
         ("0,1\n2,2\n1,3\n", "line 3: time 1 is not after that of the line before"),
+        ("0,1\n2,2\n2,3\n", "line 3: time 2 is not after that of the line before"),
         ("time,value\n0,1\n", "1 lines with numbers; there must be two at least"),
         ("0,1\n1,\udcff\n", "'utf-8' codec can't decode byte 0xff in position 6: invalid start byte"),
         (

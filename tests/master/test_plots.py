@@ -23,7 +23,7 @@ from springbeam.pictures.drawing import (
     readable_unit,
     shaded_phases,
 )
-from springbeam.pictures.panels import panels
+from springbeam.pictures.panels import compared, panels
 from springbeam.pictures.plots import figure_of, plot_run
 from springbeam.results.directory import PICTURES
 
@@ -150,14 +150,14 @@ def test_a_motion_lost_in_the_other_is_enlarged_and_levels_far_outside_are_left_
 @pytest.mark.parametrize(
     ("law", "phase", "force"),
     [
-        ("compliance", "in contact (u < y)", "of the law λ(y − u)₊ᵖ"),
-        ("link", "joined by the link", "of the link λ(y − u)"),
+        ("compliance", "in contact (u < y)", "of the law λ(y − u)₊ᵖ (1 + χ ṗ)"),
+        ("link", "joined by the link", "of the link λ(y − u) + c(z − v)"),
         ("tie", "tied (u = y)", "part λ(Ψ − u)₊ᵖ"),
         ("transmission", "touch (y ≥ Ψ)", "part λ(Ψ − u)₊ᵖ"),
     ],
 )
 def test_phases_and_forces_have_the_words_of_the_law(law, phase, force):
-    scene = with_changes(PAIR, contact={"law": law})
+    scene = with_changes(PAIR, contact={"law": law, "damping": 0.5 if law in ("compliance", "link") else 0.0})
     joined = "touch" if law in ("compliance", "transmission") else "tied"
     run = a_trajectory(scene, phase=np.where(np.arange(400) < 200, joined, "free"))
     assert [look.words for look, _ in shaded_phases(run)] == [phase, "free"]
@@ -165,14 +165,59 @@ def test_phases_and_forces_have_the_words_of_the_law(law, phase, force):
 
 
 def test_energies_are_stacked_to_the_total_unless_one_is_negative():
+    """By more than rounding."""
     found = panel("energies", a_trajectory())
     *parts, total = found.curves
     assert [curve.stacked for curve in found.curves] == [True] * 5 + [False]  # all but the loads, which are zero
     assert np.allclose(sum(curve.values for curve in parts), total.values, rtol=1e-14)
     assert panel("energies", a_trajectory(e_beam=np.full(400, 4.5e9))).axis == "energy [GJ]"
+    assert panel("energies", a_trajectory(e_load=np.full(400, -1e-13))).curves[0].stacked
     lines = panel("energies", a_trajectory(e_spring=np.linspace(-1.0, 1.0, 400)))
     assert "spring" in words_in(lines)
     assert not any(curve.stacked for curve in lines.curves)
+
+
+def test_loads_are_drawn_by_unit_and_what_the_clamp_does_in_its_own():
+    loads = [{"on": on, "signal": "step"} for on in ("tip", "base", "spring")]
+    run = a_trajectory(with_changes(PAIR, loads=[*loads, {"on": "beam", "at": 0.5}]))
+    assert [words_in(panel(name, run)) for name in ("loads-0", "loads-1")] == [
+        {"load 0, on the tip", "load 2, on the spring", "load 3, on the beam"}, {"load 1, on the base"}
+    ]  # fmt: skip
+    assert (panel("loads-1", run).heading, panel("loads-1", run).axis) == ("Acceleration of the base", "load [mm/s²]")
+    assert [panel(f"clamp-{name}", run).axis for name in ("force", "moment")] == ["force [mN]", "moment [mN·m]"]
+    # Where the beam leans at its start its clamp feels what no mesh settles.
+    assert panel("accelerations", run).curves[0].time[0] == run.time[1]
+
+
+def test_levels_and_gaps_are_those_of_what_is_there():
+    late = a_trajectory(time=np.linspace(0.5, 0.6, 400))
+    assert [curve.time.tolist() for curve in panel("positions", late).curves[2:]] == [[0.5, 0.6]] * 2
+    assert [words_in(panel("gap", a_trajectory(SCENES[has]))) for has in ("all", "no spring")] == [
+        {"u(t, L) − y"}, {"u(t, L) − φ"}
+    ]  # fmt: skip
+    still = {name: np.zeros(400) for name in ("u_tip", "y", "v_tip", "z")}
+    assert [found.name for found in compared({"still": a_trajectory(**still)})][:2] == ["position", "contact force"]
+
+
+@pytest.mark.parametrize(
+    ("least", "limits"), [(1.0 / 29.0, None), (-1.0, None), (1.0 / 31.0, (0.3 / 31.0, 3.0)), (1e-12, (0.3e-8, 3.0))]
+)
+def test_impulses_of_different_sizes_have_a_logarithmic_axis(least, limits):
+    events = [Event(t, "impact", 0, 0, 0, 0, size) for t, size in ((0.1, least), (0.2, 1.0), (0.3, 0.0))]
+    found = panel("impulses", a_trajectory(events=events))
+    assert [curve.values.tolist() for curve in found.curves] == [[least, 1.0]]
+    assert found.logarithmic == (limits and pytest.approx(limits, rel=1e-12))
+
+
+def test_the_residual_is_over_the_largest_energy_where_it_is_not_zero():
+    zero, off = np.zeros(400), np.where(np.arange(400) % 2, -6e-9, 0.0)
+    run = a_trajectory(e_beam=zero + 2.0, e_spring=zero + 1.0, e_contact=zero, e_total=zero + 3.0, energy_residual=off)
+    found = panel("residual", run)
+    assert found.axis == "energy residual [–]"
+    assert found.curves[0].values == pytest.approx([2e-9] * 200, rel=1e-12)
+    assert found.logarithmic == pytest.approx((0.6e-9, 6e-9), rel=1e-12)
+    least = panel("residual", a_trajectory(energy_residual=1e-300 * run.time)).logarithmic[0]
+    assert least == pytest.approx(0.3e-18, rel=1e-12, abs=0.0)
 
 
 def test_the_largest_mean_is_drawn_over_its_window():

@@ -32,6 +32,11 @@ def test_statics_are_those_of_a_mesh_that_holds_them():
     assert statics.tip_compliance(BEAM) == pytest.approx(by_force[d.tip], rel=1e-12)
     assert statics.tip_load_deflection(BEAM) == pytest.approx(by_load[d.tip], rel=1e-12)
     assert statics.load_energy(BEAM) == pytest.approx(load @ by_load, rel=1e-12)
+    hanging = BEAM.model_copy(update={"tip_load_coefficient": 0.0})
+    assert statics.tip_reach(hanging) == -statics.tip_load_deflection(hanging) > 0.0
+    moving = BEAM.model_copy(update={"initial_velocity_slope": -30.0})
+    energy = 0.5 * (30.0 * d.slope_shape) @ d.M @ (30.0 * d.slope_shape)  # that is ½ F²/k with u = F/k
+    assert statics.tip_reach(moving) == pytest.approx(np.sqrt(2.0 * energy * by_force[d.tip]), rel=0.02)
     at_rest = QuasiStaticBeam(BEAM, 0, statics.tip_load_deflection(BEAM), 0.0).energies()
     assert at_rest.potential == pytest.approx(0.5 * load @ by_load, rel=1e-12)
     sampler = d.interpolated()

@@ -172,13 +172,15 @@ def test_any_value_of_a_key_is_allowed_or_explained(place, value):
 
 
 @pytest.mark.parametrize("load", [0.0, 2.0, -2.0])
-@pytest.mark.parametrize("stop", [None, -1.0])
+@pytest.mark.parametrize("stop", [None, -1.0, -10.0])
 def test_a_softening_spring_may_start_with_the_energy_of_its_lower_rim(load, stop):
     """Rims from a general root finder; a foundation inside the well bars the one below."""
     k1, k2 = 3.0, -0.2
     low, _, high = sorted(np.roots([k2, 0.0, k1, -load]).real)
-    rims = (high,) if stop is not None else (low, high)
+    rims = (high,) if stop == -1.0 else (low, high)
     depth = min(0.5 * k1 * y**2 + 0.25 * k2 * y**4 - load * y for y in rims)
+    with_beam = changed(beam={"initial_velocity_slope": -9.0}, stop=None)  # ρA L³ s₁²/6 beside a well of k1²/4|k2|
+    assert "starts with 13.5 J, the softening spring's well is 11.2 J deep" in suspicions(scene_from_dict(with_beam))[0]
     for factor in (1.0 - 1e-9, 1.0 + 1e-9):
         spring = {"external_force": load, "initial_velocity": factor * math.sqrt(2.0 * depth)}
         scene = changed(beam=None, stop=stop and {"position": stop}, spring=spring)
