@@ -103,8 +103,9 @@ class LinearForm:
         xi, xi_dot = self.modal(X)
         force = self.forces(xi[None], xi_dot[None])[0] @ self.inputs + self.load_at(X[self.system.T])
         rates, amplitudes = self.oscillators.components(xi, xi_dot, force)
-        silent = NOISE * max(float(np.linalg.norm(xi)), np.max(amplitudes, initial=0.0))
-        fastest = np.max(rates[amplitudes > silent], initial=0.0)
+        reach = np.max(np.abs(self.ends), axis=0, initial=0.0)  # of the ends, by a unit of each mode
+        silent = NOISE * np.max(reach, initial=0.0) * max(float(np.linalg.norm(xi)), np.max(amplitudes, initial=0.0))
+        fastest = np.max(rates[np.tile(reach, 2) * amplitudes > silent], initial=0.0)
         return min(_STEP_PHASE / fastest if fastest > 0.0 else np.inf, self.system.loads.longest_step)
 
     def step(self, X: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
