@@ -26,12 +26,13 @@ def test_beyond_all_modes_there_is_nothing():
     values, sizes = (1.0, 1.5, 1.75), (6, 12, 24)
     assert settled(values, sizes).limit == pytest.approx(2.0)
     assert settled(values, sizes, complete=True) == (0.25, None, 1.75, 0.0)
-    scene = with_changes(load_scene("soft"), beam={"n_elements": 12})
-    study = Converge(scene=scene, metric=("u_tip_end",))
-    rows = [{"refined": "modes", "unknowns": n, "u_tip_end": u} for n, u in zip(sizes, values, strict=True)]
-    assert study.settled(rows, "u_tip_end").error == 0.0
-    fewer = Converge(scene=with_changes(scene, beam={"n_modes": 12}), metric=("u_tip_end",))
-    assert fewer.settled(rows, "u_tip_end").error == pytest.approx(0.25)
+    for elements, error in ((12, 0.0), (24, 0.25)):  # of 24 modes, of 48
+        scene = with_changes(load_scene("soft"), beam={"n_elements": elements, "n_modes": 24})
+        study = Converge(scene=scene, metric=("u_tip_end",), levels=3)
+        rows = [{"u_tip_end": value, "cost_wall_time": 1.0} for value in 2 * values]
+        records = dict(zip(study.cases(), rows, strict=True))
+        found = study.findings(records).document["modes"]["settled"]["u_tip_end"]
+        assert found["error"] == pytest.approx(error)
 
 
 def test_linear_elements_converge_by_order_two(tmp_path):

@@ -18,7 +18,8 @@ order of events. A run that is not resolved at its macro step cannot be compared
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from typing import Any, Literal
 
 import numpy as np
@@ -28,7 +29,7 @@ from ..pictures.drawing import present
 from ..results.contact_times import ContactChange, contact_changes
 from ..results.trajectory import TOLD, Trajectory, columns_of
 from ..run.runner import simulate
-from ..scene import Scene, with_changes
+from ..scene import Scene, SceneError, with_changes
 from ..scene.resolution import mesh_frequency, slowest_frequency, with_scheme_chosen
 from .study import Row
 
@@ -127,8 +128,8 @@ def _beside_event_driven(scene: Scene, found: Row) -> tuple[Trajectory, ...]:
         found["notes"] += said or ["not resolved: half the macro step changes the motion from the first contact on"]
         return ()
     times = macro_points(scene)
-    reference, perturbed = reference_and_perturbed(scene, times)
-    changes = [contact_changes(run, SHORT * size) for run in (coarse, fine, reference, perturbed)]
+    reference, moved = reference_and_perturbed(scene, times)
+    changes = [contact_changes(run, SHORT * size) for run in (coarse, fine, reference, moved)]
     stable = _agree_until(changes[2], changes[3], found["from"], float(coarse.time[-1]))
     found["horizon"] = min(found["horizon"], stable)
     before = times <= found["horizon"]
@@ -143,9 +144,9 @@ def _beside_event_driven(scene: Scene, found: Row) -> tuple[Trajectory, ...]:
         good = before & np.isfinite(ours) & np.isfinite(halved) & (away | (name in ("u_tip", "y")))
         if good.sum() < 2:
             continue
-        ours, halved, exact, moved = (values[good] for values in (ours, halved, reference[name], perturbed[name]))
+        ours, halved, exact, other = (values[good] for values in (ours, halved, reference[name], moved[name]))
         scale = float(np.abs(exact).max()) or 1.0
-        growth = np.maximum(1.0, np.maximum.accumulate(np.abs(moved - exact) / (PERTURBATION * scale)))
+        growth = np.maximum(1.0, np.maximum.accumulate(np.abs(other - exact) / (PERTURBATION * scale)))
         found["growth"] = max(found["growth"], float(growth[-1]))
         floor = _step_error(scene) * (np.flatnonzero(good) + 1.0) + _SAFETY * (_rounding(scene, name) + neglected)
         judged = _judged(name, times[good], np.abs(ours - exact), np.abs(ours - halved), floor * growth * scale)
@@ -232,10 +233,23 @@ def _compare_events(
 
 def reference_and_perturbed(scene: Scene, times: np.ndarray) -> tuple[Trajectory, Trajectory]:
     """Return the reference at ``times`` [s], and once more from initial velocities changed by `PERTURBATION`."""
-    perturbed = event_driven.simulate(
-        scene, sample_times=times, velocity_perturbation=PERTURBATION * initial_speed(scene)
-    )
-    return event_driven.simulate(scene, sample_times=times), perturbed
+    return event_driven.simulate(scene, sample_times=times), next(perturbed(scene, sample_times=times))
+
+
+def perturbed(scene: Scene, **options: Any) -> Iterator[Trajectory]:
+    """Yield the reference of ``scene`` from initial velocities changed by `PERTURBATION`; ``options`` of its run.
+
+    First the beam's; then that of a spring beside it, to less and more, where it may have any: a spring that the tip
+    meets a little above Ψ is met a little below it, where another phase follows.
+    """
+    change = PERTURBATION * initial_speed(scene)
+    yield event_driven.simulate(scene, velocity_perturbation=change, **options)
+    if scene.spring is not None and scene.beam is not None:
+        start, speed = scene.spring.initial_velocity, change * scene.beam.length
+        for velocity in (start - speed, start + speed):
+            with suppress(SceneError):  # a spring that is kept still until the tip has come
+                pushed = with_changes(scene, spring={"initial_velocity": velocity})
+                yield event_driven.simulate(pushed, **options)
 
 
 def initial_speed(scene: Scene) -> float:

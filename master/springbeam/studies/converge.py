@@ -106,45 +106,44 @@ class Converge(Study):
             cases[label] = {"refined": refined, "unknowns": mesh.modes_kept, **keys}
         return cases
 
-    def sequences(self, records: Mapping[str, Row]) -> dict[str, list[Row]]:
-        """Return the rows of each sequence as they were run."""
-        return {refined: list(rows) for refined, rows in groupby(super().rows(records), lambda row: row["refined"])}
+    def _settled(self, records: Mapping[str, Row]) -> dict[str, tuple[list[Row], dict[str, Settled]]]:
+        """Return the rows of each sequence, and how each quantity settles in it.
 
-    def settled(self, rows: Sequence[Row], name: str) -> Settled:
-        """Judge a quantity of a sequence. All modes of a mesh are its solution: no mode lies beyond the last."""
-        beam, refined = self.scene.beam, rows[-1]["refined"]
-        sizes = [row["beam.n_elements" if refined == "elements" else "unknowns"] for row in rows]
-        complete = refined == "modes" and beam is not None and beam.modes_kept == beam.unknowns
-        return settled([row[name] for row in rows], sizes, complete=complete)
-
-    def quantities(self, records: Mapping[str, Row]) -> list[str]:
-        """Return what is compared: what was asked for, or what the scene has."""
-        first = next(iter(records.values()))
-        return [name for name in self.metrics if self.metric or first[name] is not None]
+        Quantities are those asked for, or those that the scene has. All modes of a mesh are its solution: no mode lies
+        beyond the last.
+        """
+        rows, beam, found = super().rows(records), self.scene.beam, {}
+        names = [name for name in self.metrics if self.metric or rows[0][name] is not None]
+        for refined, several in groupby(rows, lambda row: row["refined"]):
+            mine = list(several)
+            sizes = [row["beam.n_elements" if refined == "elements" else "unknowns"] for row in mine]
+            complete = refined == "modes" and beam is not None and beam.modes_kept == beam.unknowns
+            of = {name: settled([row[name] for row in mine], sizes, complete=complete) for name in names}
+            found[refined] = mine, of
+        return found
 
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
         """Return a row per run; errors are from the limits of its sequence."""
-        found = []
-        for rows in self.sequences(records).values():
-            limits = {name: self.settled(rows, name).limit for name in self.quantities(records)}
-            found += [row | {f"error_{name}": None if limit is None or row[name] is None else row[name] - limit
-                             for name, limit in limits.items()} for row in rows]  # fmt: skip
-        return found
+        return [
+            row | {f"error_{name}": None if s.limit is None or row[name] is None else row[name] - s.limit
+                   for name, s in found.items()}
+            for rows, found in self._settled(records).values()
+            for row in rows
+        ]  # fmt: skip
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Judge how the quantities settle."""
-        sequences, document = self.sequences(records), dict[str, Any]()
-        given = sequences["elements"][0]
+        document = dict[str, Any]()
         shown: list[Any] = [Text(self.scene.title or "(untitled scene)", style="bold")]
-        for refined, rows in sequences.items():
-            found = {name: self.settled(rows, name) for name in self.quantities(records)}
+        given = next(iter(records.values()))
+        for refined, (rows, found) in self._settled(records).items():
             document[refined] = {"levels": rows, "settled": {name: s._asdict() for name, s in found.items()}}
             cells = [_cells(name, given[name], s) for name, s in found.items()]
             shown.append(table(("", "as given", "extrapolated", "error", "order"), cells, f"more {refined}"))
             meshes = (
                 f"{row['beam.n_elements']} el. {row['unknowns']} modes {row['cost_wall_time']:.2g} s" for row in rows
             )
-            shown.append(Text(f"runs      {', '.join(meshes)}"))
+            shown.append(f"runs      {', '.join(meshes)}")
         shown.append("error: of the run as given; in brackets the last change, where the values show no limit")
         return Findings(document, shown)
 
@@ -152,12 +151,13 @@ class Converge(Study):
         """Draw how far each quantity is from its limit over the size of the mesh, a panel a sequence."""
         from .picture import Point, curves
 
-        points = []
-        for row in self.rows(records):
-            for name in self.quantities(records):
-                if (error := row[f"error_{name}"]) is not None:
-                    share = abs(error / (row[name] - error or 1.0))
-                    points.append(Point(f"more {row['refined']}", heading(name), row["unknowns"], share))
+        points = [
+            Point(f"more {refined}", heading(name), row["unknowns"], abs((row[name] - s.limit) / (s.limit or 1.0)))
+            for refined, (rows, found) in self._settled(records).items()
+            for row in rows
+            for name, s in found.items()
+            if s.limit is not None and row[name] is not None
+        ]
         points = [point for point in points if point.y > _ROUNDING]
         title = f"{self.scene.title}: convergence with the mesh"
         return {"converge": curves(points, title, "unknowns of the beam", "distance from the limit, relative")}

@@ -51,7 +51,7 @@ class Crosscheck(Study):
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Show what was compared, quantities and changes of contact, and the verdict."""
         record, units = records[_CASE], columns_of(self.scene)
-        shown: list[Any] = [*map(Text, record["notes"])]
+        shown: list[Any] = [*record["notes"]]
         if record["quantities"]:
             cells = [
                 (f"{row['quantity']} [{units[row['quantity']]}]", f"{row['error']:.2e}", f"{row['at']:.6g}",

@@ -127,7 +127,7 @@ class Fit(Study):
         shown: list[Any] = [
             table(("key", "value", "95 % from", "to"), keys),
             table(("curve", "left, rms", "of its spread"), left),
-            Text(f"{len(record['runs'])} runs; {record['message']}"),
+            f"{len(record['runs'])} runs; {record['message']}",
         ]
         shown += [Text(f"not determined: {why}", style="bold red") for why in record["undetermined"]]
         return Findings({name: record[name] for name in ("keys", "left", "undetermined")}, shown,

@@ -182,14 +182,10 @@ class Records:
 
     def __init__(self, study: Study, directory: Path, *, replace: bool = False) -> None:
         self._settings, self.path = study.settings(), directory / FILE
-        self.by_name: dict[str, Row] = {}
-        self._whole = 0  #: bytes of complete lines
-        if replace:
-            return
-        settings, self.by_name, self._whole = _read(self.path)
-        if self._whole and settings != self._settings:
+        settings, self.by_name, self._whole = ({}, {}, 0) if replace else _read(self.path)
+        if settings not in ({}, self._settings):
             raise ResultsExist(f"{directory}: holds another study, or one of another springbeam or FMU ({FILE})")
-        if not self._whole and directory.is_dir() and any(file != self.path for file in directory.iterdir()):
+        if not (settings or replace) and directory.is_dir() and any(file != self.path for file in directory.iterdir()):
             raise ResultsExist(f"{directory}: is not empty and holds no study")
 
     def __enter__(self) -> Records:

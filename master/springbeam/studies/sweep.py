@@ -17,7 +17,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 from rich.table import Table
-from rich.text import Text
 
 from ..scene import Load, Scene, SceneError
 from ..scene.messages import unit_of
@@ -80,7 +79,7 @@ class Sweep(Study):
         if self.boundary:
             document["boundary"] = self._critical(records)
             lines += _told(document["boundary"], self.boundary)
-        shown = [Text(line) for line in lines] + ([self._first(records)] if self.metric else [])
+        shown = [*lines, *([self._first(records)] if self.metric else [])]
         return Findings(document, shown, code=2 if counts.keys() == {"refused"} else 0)
 
     def _first(self, records: Mapping[str, Row]) -> Table:

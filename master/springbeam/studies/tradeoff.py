@@ -15,7 +15,6 @@ from time import perf_counter
 from typing import Any, ClassVar
 
 import numpy as np
-from rich.text import Text
 
 from ..monolithic import event_driven
 from ..results.trajectory import Trajectory
@@ -163,7 +162,7 @@ class Tradeoff(Study):
             for row in front
         ]  # fmt: skip
         shown = [
-            Text(f"{self.scene.title}: up to t = {until:.6g} s, {len(rows)} configurations"),
+            f"{self.scene.title}: up to t = {until:.6g} s, {len(rows)} configurations",
             table(names, cells, "cheapest for an error (solve time)", words=("co-simulation", "scipy")),
             table(("configuration", "error", "event [s]", "solve [ms]", "set-up [ms]", "doSteps"), on_front,
                   "Pareto front"),
