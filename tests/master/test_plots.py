@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.image import imread
 from runs import EVERY_EVENT, ODD_COLUMNS, PAIR, SCENES, a_trajectory
 
@@ -23,8 +24,10 @@ from springbeam.pictures.drawing import (
     readable_unit,
     shaded_phases,
 )
+from springbeam.pictures.frames import frames_of, sketches
 from springbeam.pictures.panels import compared, panels
 from springbeam.pictures.plots import figure_of, plot_run
+from springbeam.pictures.report.charts import backdrop
 from springbeam.results.directory import PICTURES
 
 A, B, C, D, E, F, G = PICTURES
@@ -81,9 +84,9 @@ def test_axes_have_quantities_and_units_and_the_key_names_phases_and_events(pict
         assert axes[-1].get_xlabel() == "time t [s]"
         key = {text.get_text() for text in figure.legends[0].get_texts()}
         assert {"free", "tied (u = y < Ψ)", *(f"{look.words} (1)" for look in EVENT_LOOKS.values())} <= key
-    for resolved in (True, False):
-        marked = figure_of(dataclasses.replace(run, summary={"resolved": resolved}), picture)
-        assert (NOT_RESOLVED in texts(marked)) is not resolved
+    for summary in ({"resolved": True}, {"resolved": False}, {}):
+        marked = figure_of(dataclasses.replace(run, summary=summary), picture)
+        assert (NOT_RESOLVED in texts(marked)) is not summary.get("resolved", True)
 
 
 def test_every_panel_is_in_one_picture():
@@ -102,7 +105,7 @@ def test_panels_are_painted_with_all_that_they_say():
     energies = figure_of(run, "gap_and_energy").axes[1]
     (total,) = [line for line in energies.lines if line.get_label()[0] != "_"]
     areas = [area for area in energies.collections if area.get_label() in {look.words for look in ENERGIES.values()}]
-    assert (total.get_label(), len(areas)) == ("total", 5)
+    assert (total.get_label(), total.get_linestyle(), len(areas)) == ("total", "--", 5)
     assert areas[-1].get_paths()[0].vertices[:, 1].max() == pytest.approx(total.get_ydata().max(), rel=1e-12)
 
 
@@ -118,7 +121,36 @@ def test_what_is_compared_is_drawn_in_the_unit_of_its_axis_and_with_what_strikes
     for ax, (column, unit) in zip(figure.axes, units.items(), strict=False):
         assert ax.get_ylabel().endswith(unit)
         assert np.abs(ax.lines[0].get_ydata()).max() == pytest.approx(1e3 * np.abs(run[column]).max(), rel=1e-12)
+        assert ax.lines[0].get_xdata()[-1] == run.time[-1]
+    assert [line.get_linestyle() for line in figure.axes[0].lines[:2]] == ["-", "--"]
     assert [high.tolist() for _, high in drawn] == [[0.6, 0.6]]
+
+
+def test_phases_are_shaded_where_they_hold_and_a_time_axis_begins_with_the_run():
+    late = a_trajectory(time=np.linspace(0.5, 0.6, 400), phase=np.where(np.arange(400) < 100, "tied", "free"))
+    ax = figure_of(late, "positions").axes[0]
+    shaded = [shade.get_paths()[0].get_extents().intervalx.tolist() for shade in ax.collections[:2]]
+    turn, end = late.time[100], 0.6
+    assert shaded == [pytest.approx([0.5, turn]), pytest.approx([turn, end])]
+    assert ax.get_xlim() == (0.5, end)
+    assert shaded_phases(a_trajectory(phase=np.full(400, "free"))) == []
+
+
+def test_a_short_beam_is_drawn_in_the_unit_of_its_axis():
+    run = a_trajectory(with_changes(PAIR, beam={"length": 0.05}))
+    ax = figure_of(run, "shapes_later").axes[0]
+    assert (ax.get_xlabel(), ax.get_xlim()) == ("position along the beam x [mm]", (0.0, pytest.approx(50.0)))
+    assert ax.collections[0].get_segments()[0][-1, 0] == pytest.approx(50.0)
+    beam = sketches(run, frames_of(run))[0].strokes[2]
+    assert (beam.part, beam.x[-1]) == ("beam", pytest.approx(50.0))
+
+
+@pytest.mark.parametrize(("number", "lines"), [(60, True), (61, False)])
+def test_many_events_have_no_lines_through_panels(number, lines):
+    run = a_trajectory(events=[Event(5e-3 * (k + 1), "stop_impact", 0, 0, 0, 0) for k in range(number)])
+    (ax,) = figure_of(run, "positions").axes
+    assert any(isinstance(drawn, LineCollection) for drawn in ax.collections) is lines
+    assert any("opacity" in shape for shape in backdrop(run)) is lines
 
 
 # -- panels: what plots and report draw over time ---------------------------------------------------------------------
@@ -139,12 +171,16 @@ def words_in(found):
 
 def test_a_motion_lost_in_the_other_is_enlarged_and_levels_far_outside_are_left_out():
     t = a_trajectory().time
-    run = a_trajectory(u_tip=2e-6 * np.sin(9.0 * t), y=-1e-2 * np.sin(5.0 * t))
+    run, other = (a_trajectory(u_tip=size * np.sin(9.0 * t), y=-1e-2 * np.sin(5.0 * t)) for size in (9.5e-5, 1.05e-4))
+    assert "position [µm]" not in [p.axis for p in panels(other)]  # 2 % is the limit
     assert [p.axis for p in panels(run)][:3] == ["position [mm]", "position [µm]", "velocity [mm/s]"]
     assert len(figure_of(run, "positions").axes) == 2
     assert [p.axis for p in panels(a_trajectory())][:2] == ["position [mm]", "velocity [mm/s]"]
     assert levels_in(a_trajectory()) == {"Ψ": 0.0, "φ": -0.015}
     assert levels_in(a_trajectory(with_changes(PAIR, stop={"position": -100.0}))) == {"Ψ": 0.0}
+    for lowest, near in ((1.49, True), (1.51, False), (-2.49, True), (-2.51, False)):  # within 1.5 of a range of 1
+        away = lowest + np.linspace(0.0, 1.0, 400)
+        assert ("Ψ" in levels_in(a_trajectory(u_tip=away, y=away))) is near
 
 
 @pytest.mark.parametrize(
@@ -254,11 +290,12 @@ def test_phases_hold_until_the_next_row_and_are_sampled_in_proportion():
     few = np.array(["free", "free", "tied", "tied", "touch", "free"])
     intervals = phase_intervals(np.array([0.0, 1.0, 2.0, 3.0, 3.0, 4.0]), few)
     assert intervals == [("free", 0.0, 2.0), ("tied", 2.0, 3.0), ("touch", 3.0, 4.0)]
-    time = np.arange(40_000) / 4.0
-    intervals = phase_intervals(time, np.where(np.arange(40_000) % 4 == 0, "tied", "free"), 999)
+    time, phase = 7.0 + np.arange(40_000) / 4.0, np.where(np.arange(40_000) % 4 == 0, "tied", "free")
+    intervals = phase_intervals(time, phase, 999)
     assert len(intervals) <= 1000
-    tied = sum(end - start for name, start, end in intervals if name == "tied")
-    assert tied / time[-1] == pytest.approx(0.25, abs=0.05)
+    assert (intervals[0][1], intervals[-1][2]) == (time[0], time[-1])
+    half = 0.5 * np.ptp(time) / 999
+    assert [name for name, _, _ in intervals] == [phase[int(4.0 * (at + half - 7.0))] for _, at, _ in intervals]
 
 
 @pytest.mark.parametrize(

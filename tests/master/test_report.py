@@ -194,12 +194,16 @@ def test_a_page_is_small_and_explains_its_words():
 def test_a_contact_lost_in_the_motion_is_drawn_once_more_enlarged():
     t = np.linspace(0.0, 0.6, 400)
     tip, joined = 0.07 * np.sin(9.0 * t), t > 0.5
-    place = 1e-3 * (t - 0.5)
-    run = a_trajectory(u_tip=np.where(joined, place, tip), y=place, phase=np.where(joined, "tied", "free"))
-    chart = shown(run).data["charts"]["motion-contact"]["layout"]
+    place = 0.2 * (t - 0.5)
+    scene = with_changes(PAIR, spring={"equilibrium": 0.01}, beam={"initial_deflection_slope": 0.01})
+    run = a_trajectory(scene, u_tip=np.where(joined, place, tip), y=place, phase=np.where(joined, "touch", "free"))
+    found = shown(run).data["charts"]["motion-contact"]
+    (level,) = [curve["y"] for curve in found["data"] if curve["name"] == "rest of the spring Ψ"]
+    assert array(level) == pytest.approx([10.0, 10.0])
+    chart = found["layout"]
     room = 0.3 * float(np.ptp(place[joined]))
-    assert chart["yaxis"]["range"] == pytest.approx([1e6 * (place[joined][0] - room), 1e6 * (1e-4 + room)])
-    assert chart["yaxis"]["title"]["text"] == "height [µm]"
+    assert chart["yaxis"]["range"] == pytest.approx([1e3 * (place[joined][0] - room), 1e3 * (0.02 + room)])
+    assert chart["yaxis"]["title"]["text"] == "height [mm]"
     whole = a_trajectory(phase=np.full(400, "tied"), y=0.4 * np.sin(9.0 * t), u_tip=0.4 * np.sin(9.0 * t))
     assert "motion-contact" not in shown(whole).data["motion"]["parts"]
 
