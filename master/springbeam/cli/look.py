@@ -221,7 +221,7 @@ def _over_one_window(runs: list[Trajectory]) -> list[dict[str, Any]]:
         if summary.get("contact_force_window", common) != common:
             del summary["contact_force_max"], summary["contact_force_window"]
             if run.steps is not None:
-                found = totals(run.scene, run.steps, run.events, common, free_at_end=True)
+                found = totals(run.scene, run.steps, run.events, common)
                 summary |= {"contact_force_max": found["contact_force_max"], "contact_force_window": common}
     return summaries
 

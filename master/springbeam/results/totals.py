@@ -16,7 +16,7 @@ from numpy.polynomial.polynomial import polyder, polyval
 from ..scene import Scene
 from .contact_times import foundation_contacts, kicks, tip_contacts, touches
 from .dense import extremes
-from .steps import FORCE_COLUMNS, impulse
+from .steps import FORCE_COLUMNS, impulse, joined
 from .trajectory import Event
 
 
@@ -70,9 +70,7 @@ def in_words(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             yield f"energy lost by {words}", f"{summary[name]:.4g} J"
 
 
-def totals(
-    scene: Scene, steps: np.ndarray, events: Iterable[Event], window: float, *, free_at_end: bool
-) -> dict[str, float | int]:
+def totals(scene: Scene, steps: np.ndarray, events: Iterable[Event], window: float) -> dict[str, float | int]:
     """Return the numbers of `TOTALS` that the scene has, and the energies lost in impacts [J].
 
     Parameters
@@ -85,15 +83,13 @@ def totals(
         Of the whole run.
     window
         Over which the contact force is averaged [s]; the run may be shorter.
-    free_at_end
-        Whether tip and spring are apart when the run ends.
     """
     events = list(events)
     found: dict[str, float | int] = {}
     beam, spring = scene.upper is not None, scene.lower is not None
     stop = scene.stop is not None and not scene.elastic_stop
     if scene.coupled or (beam and stop):
-        found |= _contact(scene, steps, events, window, free_at_end)
+        found |= _contact(scene, steps, events, window)
     if beam:
         found["deepest_tip"], found["deepest_tip_time"] = extremes(scene, steps, "u_tip")[:2]
     if stop:
@@ -110,9 +106,7 @@ def totals(
     }
 
 
-def shortest_contact(
-    steps: np.ndarray, events: Iterable[Event], below: float, least: float, *, free_at_end: bool
-) -> float:
+def shortest_contact(steps: np.ndarray, events: Iterable[Event], below: float, least: float) -> float:
     """Return how long the shortest contact, touch above Ψ or rest on the foundation lasts [s]; ∞ if not ``below`` [s].
 
     Those are left out whose force passes on no more than ``least`` [N·s], and those that have not ended by the last
@@ -121,7 +115,7 @@ def shortest_contact(
     events, time, found = list(events), steps["time"], inf
     if len(steps) == 0:
         return inf
-    held = [*tip_contacts(events, inf, free_at_end=free_at_end), *touches(events)]
+    held = [*tip_contacts(events, inf, free_at_end=_apart(steps[-1])), *touches(events)]
     for intervals, force in ((held, "contact_force"), (foundation_contacts(events, inf), "foundation_force")):
         passed = np.cumsum(impulse(steps, force))
         for since, until in intervals:
@@ -132,9 +126,12 @@ def shortest_contact(
     return found
 
 
-def _contact(
-    scene: Scene, steps: np.ndarray, events: list[Event], window: float, free_at_end: bool
-) -> dict[str, float | int]:
+def _apart(step: np.ndarray) -> bool:
+    """Return whether tip and spring are apart from the row of a record on."""
+    return not joined(step).any()
+
+
+def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float) -> dict[str, float | int]:
     at_events = kicks(steps["time"], events)
     largest, since = _largest_mean(steps, at_events, window)
     found: dict[str, float | int] = {
@@ -146,6 +143,7 @@ def _contact(
     if scene.contact.lasting and scene.coupled:
         return found
     end = float(steps["time"][-1])
+    free_at_end = _apart(steps[-1])
     of_tip = tip_contacts(events, end, free_at_end=free_at_end)
     intervals = of_tip if scene.coupled else foundation_contacts(events, end)
     lengths = [until - since for since, until in intervals]

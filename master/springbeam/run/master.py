@@ -22,7 +22,6 @@ from ..coupling.protocol import NotConverged, Step
 from ..results.columns import ledger
 from ..results.recording import Recorder
 from ..results.steps import BEAM_TELLS, SPRING_TELLS, STEP, packed
-from ..results.steps import joined as are_joined
 from ..results.totals import totals
 from ..results.trajectory import Event, EventKind
 from ..scene import Scene
@@ -352,9 +351,8 @@ class Master(Stateful):
         made, joined = int(np.count_nonzero(np.diff(steps["time"]))), self._pair.joined
         inside = steps[:0] if joined.decides else steps  # what tells of the motion inside steps
         energies, warnings, changed = self._balance.report(steps)
-        free_at_end = not are_joined(inside[-1:]).any()
         of_coupling, warned = joined.report()
-        unresolved = why_not_resolved(scene, self._pair, self._steps.size, inside, events, free_at_end=free_at_end)
+        unresolved = why_not_resolved(scene, self._pair, self._steps.size, inside, events)
         warnings += filter(None, [*warned, unresolved or peak_force_doubt(scene), not_shown(scene, self._pair, inside)])
         neglect = {}
         if scene.driver_stiffness is not None and len(steps):
@@ -373,5 +371,5 @@ class Master(Stateful):
             "resolved": unresolved is None and not changed,
             "warnings": warnings,
             **({"max_velocity_mismatch": mismatch(self._pair, inside)} if len(inside) else {}),
-            **(totals(scene, steps, events, window, free_at_end=free_at_end) if len(inside) else {}),
+            **(totals(scene, steps, events, window) if len(inside) else {}),
         }

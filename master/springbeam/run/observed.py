@@ -41,12 +41,10 @@ def not_shown(scene: Scene, pair: Pair, steps: np.ndarray) -> str | None:
     return _NOT_SHOWN if too_large else None
 
 
-def why_not_resolved(
-    scene: Scene, pair: Pair, H: float, steps: np.ndarray, events: Sequence[Event], *, free_at_end: bool
-) -> str | None:
+def why_not_resolved(scene: Scene, pair: Pair, H: float, steps: np.ndarray, events: Sequence[Event]) -> str | None:
     """Return in words why a run in steps of H [s] is not resolved; ``None`` if it is."""
     least = SHORT_IMPULSE * least_momentum(scene, pair, steps)
-    lasted = shortest_contact(steps, events, SHORT * H, least, free_at_end=free_at_end)
+    lasted = shortest_contact(steps, events, SHORT * H, least)
     sizes = steps["size"][steps["size"] > 0.0]
     late = float(np.sqrt(np.mean(sizes**3) / np.mean(sizes))) if scene.coupling.adaptive and len(sizes) else None
     return not_resolved(
