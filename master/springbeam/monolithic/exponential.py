@@ -151,9 +151,9 @@ def _modes(omega2: np.ndarray, space: np.ndarray) -> tuple[np.ndarray, np.ndarra
 class ExponentialPropagator:
     """Integrates a phase from X on: exact in the linear part, ``form``, by Gauss collocation in the rest."""
 
-    def __init__(self, form: LinearForm, X: np.ndarray) -> None:
+    def __init__(self, form: LinearForm, X: np.ndarray, speed: float = 0.0) -> None:
         self.form, self.X = form, X
-        self._speed = 0.0  #: the largest of the ends so far, the scale of `_TAIL` [m/s]
+        self._speed = speed  #: the largest of the ends so far, the scale of `_TAIL` [m/s]
         self._force_limit = np.inf  #: what resolving r allows [s]
         self.elapsed = 0.0  #: since the start [s]
 
@@ -188,8 +188,13 @@ class ExponentialPropagator:
         if np.any(unresolved) or not np.all(np.isfinite(states)):
             raise ReferenceFailure(form.unresolved)
 
+        speed = self._speed
+
         def inside(tau: float) -> np.ndarray:
             # Stepped anew, because the forces of the whole segment may hold a kink that lies after τ.
-            return np.asarray(form.step(X, tau)[0][-1])
+            inner = ExponentialPropagator(form, X, speed)
+            while tau - inner.elapsed > 1e-15 * tau:
+                inner.advance(tau - inner.elapsed)
+            return inner.X
 
         return Segment(size * _NODES, np.vstack([X, states]), inside)
