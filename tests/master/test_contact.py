@@ -7,6 +7,7 @@ import pytest
 from springbeam import Motion, load_scene, with_changes
 from springbeam.contact.laws import Compliance, Link, depth
 from springbeam.contact.phases import (
+    Impact,
     Joint,
     Phase,
     Transitions,
@@ -33,6 +34,15 @@ def test_ends_that_are_let_go_have_one_velocity_but_where_they_vibrate(kind, v, 
         assert tip_mass * v_after + mass * z_after == pytest.approx(tip_mass * v + mass * z, rel=1e-14)
     else:
         assert (v_after, z_after) == (v, z)
+
+
+@pytest.mark.parametrize("seated", [False, True])
+def test_ends_that_are_let_go_with_one_velocity_to_rounding_get_no_impulse(seated):
+    """Such as those that have just met: 1e-15 of the largest speed is no error of a scheme."""
+    transitions = Transitions(load_scene("soft"), None, 0.01, 1.0, fastest=lambda: 1.0, equilibrium=0.0)
+    ends = tuple(Motion(0.0, velocity, 0.0, 0.0) for velocity in (1e-15, 0.0))
+    _, _, impact = transitions.after(EventKind.SEPARATION, Phase(Joint.TOUCH, seated), ends, 0.0, ends, 0.0, 1e-17)
+    assert impact == Impact()
 
 
 @pytest.mark.parametrize(("z", "kind"), [(-0.5, "retie"), (0.5, "separation")])

@@ -55,6 +55,23 @@ def test_the_error_follows_the_tolerance(scheme, degree, tolerances, least, orde
     assert orders[0] < slope < orders[1]
 
 
+@pytest.mark.parametrize(("scheme", "degree"), [("hermite", 2), ("energy", 2)])
+def test_a_tip_that_is_held_from_the_start_sets_no_length(scheme, degree):
+    """Until it is let go all its motion is rounding; the beam behind it moves, and by that the steps are as long."""
+    coupling = {"scheme": scheme, "degree": degree, "relative_tolerance": 1e-3}
+    beam = {
+        "density": 6333.3, "length": 1.9839, "area": 0.0023766, "second_moment_of_area": 0.00010227,
+        "young_modulus": 4.2965e7, "shear_modulus": 1.0943e7, "shear_coefficient": 0.833, "n_elements": 21,
+        "initial_velocity_slope": -0.15578, "reduced_integration": True,
+    }  # fmt: skip
+    stop = {"position": 0.0, "restitution": 0.0}
+    run = simulate(scene_from_dict({"time": {"t_end": 0.11892}, "beam": beam, "stop": stop, "coupling": coupling}))
+    times = np.linspace(0.0, 0.11892, 101)
+    exact = event_driven.simulate(run.scene, sample_times=times).u_tip
+    assert np.abs(run.at(times).columns["u_tip"] - exact).max() < 1e-2 * np.abs(exact).max()
+    assert run.summary["macro_steps"] < 2000
+
+
 def test_a_tolerance_below_rounding_stops_by_name():
     with pytest.raises(RunStopped, match=r"above the tolerance, down to a macro step of .* where it is"):
         simulate(soft(1e-17, "hermite", 2))

@@ -21,6 +21,8 @@ from .laws import SoftLaw
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only); slower than the
 #: second, if it would also rise no higher than positions can be told apart.
 _SEATING_SPEED, _SEATING_SPEED_UNSEEN = 1e-8, 1e-4
+#: Rounding of a velocity, relative to the largest so far.
+VELOCITY_ROUNDING = 16.0 * 2.0**-52
 
 
 class Joint(Enum):
@@ -227,11 +229,11 @@ class Transitions(Stateful):
     def _part(self, held: Phase, tip: Motion, low: Motion) -> Impact:
         """Ends that a tie or the foundation lets go have one velocity; where a scheme has let it differ, they take it.
 
-        Unless they part by so much that it is no error but a vibration that the macro step does not follow. A lower end
-        that the foundation holds in the phase ``held`` is at rest.
+        Unless it differs by rounding, or they part by so much that it is no error but a vibration that the macro step
+        does not follow. A lower end that the foundation holds in the phase ``held`` is at rest.
         """
-        parting = tip.velocity - low.velocity
-        if parting == 0.0 or parting > VIBRATION * self._fastest():
+        parting, fastest = tip.velocity - low.velocity, self._fastest()
+        if abs(parting) <= VELOCITY_ROUNDING * fastest or parting > VIBRATION * fastest:
             return Impact()
         if self._alone or held.seated:
             on_beam, loss = rebound(tip.velocity, self._tip_mass, restitution=0.0)

@@ -83,6 +83,25 @@ class Path(NamedTuple):
         return min((s for s in sign_changes(slopes, 0.0, 1.0) if value(bends, s) > 0.0), key=self.at, default=None)
 
 
+class Place(NamedTuple):
+    """What is known of f at a time of a step."""
+
+    time: float  #: since the start of the step [s]
+    sample: Sample
+    means: Means | None  #: over the step up to there; ``None`` if nobody knows
+
+    def path_to(self, later: Place) -> Path:
+        """Return the path from here to a ``later`` place."""
+        before, after, size = self.time, later.time, later.time - self.time
+        means = None
+        if self.means is not None and later.means is not None:
+            (mean, twice), (mean_after, twice_after) = self.means, later.means
+            gained = after * mean_after - before * mean
+            gained_twice = after**2 * twice_after - before**2 * twice - size * before * mean
+            means = gained / size, gained_twice / size**2
+        return Path.through(self.sample, later.sample, size, means)
+
+
 def value(coefficients: Sequence[float], x: float) -> float:
     total = 0.0
     for coefficient in reversed(coefficients):

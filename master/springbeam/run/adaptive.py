@@ -6,7 +6,7 @@ step has them anyway (``docs/coupling.md``, "Adaptive macro steps").
 
 from __future__ import annotations
 
-from math import ceil, inf, log2
+from math import ceil, inf, log2, sqrt
 
 from ..bodies.protocol import Memory, Stateful
 from ..contact.phases import Phase
@@ -25,7 +25,7 @@ _FIRST, _LONGEST, _SHORTEST = 14, 2, 40
 #: A step is changed by at most these factors at once, and aims below the tolerance by the safety factor.
 _SHRINK, _GROW, _SAFETY = 0.125, 2.0, 0.9
 #: Displacements are rounded to so many ulp.
-_ROUNDING = 16.0 * 2.0**-52
+_ROUNDING = 64.0 * 2.0**-52
 #: Order of the cubic.
 _CUBIC = 4
 
@@ -60,7 +60,7 @@ class AdaptiveSteps(Stateful):
         self._pair, self._end, self._length = pair, end, end - start
         self._relative = scene.coupling.relative_tolerance or 0.0
         self._absolute = scene.coupling.absolute_tolerance or 0.0
-        #: By how much a unit of the contact force bends the beam [m/N].
+        #: By how much 1 N at the tip bends the beam [m/N].
         self._compliance = 0.0 if scene.beam is None else tip_compliance(scene.beam)
         self.state = Adapted([(at.displacement, at.displacement) for at in pair.ends()])
 
@@ -116,22 +116,26 @@ class AdaptiveSteps(Stateful):
         """The step's error, 1 is the tolerance, and the order in which it falls with the size of the step.
 
         No step is too long for what is rounding, though from rest the motion so far is shorter still. The tip is the
-        sum of what the loads make of it and the contact force, which may be larger than it.
+        sum of modes, which may be larger than it: of what bends the beam with the energy so far. That is also the
+        length of the motion of ends that have been held so far.
         """
         curve, spans = 0.0, []
-        least = [max(abs(low), abs(high), self._compliance * abs(state.contact[0])) for low, high in self.state.ways]
+        bent = sqrt(2.0 * self._compliance * self.state.energy)
+        least = [max(abs(low), abs(high), bent) for low, high in self.state.ways]
         ends = zip(step.start, step.end, self._ways(step), least, strict=True)
         for start, end, (low, high), size in ends:
             means = end.integral / step.size, end.integral_2 / step.size**2
             beside = Path.through(start[:2], end[:2], step.size, means).moments_beside_cubic
             way, rounding = high - low, _ROUNDING * size
-            if way > 0.0:
-                curve = max(curve, beside / (self._absolute + self._relative * way + rounding))
             if way > rounding:
                 spans.append(way)
-        if not spans:
+            elif bent > 0.0:
+                way = bent
+            if way > 0.0:
+                curve = max(curve, beside / (self._absolute + self._relative * way + rounding))
+        span, pair = min(spans, default=bent), self._pair
+        if span == 0.0:
             return 0.0, _CUBIC
-        span, pair = min(spans), self._pair
         fastest = max(state.fastest, *(abs(end.velocity) for end in step.end))
         scales = Scales(span, fastest, self.state.energy, pair.reduced_mass(Phase()))
         tolerance = self._relative + self._absolute / span

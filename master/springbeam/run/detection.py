@@ -16,9 +16,9 @@ from ..contact.events import (
     no_dip,
     position_tolerance,
 )
-from ..contact.phases import Joint, common_velocity
+from ..contact.phases import VELOCITY_ROUNDING, Joint, common_velocity
 from ..coupling.protocol import Step
-from ..results.paths import Path, Sample
+from ..results.paths import Path, Place, Sample
 from ..results.trajectory import Event, EventKind
 from ..scene import Scene
 from .adaptive import AdaptiveSteps
@@ -27,13 +27,11 @@ from .separation import Separation
 from .stepping import Pair, State
 
 #: Trial steps to the bottom of a dip.
-_MAX_DIP_TRIALS = 4
+_MAX_DIP_TRIALS = 8
 #: Position tolerances by which the motion at a located event may be off before it is none.
 _JUMP = 1e5
 #: An event closer to the start of a step than this fraction of H happens at the start.
 _NO_TIME = 1e-9
-#: Rounding of a velocity, relative to the largest so far.
-_VELOCITY_ROUNDING = 16.0 * 2.0**-52
 
 
 class Detector:
@@ -62,7 +60,7 @@ class Detector:
         go, is rounding.
         """
         tip, low = ends
-        return max(1e-12 * max(abs(tip.velocity), abs(low.velocity)), _VELOCITY_ROUNDING * state.fastest)
+        return max(1e-12 * max(abs(tip.velocity), abs(low.velocity)), VELOCITY_ROUNDING * state.fastest)
 
     def at_start(self, state: State, start: Ends) -> EventKind | None:
         """The event that is due before any step: its function is 0 and falling, or a force that can only push pulls."""
@@ -138,23 +136,21 @@ class Detector:
         if abs(start[1]) <= self._rest(state, step.start):
             # Ends that have just parted may close a little first, by the error of the time at which they were let go.
             return whole_step
-        path = Path.through(start, end, step.size, function.means(step.end, step.size))
-        unsure = path.beside_cubic  # a path may be as wrong as the cubic is beside it
-        before, whole = 0.0, step.size
-        for _ in range(_MAX_DIP_TRIALS):
+        stretches = [(Place(0.0, start, (0.0, 0.0)), Place(step.size, end, function.means(step.end, step.size)))]
+        trials = 0
+        while stretches and trials < _MAX_DIP_TRIALS:
+            before, after = stretches.pop()  # the earliest
+            path = before.path_to(after)
             inside = path.lowest_inside()
-            if inside is None or path.at(inside) >= floor + unsure:
-                break
-            dip = self._pair.attempt(state, before + inside * path.size, step.start)
-            bottom = function(dip.end)
-            if bottom[0] < floor:
+            # A path may be as wrong as the cubic is beside it.
+            if inside is None or path.at(inside) >= floor + path.beside_cubic:
+                continue
+            trials += 1
+            dip = self._pair.attempt(state, before.time + inside * path.size, step.start)
+            bottom = Place(dip.size, function(dip.end), function.means(dip.end, dip.size))
+            if bottom.sample[0] < floor:
                 return dip
-            # The bottom is on the side to which the function falls.
-            if bottom[1] < 0.0:
-                start, before = bottom, dip.size
-            else:
-                end, whole = bottom, dip.size
-            path = Path.through(start, end, whole - before)
+            stretches += [(bottom, after), (before, bottom)]
         return whole_step
 
     def _located(self, state: State, function: EventFunction, bracket: Step, guess: float) -> Step:
@@ -170,7 +166,7 @@ class Detector:
         locate(evaluate, guess, bracket.size, tolerance, state.time)
         missed = abs(function(last.end)[0])
         # A tip at rest at 0 is there to the rounding of the modes that it is the sum of.
-        rounding = max(self.tolerance(last.end), _VELOCITY_ROUNDING * state.fastest * self._steps.size)
+        rounding = max(self.tolerance(last.end), VELOCITY_ROUNDING * state.fastest * self._steps.size)
         if missed > _JUMP * rounding:
             raise StepRefused(f"an event is not found: the motion jumps by {missed:.3g} m with the size of the step")
         return last

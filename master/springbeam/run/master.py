@@ -296,7 +296,7 @@ class Master(Stateful):
 
     def _record(self, step: Step, ends: Ends) -> None:
         """Leave the record of ``step`` with the ``ends`` after its event, and now and then the beam's shape."""
-        state, (tip, low) = self.state, ends
+        state, (tip, low) = self.state, step.end  # no event makes an end faster than both were
         state.ends = ends
         speed = max(tip[1], -tip[1], low[1], -low[1])
         if speed > state.fastest:
