@@ -86,7 +86,8 @@ def test_tied_ends_are_as_far_off_as_is_said(case):
 
 
 def test_ends_that_part_with_different_velocities_are_said_to_be_off():
-    """A light tip and a spring of 113 g, which the foundation has struck, part with 0.12 and 0.08 m/s for 0.08."""
+    """A light tip and a spring of 113 g, which the foundation has struck, part by 0.05 m/s, more than they
+    may part by for an error of the scheme."""
     tables = {
         "time": {"t_end": 0.0123},
         "beam": {
@@ -110,7 +111,7 @@ def test_ends_that_part_with_different_velocities_are_said_to_be_off():
         "stop": {"position": -8.32e-5},
     }
     coarse, fine = (
-        simulate(scene_from_dict({**tables, "coupling": {"degree": 2, "macro_step": H}})) for H in (1.6287e-4, 2e-5)
+        simulate(scene_from_dict({**tables, "coupling": {"degree": 2, "macro_step": H}})) for H in (2.5e-4, 2e-5)
     )
     said, off = both_ends(coarse, fine)
     assert off > 0.01
