@@ -12,7 +12,7 @@ import numpy as np
 
 from .scene import Scene
 from .statics import initial_kinetic_energy, shear_stiffness, tip_compliance
-from .tables import Spring
+from .tables import Beam, Spring
 
 
 def contact_energy(scene: Scene) -> float:
@@ -27,8 +27,13 @@ def beam_energy(scene: Scene) -> float:
     """Return the energy of the beam at first contact [J]: of u̇ = s₁x, and the shear of a straight u with θ = 0."""
     if (beam := scene.beam) is None:
         return 0.0
+    return initial_kinetic_energy(beam) + bent_energy(scene, beam)
+
+
+def bent_energy(scene: Scene, beam: Beam) -> float:
+    """Return the energy of the beam's shape at first contact [J]: of the shear of a straight u with θ = 0."""
     slope = beam.initial_deflection_slope + (scene.contact_time or 0.0) * beam.initial_velocity_slope
-    return initial_kinetic_energy(beam) + 0.5 * shear_stiffness(beam) * beam.length * slope**2
+    return 0.5 * shear_stiffness(beam) * beam.length * slope**2
 
 
 def _load_energy(scene: Scene) -> float:

@@ -10,11 +10,11 @@ from __future__ import annotations
 from math import inf, pi, sqrt
 from typing import Any, NamedTuple
 
-from .linearised import spring_frequency, spring_stiffness
+from .linearised import bent_energy, spring_frequency, spring_stiffness
 from .messages import Rule, filled, told
 from .reading import with_changes
 from .scene import Scene
-from .statics import bending_stiffness, locking, lowest_frequency, tip_compliance, tip_inertia
+from .statics import bending_stiffness, initial_kinetic_energy, locking, lowest_frequency, tip_compliance, tip_inertia
 from .tables import ORDINARY_SCHEMES, Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
@@ -38,6 +38,8 @@ STABLE = 3.0
 #: By which angle generalized-α may let waves lag at the end of the run [rad]: the fastest ones that an impact sets off;
 #: where nothing strikes, those of a few times the beam's lowest frequency, or of a load, which move the tip more.
 WAVE_LAG, SMOOTH_LAG, SMOOTH_WAVES = 1.0, 0.01, 5.0
+#: Energy of a start that is bent enough to count, over that of its velocity.
+BENT = 1e-4
 #: ω α_b above which waves die out within two periods and need no resolution.
 DIES_OUT = 0.15
 #: Macro steps that a contact must last for its end not to be decided by the force of one or two of them.
@@ -176,7 +178,7 @@ def _waves_lag(scene: Scene, seen: _Seen) -> dict[str, Any]:
         return {}
     H = seen.H or scene.coupling.H
     waves, omega, limit = "the fastest waves that an impact or a bent start sets off", impact_frequency(beam), WAVE_LAG
-    bent = beam.approach == "elastic" and beam.initial_deflection_slope != 0.0
+    bent = not scene.static and bent_energy(scene, beam) > BENT * initial_kinetic_energy(beam)
     if not (bent or (scene.contact.rigid and _struck(scene))):
         omega = max(SMOOTH_WAVES * slowest_frequency(beam), *(load.rate for load in scene.loads), 0.0)
         waves, omega, limit = f"waves of {omega:.3g} rad/s", min(omega, lasting_frequency(beam)), SMOOTH_LAG
