@@ -107,6 +107,7 @@ CASES = {
     "let go of the stop": (OURS, named("let go of the stop"), {"motion": 2e-3}),  # 4e-2 if a velocity is left it
     "let go after a rest": (OURS, named("let go after a rest"), {"motion": 2e-3}),  # 6e-2 if a velocity is left it
     "struck in the second dip": (OURS, named("struck in the second dip"), {"motion": 1e-10}),  # 4e-2 without a search
+    "struck between slow ends": (OURS, named("struck between slow ends"), {"motion": 1e-10}),  # 0.2 if the ends decide
     # What the stop gives is that of the reference, with one rest more: 1.6e-3 less without it.
     "off for less than a step": (
         OURS, named("off for less than a step"), {"times": 1e-3, "motion": 2e-6, "stop": 1e-6}

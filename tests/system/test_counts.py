@@ -91,7 +91,8 @@ def test_a_tied_step_costs_two_steps_of_each_body(counted, H, scheme, degree):
 
 
 def test_a_tied_step_passes_at_most_40_functions_in_12_files():
-    """The walk of docs/architecture.md; what happens now and then, as a shape that is kept, is not in a usual step."""
+    """The walk of docs/architecture.md. What happens now and then, as a shape that is kept, is not in a usual step, nor is a
+    search for a dip, as in the first steps after an impact."""
     passed: list[set[tuple[str, str, int]]] = []
 
     def note(frame, event, _):
@@ -102,7 +103,7 @@ def test_a_tied_step_passes_at_most_40_functions_in_12_files():
         master = simulation._master
         while master.state.phase.joint is not Joint.TIED or master.state.shapes_left:
             master.step()
-        for _ in range(20):
+        for _ in range(200):
             passed.append(set())
             sys.setprofile(note)
             try:

@@ -150,10 +150,14 @@ def position_tolerance(ends: Ends, level: float, macro_step: float) -> float:
     return 8.0 * _EPS * max(u, -u, y, -y, level, -level) + 1e-15 * max(v, -v, z, -z) * macro_step
 
 
-def no_dip(start: Sample, end: Sample, size: float) -> bool:
-    """Tell whether what both samples hold stays above 0 between them: no dip is deeper than all that changes there."""
+def no_dip(start: Sample, end: Sample, size: float, fastest: float) -> bool:
+    """Tell whether what both samples hold stays above 0 between them, at sight: it has no time to fall to 0 and to rise.
+
+    Not if each end is as much as twice as fast as the ``fastest`` so far [m/s], nor by the cubic through the samples.
+    """
     (f0, d0), (f1, d1) = start, end
-    return (f0 if f0 < f1 else f1) > abs(f1 - f0) + size / 3.0 * (abs(d0) + abs(d1))
+    low = f0 if f0 < f1 else f1
+    return f0 + f1 > 2.0 * fastest * size and low > abs(f1 - f0) + size / 3.0 * (abs(d0) + abs(d1))
 
 
 def locate(evaluate: Callable[[float], Sample], guess: float, size: float, tolerance: float, time: float) -> float:

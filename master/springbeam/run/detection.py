@@ -106,7 +106,7 @@ class Detector:
             starts = self._functions.samples(state.phase, step.start)
             ends = self._functions.samples(state.phase, step.end)
             for (kind, function), start, end in zip(functions, starts, ends, strict=True):
-                if no_dip(start, end, step.size):
+                if no_dip(start, end, step.size, state.fastest):
                     continue
                 f0, _ = start
                 # A gap that a tie has left open, or a little below zero, is no event: only what falls further is.
@@ -194,7 +194,7 @@ class Detector:
         sign = -1.0 if touching else 1.0  # penetration or gap falls through zero
         start, end = ((sign * value, sign * rate) for value, rate in (gap(step.start), gap(step.end)))
         changed = (step.end[0].displacement < step.end[1].displacement) is not touching
-        if not changed and no_dip(start, end, step.size):
+        if not changed and no_dip(start, end, step.size, state.fastest):
             return []
         mean, twice = gap.means(step.end, step.size)
         path = Path.through(start, end, step.size, (sign * mean, sign * twice))
