@@ -10,10 +10,9 @@ from springbeam import RunStopped, load_scene, with_changes
 from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Motion
 from springbeam.contact.laws import Compliance
-from springbeam.coupling.hermite import gap_inside
 from springbeam.coupling.protocol import Scales, Step
 from springbeam.coupling.soft import SoftSolver
-from springbeam.coupling.tie import Tie
+from springbeam.coupling.tie import Tie, gap_inside
 from springbeam.run.adaptive import AdaptiveSteps
 from springbeam.run.stepping import Pair, State
 

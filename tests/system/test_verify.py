@@ -13,7 +13,7 @@ from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
 from springbeam.bodies.protocol import StepRefused
 from springbeam.cli.checks import report
 from springbeam.contact.laws import Compliance
-from springbeam.coupling.tie import SCHEMES
+from springbeam.coupling.solver import SCHEMES
 from springbeam.studies import verify
 from springbeam.studies.verify.alone import Check, section
 from springbeam.studies.verify.coupled import _airy_overshoot

@@ -17,6 +17,7 @@ from ctypes import byref, c_double, c_int, c_size_t, c_uint, c_void_p, cast
 from functools import cache, lru_cache, partial
 from math import prod
 from pathlib import Path
+from struct import Struct
 from typing import Any, NoReturn, TypeVar
 
 from fmpy.fmi1 import FMICallException
@@ -175,18 +176,33 @@ class Fmu:
         name = self._slave.STATE
         return self.bound(f"Get{name}", byref(self._state)), self.bound(f"Set{name}", self._state)
 
-    def accessor(self, verb: str, names: Sequence[str], values: Any, size: int = 1) -> Call:
-        """Return what gets or sets (``verb``) variables of ``size`` real numbers each by ``values``, an array of C."""
+    def reading(self, names: Sequence[str], size: int = 1) -> Callable[[], tuple[float, ...]]:
+        """Return what reads variables of ``size`` real numbers each; it has read them once.
+
+        The arguments are converted to C once. Raises FmuError for a variable that cannot be read.
+        """
+        values = (c_double * (len(names) * size))()
         references = self._references(names, self._slave.REAL, size)
         counts = [c_size_t.from_param(n) for n in (len(references), len(values))]
         last = counts[1:] if self._slave.COUNTED else []
-        return self.bound(verb + self._slave.REAL, byref(references), counts[0], byref(values), *last)
+        read = self.bound(f"Get{self._slave.REAL}", byref(references), counts[0], byref(values), *last)
+        unpacked = partial(Struct(f"{len(values)}d").unpack, values)
 
-    def advancing(self, inputs: Sequence[str], slopes: int, outputs: Sequence[str], told: Any, always: bool) -> Any:
-        """Return what makes an advance, and the array of C from which it takes what is given.
+        def told() -> tuple[float, ...]:
+            if (status := read()) > WARNING:
+                raise self.failed(status, f"cannot read {', '.join(names)}")
+            return unpacked()
 
-        Derivatives 1 … ``slopes`` of each input follow the inputs, those of one after another. An advance leaves the
-        outputs in the array ``told`` and returns 0, or what `Failure` says.
+        told()
+        return told
+
+    def advancing(
+        self, inputs: Sequence[str], impulse: Sequence[str], slopes: int, outputs: Sequence[str], always: bool
+    ) -> tuple[Call, Any, Any]:
+        """Return what makes an advance, and the arrays of C from which it takes what is given, and where it tells.
+
+        Given are time, size, the inputs, the ``impulse`` if it has one, and derivatives 1 … ``slopes`` of each input,
+        those of one after another. An advance returns 0, or what `Failure` says.
         """
         slave = self._slave
         each = [(name, order) for name in inputs for order in range(1, slopes + 1)]
@@ -195,17 +211,17 @@ class Fmu:
         if each:
             named["set_derivatives"] = slave.SET_DERIVATIVES
         of_inputs, of_derivatives, of_outputs = (
-            self._references(names, slave.REAL) for names in (inputs, derivatives, outputs)
+            self._references(names, slave.REAL) for names in ((*inputs, *impulse), derivatives, outputs)
         )
-        given = (c_double * (2 + len(inputs) + len(each)))()
+        given, told = (c_double * (2 + len(of_inputs) + len(each)))(), (c_double * len(outputs))()
         advance = Advance(
-            slave.component, n_inputs=len(inputs), n_derivatives=len(each), n_outputs=len(outputs), inputs=of_inputs,
+            slave.component, n_inputs=len(of_inputs), n_derivatives=len(each), n_outputs=len(outputs), inputs=of_inputs,
             derivatives=of_derivatives, outputs=of_outputs, orders=(c_int * len(each))(*[order for _, order in each]),
             given=given, told=told, always=always,
             **{key: cast(self._function(name), c_void_p) for key, name in named.items()},
         )  # fmt: skip
         library = self._asked("cannot be used", advances)
-        return partial(library[f"advance{self.version[0]}"], byref(advance)), given
+        return partial(library[f"advance{self.version[0]}"], byref(advance)), given, told
 
     def variable(self, name: str) -> Any:
         """Return what the FMU says of a variable. Raises FmuError if it has none of this name."""

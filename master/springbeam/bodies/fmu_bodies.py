@@ -6,7 +6,6 @@ One module, though longer than others: every step of a run passes through all of
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from ctypes import c_double
 from functools import partial
 from math import isfinite
 from struct import Struct
@@ -27,33 +26,10 @@ from .protocol import NO_FORCE, BeamBody, Body, BodyFailed, Energies, Felt, FmuE
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
 _MASS_MATRICES = {"consistent": 1, "averaged": 2}
 _AT_REST = 2
-
-
-class Reals:
-    """Real numbers of an FMU, read and written together; the arguments are converted to C once.
-
-    Each variable has ``size`` values.
-    """
-
-    def __init__(self, fmu: Fmu, *names: str, size: int = 1) -> None:
-        n = len(names) * size
-        self.names = names
-        self._fmu = fmu
-        self.values: Any = (c_double * n)()  #: as last read or written
-        self.unpacked = partial(Struct(f"{n}d").unpack, self.values)
-        self._read, self._write = (fmu.accessor(verb, names, self.values, size) for verb in ("Get", "Set"))
-        if names:
-            self.get()  # a wrong reference is found before the run
-
-    def get(self) -> tuple[float, ...]:
-        if (status := self._read()) > WARNING:
-            raise self._fmu.failed(status, f"cannot read {', '.join(self.names)}")
-        return self.unpacked()
-
-    def set(self, values: Sequence[float]) -> None:
-        self.values[:] = values
-        if (status := self._write()) > WARNING:
-            raise self._fmu.failed(status, f"cannot set {', '.join(self.names)}")
+#: What tells `Felt`, and `BeamBody.shape`: variables, and how many numbers each has.
+_FELT = ("tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
+_ALONG, _POINTS = ("deflection", "bending_moment", "shear_force"), len(SHAPE_POINTS)
+_SHAPE_3, _SHAPE_2 = (_ALONG, _POINTS), (tuple(f"{name}[{i}]" for name in _ALONG for i in range(1, _POINTS + 1)), 1)
 
 
 #: What FMI 3.0 lets an FMU ask for after a step, and is not given.
@@ -73,9 +49,9 @@ class Port:
 
     Parameters
     ----------
-    inputs, outputs, impulse
-        Names of variables. A step sets the inputs and tells the outputs; an impulse, if the FMU takes one, acts at the
-        start of the next step.
+    inputs, impulse, outputs
+        Names of variables. A step sets the inputs and the impulse, if the FMU takes one, which acts at its start; it
+        tells the outputs.
     slopes
         Highest derivative of the inputs that a step sets; those that are all 0 only ``always``.
     repeats
@@ -86,33 +62,33 @@ class Port:
         self,
         fmu: Fmu,
         inputs: tuple[str, ...],
-        outputs: tuple[str, ...],
         impulse: tuple[str, ...],
+        outputs: tuple[str, ...],
         slopes: int = 2,
         always: bool = False,
         repeats: bool = True,
     ) -> None:
-        self.path, self._fmu, self._inputs = fmu.path, fmu, inputs
-        self._outputs, self._impulse = Reals(fmu, *outputs), Reals(fmu, *impulse)
-        Reals(fmu, *inputs)  # a wrong reference is found before the run
-        self._advance, self._given = fmu.advancing(inputs, slopes, outputs, self._outputs.values, always)
+        self.path, self._fmu, self._inputs, self._outputs = fmu.path, fmu, (*inputs, *impulse), outputs
+        fmu.reading(self._inputs)  # a wrong reference is found before the run
+        self._read = fmu.reading(outputs)
+        self._advance, self._given, told = fmu.advancing(inputs, impulse, slopes, outputs, always)
         self._write = partial(Struct(f"{len(self._given)}d").pack_into, self._given, 0)
-        self._told = self._outputs.unpacked
+        self._told = partial(Struct(f"{len(told)}d").unpack, told)
         #: Save the state, and return to it; both return their status.
         self.get_state, self.set_state = fmu.of_state() if repeats else (lambda: OK, self._refuse_to_repeat)
 
     def read(self) -> tuple[float, ...]:
         """Return the outputs. Raises StepRefused if one is not finite."""
-        return self._finite(self._outputs.get())
+        return self._finite(self._read())
 
     def _finite(self, told: tuple[float, ...]) -> tuple[float, ...]:
         if not all(map(isfinite, told)):
-            values = ", ".join(f"{name} = {value}" for name, value in zip(self._outputs.names, told, strict=True))
+            values = ", ".join(f"{name} = {value}" for name, value in zip(self._outputs, told, strict=True))
             raise StepRefused(f"not finite: {values} of {self.path.name}")
         return told
 
     def step(self, *given: float) -> tuple[float, ...]:
-        """Step by what is ``given``: time [s], size [s], inputs, and their derivatives; return the outputs."""
+        """Step by what is ``given``: time [s], size [s], inputs, impulse, derivatives; return the outputs."""
         self._write(*given)
         if code := self._advance():
             self._stop(*divmod(code, 16))
@@ -124,7 +100,7 @@ class Port:
         failed = {
             Failure.SET: f"cannot set {', '.join(self._inputs)}",
             Failure.SET_DERIVATIVES: "cannot set input derivatives",
-            Failure.GET: f"cannot read {', '.join(self._outputs.names)}",
+            Failure.GET: f"cannot read {', '.join(self._outputs)}",
         }
         if failure in failed:
             raise self._fmu.failed(status, failed[Failure(failure)])
@@ -133,10 +109,6 @@ class Port:
         if failure == Failure.OUTPUTS_NOT_FINITE:
             self._finite(self._told())
         self._fmu.refuse(max(status, DISCARD), time, _ASKED.get(Failure(failure), ""))
-
-    def strike(self, impulse: float) -> None:
-        """Let an upward ``impulse`` [N·s] act at the start of the next step."""
-        self._impulse.set((impulse,))
 
     def failed(self, status: int, what: str) -> FmuError:
         """Return the error of a call that returned ``status``."""
@@ -234,13 +206,13 @@ class FmuBody(Body):
     def apply_impulse(self, impulse: float) -> None:
         # The FMU applies it at the start of its next step; motion and energies already show it.
         motion, told, pending, *_ = self.state
-        pending += impulse
         self._moved = True
-        self._port.strike(pending)
         velocity, n = motion.velocity + impulse / self.mass, self._n_motion
         work = 0.5 * impulse * (motion.velocity + velocity)
         told = (*told[:n], *[kinetic + work for kinetic in told[n : n + 1]], *told[n + 1 :])
-        self.state = self.state._replace(motion=motion._replace(velocity=velocity), told=told, pending=pending)
+        self.state = self.state._replace(
+            motion=motion._replace(velocity=velocity), told=told, pending=pending + impulse
+        )
 
     def _take(self, told: tuple[float, ...]) -> Motion:
         """Take what the FMU has told as the present motion and energies, with no impulse pending; return the motion."""
@@ -265,7 +237,7 @@ class OwnBody(FmuBody):
         self.fmu, self.state, self._shares = Fmu.of(self.NAMES.fmu, parameters, start_time), FmuState(), {}
         try:
             self._connect()
-            self._begin(*self.fmu.once(Reals, self.NAMES.mass).get())
+            self._begin(*self.fmu.once(Fmu.reading, (self.NAMES.mass,))())
         except BaseException:
             self.fmu.close()
             raise
@@ -274,7 +246,7 @@ class OwnBody(FmuBody):
         """Prepare what a step sets and tells: under loads, also these and their work."""
         names, loads = self.NAMES, self._shares
         energies = (*names.energies[:3], "load_work") if loads else names.energies
-        self._port = self.fmu.once(Port, (*names.forces, *loads), (*names.motion, *energies), (names.impulse,))
+        self._port = self.fmu.once(Port, (*names.forces, *loads), (names.impulse,), (*names.motion, *energies))
 
     def expect_loads(self, loads: Sequence[Load]) -> None:
         for number, load in enumerate(loads):
@@ -298,11 +270,12 @@ class OwnBody(FmuBody):
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         (c, dc, ddc), (n, dn, ddn), (values, slopes) = contact, foundation, self._loads
+        impulse = self.state.pending
         self.steps += 1
         self._moved = True
         if len(self.NAMES.forces) == 1:  # nothing but the other body presses its end
-            return self._take(self._port.step(time, size, c, *values, dc, ddc, *slopes))
-        return self._take(self._port.step(time, size, c, n, *values, dc, ddc, dn, ddn, *slopes))
+            return self._take(self._port.step(time, size, c, *values, impulse, dc, ddc, *slopes))
+        return self._take(self._port.step(time, size, c, n, *values, impulse, dc, ddc, dn, ddn, *slopes))
 
     def _take(self, told: tuple[float, ...]) -> Motion:
         motion = _motion_of(Motion, told[:4])
@@ -360,8 +333,9 @@ class FmuBeam(OwnBody, BeamBody):
                 for name, share in self._inputs_of(load) if load.on != "spring" else ():
                     parameters[name] = parameters.get(name, 0.0) + share * float(load.value(start_time))
         super().__init__(parameters, start_time)
-        self._felt = self.fmu.once(Reals, "tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
-        self._shape = self.fmu.once(_shape)
+        self._felt = self.fmu.once(Fmu.reading, _FELT)
+        # FMI 2.0 knows no arrays.
+        self._shape = self.fmu.once(Fmu.reading, *(_SHAPE_2 if self.fmu.version == "2.0" else _SHAPE_3))
 
     def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
         if load.on == "tip":
@@ -374,20 +348,11 @@ class FmuBeam(OwnBody, BeamBody):
         return [(f"distributed_load_{i}" if i else "distributed_load", s) for i, s in enumerate(shape) if s != 0.0]
 
     def felt(self) -> Felt:
-        return _felt_of(Felt, self._felt.get())
+        return _felt_of(Felt, self._felt())
 
     def shape(self) -> np.ndarray:
         """See `BeamBody.shape`."""
-        self._shape.get()
-        return np.array(self._shape.values)
-
-
-def _shape(fmu: Fmu) -> Reals:
-    """Return what reads the shape of a beam; FMI 2.0 knows no arrays."""
-    along, points = ("deflection", "bending_moment", "shear_force"), len(SHAPE_POINTS)
-    if fmu.version == "2.0":
-        return Reals(fmu, *[f"{name}[{i}]" for name in along for i in range(1, points + 1)])
-    return Reals(fmu, *along, size=points)
+        return np.array(self._shape())
 
 
 class FmuSpring(OwnBody, EndLoaded):

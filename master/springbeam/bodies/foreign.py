@@ -64,7 +64,7 @@ def opened(spec: ForeignFmu, start_time: float, found: Findings | None) -> tuple
         outputs, impulse = tuple(_told(spec, found).values()), () if spec.impulse is None else (spec.impulse,)
         # Derivatives of one step may act in the next if they are not set again.
         always = {"always": True, "repeats": abilities.state}
-        return Port(fmu, (spec.force,), outputs, impulse, abilities.slopes, **always), found
+        return Port(fmu, (spec.force,), impulse, outputs, abilities.slopes, **always), found
     except BaseException:
         fmu.close()
         raise
@@ -147,9 +147,8 @@ class ForeignBody(FmuBody, EndLoaded):
         inputs = self._followed(force.combined((sign * up, sign * up), (exchanged, load)), size)
         self.steps += 1
         self._moved = True
-        told = self._port.step(time, size, *inputs[: 1 + self.abilities.slopes])
-        if self.state.pending != 0.0:
-            self._port.strike(0.0)  # should the FMU not take it as used up
+        impulse = () if self._spec.impulse is None else (self.state.pending,)
+        told = self._port.step(time, size, inputs[0], *impulse, *inputs[1 : 1 + self.abilities.slopes])
         end = self._take(told, size)
         received = self.state.received + force.work_on(exchanged, start, end, size)
         load_work = self.state.load_work + force.work_on(load, start, end, size)

@@ -186,9 +186,6 @@ class RemotePort(Port):
     def step(self, *given: float) -> Any:
         return self._ask(f"its step at t = {given[0]:.9g} s", "step", *given)
 
-    def strike(self, impulse: float) -> None:
-        self._ask("taking an impulse", "strike", impulse)
-
     def get_state(self) -> int:
         self._waiting.append(("get_state",))
         return OK

@@ -11,8 +11,9 @@ rule). Since ẇ is such a polynomial, the work of C is accounted for exactly,
 
     ∫ C ẇ dτ = ½ k Δ(w²) + α_b k ∫ ẇ² dτ,
 
-at any step and any α_b ≥ 0: what the `energy` conditions of `springbeam.coupling.energy` need. (The exact response to a
-polynomial force would not do: without damping it jumps whenever C does.) Nothing at its end, w = w₀ e^{−τ/α_b}.
+at any step and any α_b ≥ 0: what the conditions of scheme `energy` need (`springbeam.coupling.tie`). (The exact
+response to a polynomial force would not do: without damping it jumps whenever C does.) Nothing at its end,
+w = w₀ e^{−τ/α_b}.
 """
 
 from __future__ import annotations

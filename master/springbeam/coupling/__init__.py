@@ -1,8 +1,8 @@
 """How the contact force of a macro step is found.
 
 On a step of size H the force is a polynomial of degree d; a *coupling* (``protocol``; start there) finds its d + 1
-coefficients and advances both bodies. ``tie`` holds ends together by the conditions of a scheme (``energy``, creates no
-energy at any H; ``hermite``, velocities agree, too), ``soft`` applies a contact law that is a function of the
+coefficients and advances both bodies. ``tie`` holds ends together by the conditions of a scheme (``energy`` creates no
+energy at any H, with ``hermite`` velocities agree, too), ``soft`` applies a contact law that is a function of the
 penetration, ``projection`` says what that is over a step; both are ``solver`` with another aim. ``one_way`` leaves one
 end unmoved, ``exchange`` is what ordinary masters do, ``algorithm_1`` what Ahn & Tate do. Imports `contact`, `bodies`
 and `scene`.

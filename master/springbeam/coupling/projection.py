@@ -24,9 +24,9 @@ import numpy as np
 from ..bodies.protocol import Ends
 from ..contact.laws import SoftLaw
 from ..results.paths import sign_changes
-from . import energy
 from .protocol import Booking, Counts, Coupling, Step
 from .small import Matrix, Vector, transposed
+from .solver import SCHEMES
 
 #: p̃ by its coefficients in powers of s, up to degree 3.
 _Path = tuple[float, float, float, float]
@@ -61,7 +61,7 @@ class Projection:
     """Projects ``law`` onto polynomials of ``degree`` over a step.
 
     A step is told by the penetration at its start [m] and the penetration's numbers x [m]: its value at the end of the
-    step, its mean, and the mean of s p, the first d + 1 of them: minus the conditions of `springbeam.coupling.energy`.
+    step, its mean, and the mean of s p, the first d + 1 of them: minus the conditions of scheme ``energy``.
     """
 
     def __init__(self, law: SoftLaw, degree: int) -> None:
@@ -221,7 +221,7 @@ def _at(path: _Path, s: float, size: float = 2.0) -> tuple[float, float]:
 def penetration(step: Step, degree: int) -> tuple[float, Vector]:
     """Return the penetration at the start of ``step`` [m], and its numbers over the step as `Projection` takes them."""
     tip, low = step.start
-    conditions = energy.CONDITIONS[degree]
+    conditions = SCHEMES["energy"][degree]
     x = list(map(sub, conditions(step.end[1], step.size), conditions(step.end[0], step.size)))
     return low.displacement - tip.displacement, x
 

@@ -18,11 +18,10 @@ import numpy as np
 
 from ..bodies.protocol import Ends
 from ..contact.laws import SoftLaw
-from . import energy
 from .projection import Booked, penetration
 from .protocol import ErrorEstimate, NotConverged, Scales, Step
 from .small import Matrix, Vector, inverse, less, times
-from .solver import Aim, Responses, StepSolver
+from .solver import SCHEMES, Aim, Responses, StepSolver
 
 _MAX_NEWTON, _MAX_DAMPING = 60, 8
 #: A correction smaller than this share of the penetration's numbers changes nothing.
@@ -59,7 +58,7 @@ class SoftSolver(Booked, StepSolver):
     state: SoftState
 
     def __init__(self, law: SoftLaw, degree: int, tolerance: float) -> None:
-        StepSolver.__init__(self, energy.CONDITIONS[degree], degree, tolerance)
+        StepSolver.__init__(self, SCHEMES["energy"][degree], degree, tolerance)
         Booked.__init__(self, law, degree)
         self.state = SoftState()
 

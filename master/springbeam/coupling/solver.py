@@ -1,12 +1,12 @@
 """Find the contact force of a step: predict, correct, verify, with responses of the bodies that are remembered.
 
-Unknowns are the Legendre coefficients a of C; the conditions on the gap over the step, in metres, should be what the
-law wants them to be (`StepSolver.aim`: zero, where the ends are tied). Both bodies advance under the force that the
-last step tells. Corrections follow from responses: B of the upper body's conditions to a is measured once for each size
-of step and remembered, for the beam is linear. S of the lower body's starts as that of a free mass, and Broyden's
-rank-one updates make it follow. Under a corrected force the lower body advances and the end of the upper one is
-predicted by B. Once the conditions hold so, the upper body advances to verify it, so a step usually costs two steps of
-each body. An upper body that is not linear is found out there, and B follows as S does.
+Unknowns are the Legendre coefficients a of C; the conditions on the gap over the step (`SCHEMES`), in metres, should be
+what the law wants them to be (`StepSolver.aim`: zero, where the ends are tied). Both bodies advance under the force
+that the last step tells. Corrections follow from responses: B of the upper body's conditions to a is measured once for
+each size of step and remembered, for the beam is linear. S of the lower body's starts as that of a free mass, and
+Broyden's rank-one updates make it follow. Under a corrected force the lower body advances and the end of the upper one
+is predicted by B. Once the conditions hold so, the upper body advances to verify it, so a step usually costs two steps
+of each body. An upper body that is not linear is found out there, and B follows as S does.
 """
 
 from __future__ import annotations
@@ -36,6 +36,31 @@ _LATE, _NOISE = 8, 1e3
 SIZES_REMEMBERED = 64
 
 
+def _end(m: Motion, size: float) -> tuple[float, ...]:
+    return (m.displacement,)
+
+
+def _end_and_mean(m: Motion, size: float) -> tuple[float, ...]:
+    return (m.displacement, m.integral / size)
+
+
+def _end_and_moments(m: Motion, size: float) -> tuple[float, ...]:
+    return (m.displacement, m.integral / size, (m.integral - 2.0 * m.integral_2 / size) / size)
+
+
+def _end_and_rate(m: Motion, size: float) -> tuple[float, ...]:
+    return (m.displacement, size * m.velocity)
+
+
+def _end_rate_and_mean(m: Motion, size: float) -> tuple[float, ...]:
+    return (m.displacement, size * m.velocity, m.integral / size)
+
+
+#: The conditions of each scheme on the gap over a step, by degree; `springbeam.coupling.tie` says what follows of them.
+SCHEMES: dict[str, dict[int, Conditions]] = {
+    "energy": {0: _end, 1: _end_and_mean, 2: _end_and_moments},
+    "hermite": {1: _end_and_rate, 2: _end_rate_and_mean},
+}
 #: Where a correction leads: the conditions there [m], ``None`` if zero; the correction of the coefficients [N], and the
 #: coefficients there [N].
 Aim = tuple[Vector | None, Vector, Vector]

@@ -29,7 +29,7 @@ from ...bodies import force
 from ...bodies.protocol import Motion
 from ...contact.laws import depth, law_of
 from ...coupling.projection import penetration_series
-from ...coupling.tie import SCHEMES
+from ...coupling.solver import SCHEMES
 from ...monolithic.oscillators import GAUSS, Oscillators
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
 from ...scene import Beam, Scene, suspicions
