@@ -79,12 +79,19 @@ def test_a_run_leaves_results_and_pictures_and_says_where(here, unpainted):
 
 
 def test_a_picture_that_cannot_be_written_ends_with_3_and_loses_nothing(here, monkeypatch):
+    """All that the run has come to is said before pictures are drawn."""
+    said = []
+
     def full(*_, **__):
+        sys.stdout.flush()
+        said.append(sys.stdout.buffer.getvalue().decode())
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(Figure, "savefig", full)
     result = command("run", "soft")
     assert result.exit_code == 3
+    assert said == [result.stdout]
+    assert result.stdout.endswith("results   results/soft\n")
     assert "no pictures: " in result.stderr
     assert "No space left on device; what was computed is in results/soft" in " ".join(result.stderr.split())
     assert len(load_trajectory(here / "results" / "soft")) == 31

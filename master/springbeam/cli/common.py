@@ -114,7 +114,8 @@ def progress_bar(*columns: ProgressColumn, quiet: bool) -> Progress:
 def say(found: Findings, *, quiet: bool, as_json: bool) -> None:
     """Say what a command has found: one JSON document, or with ``quiet`` only the place, or all for a reader.
 
-    Ends the command with its code and error if it has any. In JSON, NaN and infinity become strings.
+    Pictures are drawn when all else has been said. Ends the command with its code and error if it has any. In JSON, NaN
+    and infinity become strings.
     """
     if as_json:
         typer.echo(json_of(found.document).decode())
@@ -123,12 +124,21 @@ def say(found: Findings, *, quiet: bool, as_json: bool) -> None:
     console = console_for(silent=quiet or as_json)
     for part in found.shown:
         console.print(Text(part) if isinstance(part, str) else part)
-    for word, file in found.files:
-        console.print(Text(f"{word:<10}{file}" if word else str(file)), soft_wrap=True)
+    _say_where(found, console)
+    if found.draw is not None:
+        with bad_input_reported():
+            drawn = found.draw()
+        _say_where(drawn, console)
+        found = found if found.code else drawn
     if found.error:
         fail(found.code, found.error)
     if found.code:
         raise typer.Exit(found.code)
+
+
+def _say_where(found: Findings, console: Console) -> None:
+    for word, file in found.files:
+        console.print(Text(f"{word:<10}{file}" if word else str(file)), soft_wrap=True)
 
 
 def results_directory(path: Path) -> Path:

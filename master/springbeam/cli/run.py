@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from math import inf
 from pathlib import Path
 from time import monotonic
@@ -172,20 +173,23 @@ def carry_out(
     finally:
         if not recorder.begun:
             directory.discard()
-    files: list[tuple[str, Any]] = [("results", directory.path)]
-    if not no_plots:
-        from ..pictures.plots import plot_run  # matplotlib takes a second to load
-
-        try:
-            if pictures := plot_run(load_trajectory(directory.path), directory.path):
-                files.append(("pictures", f"{directory.path / '*.png'} ({len(pictures)})"))
-        except (KeyboardInterrupt, OSError) as trouble:
-            lost = f"no pictures: {cause_of(trouble, directory.path)}; what was computed is in {directory.path}"
-            error = error or lost
     summary = load_summary(directory.path)
     shown = list(_in_words(recorder.scene, summary, load_events(directory.path)))
-    document = {"directory": directory.path, **summary}
-    return Findings(document, shown, files, directory.path, STOPPED if error else 0, error)
+    document, files = {"directory": directory.path, **summary}, [("results", directory.path)]
+    draw = None if no_plots else partial(_drawn, directory.path)
+    return Findings(document, shown, files, directory.path, STOPPED if error else 0, error, draw)
+
+
+def _drawn(directory: Path) -> Findings:
+    """Draw the run in ``directory``; an error is that there is no room for pictures, or no time."""
+    from ..pictures.plots import plot_run  # matplotlib takes a second to load
+
+    try:
+        pictures = plot_run(load_trajectory(directory), directory)
+    except (KeyboardInterrupt, OSError) as trouble:
+        lost = f"no pictures: {cause_of(trouble, directory)}; what was computed is in {directory}"
+        return Findings(code=STOPPED, error=lost)
+    return Findings(files=[("pictures", f"{directory / '*.png'} ({len(pictures)})")] if pictures else ())
 
 
 @contextmanager

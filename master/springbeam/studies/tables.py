@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ class Findings:
     where: Path | None = None  #: the place of all of them (``--quiet``)
     code: int = 0  #: exit code of the command
     error: str = ""  #: why, in words
+    draw: Callable[[], Findings] | None = None  #: draws pictures, which takes a while, and says where they are
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str = "", words: Collection[str] = ()) -> Table:
