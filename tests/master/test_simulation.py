@@ -70,6 +70,26 @@ def test_a_bouncing_mass_comes_to_rest_after_its_geometric_series(e, size):
     assert trajectory.z[-1] == 0.0
 
 
+def test_ends_that_start_at_rest_on_each_other_are_joined():
+    """And stay so where nothing moves them: a rest is no parting."""
+    run = simulate(soft(stop=None, beam={"initial_velocity_slope": 0.0}, time={"t_end": 0.01}))
+    assert kinds(run) == ["impact"]
+    assert set(run.phase) == {"tied"}
+    assert not run.y.any()
+
+
+def test_400_shapes_are_kept_evenly_and_20_steps_after_first_contact():
+    """Of 800 steps every second one; the tip arrives from a height."""
+    start = {"approach": "elastic", "initial_deflection_slope": 0.02}
+    run = simulate(soft(stop=None, beam=start, time={"t_end": 0.08}, coupling={"macro_step": 1e-4}))
+    times, met = run.shapes[0], run.events[0].time
+    assert 0.01 < met < 0.05
+    early = run.time[np.searchsorted(run.time, met) :][:20]
+    assert set(early) <= set(times)
+    assert np.sum(times < met) == pytest.approx(met / 2e-4, abs=1.0)
+    assert len(times) == pytest.approx(401 + 10, abs=2)
+
+
 class Sinking(DuffingBody):
     """Sinks in steps shorter than 50 ms by 8 m/s, from 0.19 s on: where a step does not resolve a motion, its end tells
     little of what a shorter one does."""
@@ -177,6 +197,16 @@ def test_a_residual_is_relative_to_the_largest_energy_so_far_that_of_the_contact
     assert errors(scene, steps[2:], steps[:1], 99.999, of_interface=False) == (share[2:], largest[2:])
 
 
+@pytest.mark.parametrize("where", ["beam", "spring", "contact"])
+def test_what_damping_takes_is_told_where_it_is_lost(where):
+    damping = {"beam": {"alpha_b": 1e-2}, "spring": {"damping": 2.0}, "contact": {"damping": 2.0}}[where]
+    linked = soft(stop=None, contact={"law": "link", "stiffness": 1e3}, coupling={"scheme": "energy"})
+    run = simulate(with_changes(linked, **{where: damping}))
+    lost = {f"loss_{part}": run.e_dissipated[-1] * (part == where) for part in ("beam", "spring", "contact")}
+    assert {name: run.summary[name] for name in lost} == pytest.approx(lost, rel=1e-12)
+    assert run.e_dissipated[-1] > 1e-3 * run.e_total[0]
+
+
 @pytest.mark.parametrize(("tolerance", "warns"), [(1e-13, 1e-8), (1e-12, 1e-8), (1e-9, 1e-5), (1e-3, 1e-3)])
 def test_a_looser_tolerance_may_change_more_of_the_energy(tolerance, warns):
     for tables in ({"coupling": {"tolerance": tolerance}}, {"spring": {"relative_tolerance": tolerance}}):
@@ -209,7 +239,7 @@ def test_energy_that_appears_is_named(scheme, degree, share, warns, stops):
 
     trajectory, stopped = stopping(scene, wrapped(energies=energies))
     named = [w for w in trajectory.summary["warnings"] if "changed the energy" in w]
-    assert len(named) == warns
+    assert (len(named), trajectory.summary["resolved"]) == (warns, not warns)
     assert (stopped is not None) is stops
     assert not stops or named[0] in str(stopped)
 

@@ -67,6 +67,11 @@ def test_to_pandas_and_xarray(run):
     assert dataset["u_tip"].attrs == {"units": "m"}
     assert np.array_equal(dataset["deflection"].sel(x=1.0).values, run.shapes[1][:, -1])
     assert np.array_equal(dataset["phase"].values, run.phase)
+    along = {"deflection": (run.shapes[1], "m"), "bending_moment": (run.bending_moment, "N·m")}
+    for name, (values, unit) in (along | {"shear_force": (run.shear_force, "N")}).items():
+        assert (dataset[name].dims, dataset[name].attrs) == (("shape_time", "x"), {"units": unit})
+        assert np.array_equal(dataset[name].values, values)
+    assert np.array_equal(dataset["shape_time"].values, run.shapes[0])
     longer = a_trajectory(with_changes(run.scene, beam={"length": 2.0}))
     assert np.array_equal(longer.to_xarray()["x"].values, 2.0 * SHAPE_POINTS)
 

@@ -11,7 +11,7 @@ from scenes import kinds
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import algorithm1, event_driven
-from springbeam.studies.comparison import compare
+from springbeam.studies.comparison import _judged, compare
 from springbeam.studies.crosscheck import Crosscheck, Orders
 from springbeam.studies.study import record_all
 
@@ -54,6 +54,19 @@ def test_any_elements_and_loads_pass(degree, loads, beam):
     report = compare(with_changes(SOFT, time={"t_end": 0.1}, coupling=coupling, beam=beam, loads=loads))
     assert report["verdict"] == "agrees", report["quantities"]
     assert report["horizon"] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("error", "at", "passed"),
+    [([0.3, 0.2, 0.5], 2, True), ([0.5, 0.9, 1.0], 1, False), ([0.0, 0.0, 0.82], 2, False), ([0.41, 0.4, 0.8], 2, True)],
+)
+def test_an_error_may_be_four_times_what_halving_has_changed_so_far_and_the_floor(error, at, passed):
+    """Told is the largest error or, where a bound is broken, the one that is furthest out of it."""
+    changed, floor = np.array([0.1, 0.0, 0.2]), np.full(3, 0.01)
+    found = _judged("y", np.array([1.0, 2.0, 3.0]), np.array(error), changed, floor)
+    rms, bound = np.sqrt(np.mean(np.square(error))), (0.41, 0.41, 0.81)[at]
+    assert (found["at"], found["error"], found["passed"]) == (at + 1.0, error[at], passed)
+    assert (found["l2"], found["bound"]) == pytest.approx((rms, bound), rel=1e-14)
 
 
 def test_what_cannot_be_compared_has_not_agreed(tmp_path):
@@ -187,7 +200,7 @@ def test_algorithm_1_decides_as_its_reference_does(impact, slope, speed, stop, s
     spring = {"initial_velocity": -0.02 if slope else 0.0}
     scene = resolved(time={"t_end": 5.3e-3}, contact=contact, beam=beam, spring=spring, stop={"position": stop})
     run, reference = simulate(scene), algorithm1.simulate(scene)
-    assert list(run.phase) == list(reference.phase)
+    assert (list(run.phase), run.summary["macro_steps"]) == (list(reference.phase), 6)
     assert set(run.phase) == phases
     assert kinds(run) == kinds(reference)
     impulses = [[event.impulse_foundation for event in found.events] for found in (run, reference)]

@@ -12,6 +12,7 @@ import pytest
 from commands import HANGS, command, swept
 from runs import a_trajectory
 
+from springbeam.results.trajectory import Event, EventKind
 from springbeam.run.runner import simulate
 from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
 from springbeam.studies import picture, study, sweep
@@ -65,8 +66,19 @@ def test_a_latin_hypercube_has_one_sample_in_each_of_its_rows():
     assert np.mean([v[1] for v in by_chance]) == pytest.approx(0.5, abs=3.0 / np.sqrt(12.0 * 300.0))
 
 
-def test_the_largest_speed_may_be_downward():
-    assert METRICS_THERE_ARE["z_max"](a_trajectory(z=np.linspace(-2.0, 1.0, 400))) == 2.0
+def test_each_metric_is_the_number_that_it_names():
+    """Columns that run from one value to another, one of them downward at the largest speed; 1 … 7 events of a kind."""
+    ends = {"u_tip": (-3.0, 2.0), "y": (5.0, -4.0), "z": (-2.0, 1.0), "gap": (-7.0, 6.0), "a_y": (-10.0, 9.0)}
+    ends |= {"e_dissipated": (0.0, 8.0), "e_impact_loss": (0.0, 9.0)}
+    events = [Event(0.05 * n + 0.001 * k, kind) for n, kind in enumerate(EventKind, 1) for k in range(n)]
+    run = a_trajectory(events=events, **{name: np.linspace(*values, 400) for name, values in ends.items()})
+    expected = {
+        **{"u_tip_min": -3.0, "u_tip_max": 2.0, "u_tip_end": 2.0, "y_min": -4.0, "y_max": 5.0, "y_end": -4.0},
+        **{"z_max": 2.0, "max_z": 2.0, "max_y": 5.0, "gap_max": 6.0, "dissipated": 8.0, "impact_loss": 9.0},
+        **{f"number_of_{kind}": float(n) for n, kind in enumerate(EventKind, 1)},
+        **{f"first_{kind}": 0.05 * n for n, kind in enumerate(EventKind, 1)},
+    }
+    assert {name: METRICS_THERE_ARE[name](run) for name in expected} == expected
 
 
 @pytest.mark.parametrize(("masses", "code"), [("-1,-2", 2), ("-1,1", 0)])

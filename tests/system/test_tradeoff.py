@@ -6,11 +6,12 @@ import json
 import numpy as np
 import pytest
 from commands import HANGS, printed
+from scenes import kinds
 
 from springbeam.monolithic import event_driven
 from springbeam.scene import load_scene, with_changes
 from springbeam.studies import tradeoff
-from springbeam.studies.metrics import motion_errors, worst
+from springbeam.studies.metrics import costs, errors, motion_errors, worst
 from springbeam.studies.rivals import Rival
 from springbeam.studies.study import record_all, troubles
 from springbeam.studies.tradeoff import Tradeoff, cheapest, pareto
@@ -43,6 +44,44 @@ def test_a_curve_between_few_points_is_judged_too(rows):
     index = np.searchsorted(at_points.time, run.time)
     scale = np.abs(at_points.u_tip - at_points.u_tip[0]).max()
     assert coarse["error_u_tip"] > 3.0 * np.abs(run.u_tip - at_points.u_tip[index]).max() / scale
+
+
+def test_what_a_configuration_costs_and_where_it_errs_is_that_of_its_run():
+    """The spring strikes its stop once."""
+    scene = small(time={"t_end": 0.12})
+    run, exact = tradeoff.simulate(scene), event_driven.simulate(scene)
+    row, summary = {**costs(run), **errors(run, exact, 1e-4)}, run.summary
+    counts = {f"cost_{name}": sum(summary[f"{body}_{of}"] for body in ("beam", "spring"))
+              for name, of in (("do_steps", "steps"), ("rollbacks", "rollbacks"))}  # fmt: skip
+    assert {name: row[name] for name in counts} == counts
+    assert row["error_energy"] == summary["max_energy_residual"]
+    assert kinds(run) == kinds(exact) == ["impact", "stop_impact"]
+    assert row["error_event_time"] == pytest.approx(abs(run.events[1].time - exact.events[1].time), rel=1e-9)
+    impulses = np.array([[(event.impulse_contact, event.impulse_foundation) for event in found.events]
+                         for found in (run, exact)]).sum(axis=1)  # fmt: skip
+    off = np.abs(impulses[0] - impulses[1]).sum() / np.abs(impulses[1]).sum()
+    assert row["error_impulse"] == pytest.approx(off, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "settings", "median", "runs"),
+    [((1.0, 2.9, 2.0), {}, 2.0, 3), ((3.1,), {}, 3.1, 1), ((2.0,), {"quick": True}, 2.0, 1)],
+)
+def test_the_median_of_the_timings_counts_and_long_runs_are_timed_once(monkeypatch, seconds, settings, median, runs):
+    left = iter(seconds)
+    monkeypatch.setattr(Tradeoff, "_by_us", lambda study, case: {"cost_wall_time": next(left)})
+    record = Tradeoff(scene=small(), **settings).record({"family": "energy 0"})
+    assert (record["cost_wall_time"], len(record["times"])) == (median, runs)
+
+
+@pytest.mark.parametrize(("quick", "seconds", "left_out"), [
+    (False, 9.9, False), (False, 10.1, True), (True, 0.9, False), (True, 1.1, True),
+])  # fmt: skip
+def test_what_is_finer_than_one_that_took_too_long_is_left_out(quick, seconds, left_out):
+    records = {"energy 0, H = 0.1": {"cost_wall_time": seconds}, "energy 1, H = 0.1": {"cost_wall_time": 99.0}}
+    skipped = Tradeoff(scene=small(), quick=quick).skipped({"family": "energy 0"}, records)
+    assert (skipped is not None) is left_out
+    assert not left_out or skipped["error"] == f"energy 0, H = 0.1 took more than {1 if quick else 10} s"
 
 
 def test_front_and_choices_are_of_what_is_a_result():
