@@ -478,13 +478,18 @@ def test_rows_that_find_no_room_lose_no_record(tmp_path):
 def test_a_run_is_handed_over_up_to_where_it_goes_wrong():
     """A record of the second block is not finite: those before it are kept with their events."""
     recorder, judged = MemoryRecorder(PAIR), []
-    log = Log(PAIR, recorder, lambda steps, first: judged.append((len(steps), first["time"].tolist())))
+
+    def judge(steps, first):
+        judged.append((len(steps), first["time"].tolist()))
+        return np.zeros(len(steps), bool), str
+
+    log = Log(PAIR, recorder, judge)
     for begin in (0, 30):
         steps, events, shapes = block(30, begin=begin)
         steps["z"][17] = math.nan if begin else 0.0
         log.records += [step.tobytes() for step in steps]
         log.events += events
-        log.shapes += [(row[0], row[1:]) for row in shapes]
+        log.shapes += list(shapes)
         with pytest.raises(RunStopped, match="z = nan at t = ") if begin else nullcontext():
             log.hand_over()
     kept = recorder.trajectory()
@@ -492,7 +497,7 @@ def test_a_run_is_handed_over_up_to_where_it_goes_wrong():
     assert judged == [(30, [0.0]), (17, [0.0])]
     # A run that goes on: what it has is judged before what comes.
     judged.clear()
-    log = Log(PAIR, recorder, lambda steps, first: judged.append((len(steps), first["time"].tolist())))
+    log = Log(PAIR, recorder, judge)
     log.records.append(block(30)[0][-1].tobytes())
     log.hand_over()
     assert judged == [(47, [0.0]), (1, [0.0])]

@@ -58,7 +58,12 @@ def test_any_elements_and_loads_pass(degree, loads, beam):
 
 @pytest.mark.parametrize(
     ("error", "at", "passed"),
-    [([0.3, 0.2, 0.5], 2, True), ([0.5, 0.9, 1.0], 1, False), ([0.0, 0.0, 0.82], 2, False), ([0.41, 0.4, 0.8], 2, True)],
+    [
+        ([0.3, 0.2, 0.5], 2, True),
+        ([0.5, 0.9, 1.0], 1, False),
+        ([0.0, 0.0, 0.82], 2, False),
+        ([0.41, 0.4, 0.8], 2, True),
+    ],
 )
 def test_an_error_may_be_four_times_what_halving_has_changed_so_far_and_the_floor(error, at, passed):
     """Told is the largest error or, where a bound is broken, the one that is furthest out of it."""

@@ -376,9 +376,7 @@ class FmuSpring(OwnBody, EndLoaded):
         super().__init__(parameters, start_time)
 
     def holding_force(self, displacement: float, velocity: float) -> float:
-        spring, y = self._spring, displacement
-        static = spring.linear_stiffness * y + spring.cubic_stiffness * y**3 - spring.external_force
-        return static + spring.damping * velocity
+        return self._spring.force(displacement) + self._spring.damping * velocity
 
     def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
         return [("base_acceleration" if load.on == "base" else "external_force", 1.0)]

@@ -19,7 +19,7 @@ from ..results.trajectory import EventKind
 from ..scene import Beam, Scene, Spring
 from ..scene.statics import tip_compliance, tip_load_deflection
 from .laws import SoftLaw
-from .phases import Joint, Phase, spring_force
+from .phases import Joint, Phase
 
 _EPS = float(np.finfo(float).eps)
 _MAX_EVALUATIONS = 60
@@ -83,7 +83,7 @@ class Holding:
         _, low = ends
         y, z, spring = low.displacement, low.velocity, self._spring
         value = y - self._rest + self._alpha * z
-        acceleration = -(self._stiffness * value + spring.damping * z + spring_force(spring, y)) / spring.mass
+        acceleration = -(self._stiffness * value + spring.damping * z + spring.force(y)) / spring.mass
         return value, z + self._alpha * acceleration
 
     def means(self, ends: Ends, size: float) -> None:

@@ -13,7 +13,7 @@ from math import inf
 
 from ..bodies.protocol import Ends, Motion, Stateful
 from ..results.trajectory import EventKind
-from ..scene import Scene, Spring
+from ..scene import Scene
 from ..scene.resolution import VIBRATION
 from ..scene.statics import tip_compliance, tip_load_deflection
 from .laws import SoftLaw
@@ -97,11 +97,6 @@ def common_velocity(v: float, z: float, tip_mass: float, mass: float) -> float:
     if max(tip_mass, mass) == inf:
         return v if tip_mass == inf else z
     return (tip_mass * v + mass * z) / (tip_mass + mass)
-
-
-def spring_force(spring: Spring, y: float) -> float:
-    """k1 y + k2 y³ − f_s [N]: what the seated spring hands to the foundation besides C (Ahn & Tate, (6))."""
-    return spring.linear_stiffness * y + spring.cubic_stiffness * y**3 - spring.external_force
 
 
 class Transitions(Stateful):
@@ -195,7 +190,7 @@ class Transitions(Stateful):
         if self._tip_mass != 0.0 or beam is None or spring is None:
             return False
         psi = spring.equilibrium
-        return spring_force(spring, psi) + (psi - tip_load_deflection(beam)) / tip_compliance(beam) < 0.0
+        return spring.force(psi) + (psi - tip_load_deflection(beam)) / tip_compliance(beam) < 0.0
 
     def _strike(
         self,

@@ -69,15 +69,15 @@ class AdaptiveSteps(Stateful):
         """H [s] of a whole step from here."""
         return self._length * float(2.0 ** (-self.state.number / _PER_OCTAVE))
 
-    def next(self, time: float, kink: float = inf) -> tuple[float, float]:
-        """The time at which the step from ``time`` should end, and its size; ``kink`` as of `MacroGrid`."""
+    def next(self, time: float, kink: float = inf, *, struck: bool = False) -> tuple[float, float]:
+        """The time at which the step from ``time`` should end, and its size; ``kink`` as of `MacroGrid`.
+
+        Error estimates tell how long steps may be, also where ends have ``struck`` each other.
+        """
         size, left = self.size, self._end - time
         if kink < time + (1.0 + SHORT_REMAINDER) * size:
             return kink, kink - time
         return (self._end, left) if left <= (1.0 + SHORT_REMAINDER) * size else (time + size, size)
-
-    def struck(self, time: float) -> None:
-        """Do nothing: error estimates tell how long steps may be."""
 
     def note(self, energy: float) -> None:
         """Note that all energies together have been as large as this [J]."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf
 from typing import Any
 
@@ -67,13 +68,11 @@ class Balance:
             self._warns = self._stops = inf
         self._scale = 0.0  #: the largest energy so far [J]
 
-    def check(self, steps: np.ndarray, first: np.ndarray) -> tuple[int, str] | None:
-        """Return at which of the next records too much of the energy has changed, and why; see `Log`."""
+    def check(self, steps: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, Callable[[int], str]]:
+        """Tell at which of the next records too much of the energy has changed, and why; see `Log`."""
         share, largest = errors(self._scene, steps, first, self._scale, of_interface=True)
         self._scale = float(largest[-1])
-        wrong = self._wrong(share) > self._stops
-        row = int(np.argmax(wrong))
-        return (row, self._cause(float(abs(share[row])), steps)) if wrong[row] else None
+        return self._wrong(share) > self._stops, lambda row: self._cause(float(abs(share[row])), steps)
 
     def _wrong(self, share: np.ndarray) -> np.ndarray:
         """Return the share of the energy that has changed; what numerical damping takes is not an error."""
@@ -158,16 +157,14 @@ class Neglect:
         motion = 2.0 * variation / self._stiffness
         return motion, np.divide(motion, deepest, out=np.zeros_like(motion), where=deepest > 0.0)
 
-    def check(self, steps: np.ndarray, first: np.ndarray) -> tuple[int, str] | None:
-        """Return at which of the next records too much may have been neglected, and what to do; see `Log`."""
-        allowed = self._coupling.feedback_tolerance
-        motion, share = self.by(steps)
-        row = int(np.argmax(share > allowed))
-        if not share[row] > allowed:
-            return None
+    def check(self, steps: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, Callable[[int], str]]:
+        """Tell at which of the next records too much may have been neglected, and what to do; see `Log`."""
+        (motion, share), allowed = self.by(steps), self._coupling.feedback_tolerance
         return (
-            row,
-            f"coupling.feedback = {self._coupling.feedback!r} may by now neglect {motion[row]:.3g} m of the driving "
-            f"end's motion, {share[row]:.2g} of the largest penetration; allowed is coupling.feedback_tolerance = "
-            f"{allowed:g}. Take 'two_way', or allow more",
+            share > allowed,
+            lambda row: (
+                f"coupling.feedback = {self._coupling.feedback!r} may by now neglect {motion[row]:.3g} m of the "
+                f"driving end's motion, {share[row]:.2g} of the largest penetration; allowed is coupling.feedback_tolerance = "
+                f"{allowed:g}. Take 'two_way', or allow more"
+            ),
         )

@@ -16,9 +16,9 @@ from .outcome import RunStopped
 
 #: Most records that are checked and handed on together, and the longest that one waits for it [s].
 TOGETHER, _WAITS = 1024, 1.0
-#: Judges the next records of a run, shape (n,), beside its first one, shape (1,): returns the number of the first that
-#: is wrong, and the cause that stops the run there, or ``None``.
-Check = Callable[[np.ndarray, np.ndarray], tuple[int, str] | None]
+#: Judges the next records of a run, shape (n,), beside its first one, shape (1,): returns whether each is wrong, and
+#: what says by its number why the run stops there.
+Check = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, Callable[[int], str]]]
 
 
 class Log:
@@ -27,8 +27,8 @@ class Log:
     def __init__(self, scene: Scene, recorder: Recorder, *checks: Check) -> None:
         self._scene, self._recorder, self._checks = scene, recorder, checks
         #: What the recorder does not have yet: records as of `springbeam.results.steps.packed`, events of these and the
-        #: next one, and the beam's shapes, (63,), at times of records [s].
-        self.records, self.events, self.shapes = list[bytes](), list[Event](), list[tuple[float, np.ndarray]]()
+        #: next one, and the beam's shapes at some records, the numbers of `SHAPE_COLUMNS`.
+        self.records, self.events, self.shapes = list[bytes](), list[Event](), list[np.ndarray]()
         self._events = 0  #: number of those that the recorder has
         self._first = np.empty(0, STEP)  #: record of the run
         self.due = monotonic() + _WAITS  #: when the next records are handed on, however few [s]
@@ -45,9 +45,7 @@ class Log:
             self._events = int(earlier["events"][-1])
             self._sound(earlier)
         steps, stopped = self._sound(np.frombuffer(b"".join(self.records), STEP))
-        shapes = np.empty((len(self.shapes), len(SHAPE_COLUMNS)))
-        for row, (row_time, shape) in zip(shapes, self.shapes, strict=True):
-            row[0], row[1:] = row_time, shape
+        shapes = np.array(self.shapes).reshape(-1, len(SHAPE_COLUMNS))
         finite = np.isfinite(shapes).all(axis=1)
         wrong = shapes[~finite, 0]
         if wrong.size and len(steps) and wrong[0] <= steps["time"][-1]:
@@ -70,8 +68,9 @@ class Log:
             row, what = infinite
             cause = f"{what} at t = {float(time[row])!r} s: not a finite number"
             stopped, steps = RunStopped(cause, float(time[row])), steps[:row]
-        for check in self._checks:
-            if len(steps) and (wrong := check(steps, self._first)) is not None:
-                row, cause = wrong
-                stopped, steps = RunStopped(cause, float(time[row])), steps[: row + 1]
+        for check in self._checks if len(steps) else ():
+            wrong, cause_at = check(steps, self._first)
+            if wrong.any():
+                row = int(np.argmax(wrong))
+                stopped, steps = RunStopped(cause_at(row), float(time[row])), steps[: row + 1]
         return steps, stopped

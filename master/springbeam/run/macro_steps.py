@@ -18,20 +18,18 @@ SAME = 1e-9
 class MacroGrid(Stateful):
     """The grid t₀ + k H up to t_end [s]."""
 
-    state: float = -inf  #: when the last impact was [s]
-
     def __init__(self, start: float, end: float, macro_step: float) -> None:
         self._start, self._end = start, end
         self.size = macro_step  #: H [s]
 
-    def next(self, time: float, kink: float = inf) -> tuple[float, float]:
+    def next(self, time: float, kink: float = inf, *, struck: bool = False) -> tuple[float, float]:
         """Return when the step from ``time`` should end, and its size [s] (exactly H where it is a whole one).
 
-        It ends at ``kink`` [s], where a load jumps or bends, if that comes first or soon after. It is short after an
-        impact.
+        It ends at ``kink`` [s], where a load jumps or bends, if that comes first or soon after. It is short if ends
+        have ``struck`` each other at ``time``.
         """
         H = self.size
-        if time == self.state:
+        if struck:
             size = _AFTER_IMPACT * H
             if time + size < self._end:
                 return (time + size, size) if kink >= time + size + SHORT_REMAINDER * H else (kink, kink - time)
@@ -44,10 +42,3 @@ class MacroGrid(Stateful):
         if kink < target + SHORT_REMAINDER * H:
             target, size = kink, kink - time
         return target, H if abs(size - H) <= SAME * H else size
-
-    def struck(self, time: float) -> None:
-        """Note that the last event was an impact at ``time`` [s], or none if that is −∞.
-
-        It has changed velocities, and ends that have met may part again soon.
-        """
-        self.state = time

@@ -157,7 +157,7 @@ class Master(Stateful):
     def _step(self) -> None:
         state, steps, pair = self.state, self._steps, self._pair
         kink = pair.loads.next_kink(state.time + _SAME_TIME * steps.size, steps.size) if pair.loads.any else inf
-        target, size = steps.next(state.time, kink)
+        target, size = steps.next(state.time, kink, struck=state.struck == state.time)
         step, event = self._advance(size, to_kink=target == kink)
         whole = event is None and abs(step.size - size) <= 1e-9 * steps.size
         end = target if whole else state.time + step.size
@@ -261,7 +261,7 @@ class Master(Stateful):
         if kind in (EventKind.IMPACT, EventKind.SEATED):
             state.reclosed = state.time - state.last_opening <= SIMULTANEOUS * self._steps.size
         # Another event at the time of an impact settles what that has begun.
-        self._steps.struck(state.time if kind.collision and pair.divides else -inf)
+        state.struck = state.time if kind.collision and pair.divides else -inf
         pair.apply_impulses(impact.on_beam, impact.on_spring)
         lost = impact.energy_loss + pair.follow_phase(phase)
         state.lost += lost
@@ -339,7 +339,7 @@ class Master(Stateful):
         state.shapes_left -= early
         if time >= state.next_shape:
             state.next_shape += every * ((time - state.next_shape) // every + 1.0)
-        self._log.shapes.append((time, beam.shape()))
+        self._log.shapes.append(np.array([time, *beam.shape()]))
 
     # -- what it amounts to -------------------------------------------------------------------------------------------
 

@@ -43,6 +43,7 @@ class State(Memory):
     begun: bool = False  #: whether the row of the start is made
     energy_at_start: float = 0.0  #: before an impact there [J]
     last_opening: float = -inf  #: when a contact or a rest was last let go [s]
+    struck: float = -inf  #: when ends have met, if that was the last event [s]: they may part again soon
     #: Events in a row, each within a macro step of the one before: how many, and when the last was [s].
     in_a_row: tuple[int, float] = (0, -inf)
     macro_steps: int = 0

@@ -272,6 +272,10 @@ class Spring(Table):
     relative_tolerance: float = key("–", "relative tolerance of IDA, which integrates it", 1e-12, gt=0.0, le=1e-2)
     absolute_tolerance: float = key("m, m/s", "absolute tolerance of IDA, of y and z", 1e-30, gt=0.0, le=1e-2)
 
+    def force(self, y: float) -> float:
+        """Return k1 y + k2 y³ − f_s [N]: what holds the top at ``y`` [m], or a seated one hands to the foundation."""
+        return self.linear_stiffness * y + self.cubic_stiffness * y**3 - self.external_force
+
     @property
     def softens(self) -> bool:
         """Whether it gives way: it pushes back near 0, and less and less further out."""
