@@ -90,6 +90,21 @@ def test_400_shapes_are_kept_evenly_and_20_steps_after_first_contact():
     assert len(times) == pytest.approx(401 + 10, abs=2)
 
 
+def test_a_soft_contact_within_a_step_is_told_where_the_path_of_the_ends_has_it():
+    """Two masses of 1 kg, λ = 1 MN/m: they touch for π/1414 s of a step of 10 ms."""
+    law = {"law": "compliance", "stiffness": 1e6, "exponent": 1.0}
+    tables = {"contact": law, "beam": {"approach": "elastic"}, "stop": None, "time": {"t_end": 0.02}}
+    scene = with_changes(load_scene("soft"), **tables, coupling={"degree": 2, "macro_step": 0.01})
+    ends = Upper(1.0, 0.0, 0.0, y=4.9e-3, z=-1.0), DuffingBody(1.0, 0.0, 0.0)
+    run = simulate(scene, lambda *_: ends)
+    there = run.at([event.time for event in run.events])
+    assert kinds(run) == ["impact", "separation"]
+    assert (len(run), there.time[0] < 6e-3 < there.time[1] < 0.01) == (3, True)
+    assert there.gap == pytest.approx([0.0, 0.0], abs=1e-14)
+    for name in ("y", "z", "u_tip", "v_tip"):
+        assert [getattr(event, name) for event in run.events] == pytest.approx(there[name], rel=1e-10), name
+
+
 class Sinking(DuffingBody):
     """Sinks in steps shorter than 50 ms by 8 m/s, from 0.19 s on: where a step does not resolve a motion, its end tells
     little of what a shorter one does."""

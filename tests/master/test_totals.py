@@ -39,8 +39,13 @@ def found(steps, *events, window=0.1, scene=SCENE, apart=True):
 def test_what_events_take_is_of_the_stop_or_of_the_ends_that_meet():
     """1, 2, 4 … 64 J by the events of each kind: strokes on the stop and seating take 2 + 32 J, the others 93."""
     events = [Event(0.1 * k, kind, energy_loss=2.0**k) for k, kind in enumerate(EventKind)]
-    numbers = found(steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 1.0, 11)), *events)
+    steps = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 1.0, 11))
+    numbers = found(steps, *events)
     assert (numbers["loss_stop"], numbers["loss_impact"]) == (34.0, 93.0)
+    assert (numbers["stop_strokes"], numbers["last_impact_time"]) == (2, 0.5)  # the seating, of all
+    assert found(steps, *events[2:])["stop_strokes"] == 1
+    assert found(steps, events[0])["last_impact_time"] == 0.0
+    assert "last_impact_time" not in found(steps, *events[2:5])
 
 
 @pytest.mark.parametrize("window", [1e-3, 0.2, 0.5, 0.97])
