@@ -19,8 +19,8 @@ from springbeam.scene import Scene
 from springbeam.scene.resolution import choice
 from springbeam.studies import rivals, tradeoff
 from springbeam.studies.metrics import worst
-from springbeam.studies.study import Row, record_all, troubles
-from springbeam.studies.tables import number
+from springbeam.studies.study import record_all, troubles
+from springbeam.studies.tables import Row, number
 from springbeam.studies.tradeoff import Tradeoff, cheapest
 
 
@@ -86,7 +86,7 @@ def main(names: list[str]) -> None:
         study = Tradeoff.of(scene, window.until)
         records = record_all(study)
         rows, remarks = study.rows(records), troubles(records)
-        study.draw(records)["tradeoff"].savefig(IMAGES / f"tradeoff-{name}.png", dpi=110)
+        study.findings(records).pictures["tradeoff"]().savefig(IMAGES / f"tradeoff-{name}.png", dpi=110)
         shrink(IMAGES / f"tradeoff-{name}.png")
         notes = [f"* {note}" for note in remarks]
         lines = [*choices(rows), "", *side_by_side(rows, study.scene), *([""] if notes else []), *notes]

@@ -24,7 +24,8 @@ def bifurcation() -> None:
         metric=("stroboscopic", "settled_u_tip"),
     )
     with tempfile.TemporaryDirectory() as folder:
-        todo.write(record_all(todo, workers=os.cpu_count() or 1), Path(folder), pictures=True)
+        found = todo.findings(record_all(todo, workers=os.cpu_count() or 1))
+        found.written(Path(folder), pictures=True)
         shutil.copy(Path(folder) / "sweep.png", IMAGES / "vibro-impact.png")
 
 

@@ -231,7 +231,7 @@ def test_orders_are_those_of_the_scheme():
     """hermite of degree 2: displacement 6, velocity 6, and the force 4, if the means of its limits are compared."""
     coupling = {"macro_step": 2e-3, "scheme": "hermite", "degree": 2}
     study = Orders(scene=with_changes(SOFT, time={"t_end": 0.07}, coupling=coupling), quick=True)
-    orders = {row["quantity"]: row["order_H/2"] for row in study.rows(record_all(study))}
+    orders = {row["quantity"]: row["order_H/2"] for row in study.findings(record_all(study)).tables["orders"]}
     assert orders["y"] == pytest.approx(6.0, abs=0.5)
     assert orders["z"] == pytest.approx(6.0, abs=0.4)
     assert orders["contact_force"] == pytest.approx(4.0, abs=0.4)

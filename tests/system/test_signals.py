@@ -136,7 +136,8 @@ def test_the_damage_boundary_of_an_oscillator_is_that_of_its_shock_spectrum(sign
         scene=pulsed(signal=signal, **more), vary=vary, metric=("a=max(abs(a_y+load_0))",), boundary=f"a={limit}"
     )
     records = record_all(study)
-    found = study.findings(records).document["boundary"]
+    findings = study.findings(records).written(tmp_path, pictures=True)
+    found = findings.document["boundary"]
     rate = sqrt(STIFFNESS / MASS)
     for critical, duration in zip(found, durations, strict=True):
         load = study.scene.loads[0].model_copy(update={"duration": duration, "amplitude": 1.0})
@@ -147,11 +148,11 @@ def test_the_damage_boundary_of_an_oscillator_is_that_of_its_shock_spectrum(sign
         assert critical["velocity_change"] == pytest.approx(critical["peak"] * base[-1], rel=1e-6)
         assert critical["peak"] == pytest.approx(limit / spectrum.maximax[0], rel=3e-3)
     assert found[0]["velocity_change"] == pytest.approx(limit / rate, rel=0.01)
-    files = study.write(records, tmp_path, pictures=True)
-    assert {file.name for file in files} >= {"sweep-boundary.csv", "sweep-boundary.png"}
-    pictures = study.draw(records)
+    assert {file.name for _, file in findings.files} >= {"sweep-boundary.csv", "sweep-boundary.png"}
     for picture, label in (("sweep-boundary", "peak [m/s²]"), ("sweep", "loads.0.amplitude [m/s²]")):
-        assert label in {label for ax in pictures[picture].axes for label in (ax.get_xlabel(), ax.get_ylabel())}
+        assert label in {
+            label for ax in findings.pictures[picture]().axes for label in (ax.get_xlabel(), ax.get_ylabel())
+        }
 
 
 # -- spectra ------------------------------------------------------------------------------------------------------

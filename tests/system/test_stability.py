@@ -249,8 +249,8 @@ def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else():
 
 def test_pictures_have_units():
     study = Grid(samples=0, resolution=2)
-    figures = study.draw({name: ended("conserved") | {"residual": 1e-9} for name in study.cases()})
-    axes = [ax for figure in figures.values() for ax in figure.axes if ax.get_title()]
+    found = study.findings({name: ended("conserved") | {"residual": 1e-9} for name in study.cases()})
+    axes = [ax for draw in found.pictures.values() for ax in draw().axes if ax.get_title()]
     assert len(axes) == 2 * len(SLICES)
     labels = {label for ax in axes for label in (ax.get_xlabel(), ax.get_ylabel())}
     assert {"macro_step [s]", "stiffness [N]", "contact_damping [s/m]", "restitution [–]"} <= labels

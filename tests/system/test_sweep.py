@@ -93,7 +93,7 @@ def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
     plan = planned("spring.mass=0.5,1,-1", "spring.linear_stiffness=1:100:3:log")
     records = record_all(plan)
     assert plan.findings(records).document["runs"] == {"done": 6, "stopped": 0, "refused": 3, "lost": 0}
-    plan.write(records, tmp_path, pictures=True)
+    plan.findings(records).written(tmp_path, pictures=True)
     assert (tmp_path / "sweep.png").stat().st_size > 10_000
     rows = swept(tmp_path)
     assert rows["index"] == list(range(9))
@@ -159,11 +159,11 @@ def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_dou
         scene=load_scene("vibro-impact"), vary=("loads.0.frequency=35,45",), metric=("stroboscopic", "u_tip_max")
     )
     records = record_all(todo)
-    todo.write(records, tmp_path, pictures=False)
+    found = todo.findings(records).written(tmp_path, pictures=False)
     columns = swept(tmp_path)
     once, doubled = (np.unique(np.round(np.array(points), 5)) for points in columns["stroboscopic"])
     assert (len(once), len(doubled)) == (1, 2)
-    dots = todo.draw(records)["sweep"].axes[0].lines[0]
+    dots = found.pictures["sweep"]().axes[0].lines[0]
     assert dots.get_linestyle() == "None"
     assert dots.get_ydata().tolist() == [x for points in columns["stroboscopic"] for x in points]
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,12 +12,13 @@ import numpy as np
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn
 
+from ..pictures.diagrams import Diagram, draw_diagrams
 from ..results.directory import ANIMATIONS, REPORT
 from ..results.files import load_trajectory
 from ..results.totals import LOSS_NAMES, TOTALS, totals
 from ..results.trajectory import Trajectory
 from ..scene import Scene
-from ..studies.tables import Findings, table, write_csv
+from ..studies.tables import Findings, table
 from .common import (
     BAD_INPUT,
     ForceOption,
@@ -29,6 +31,11 @@ from .common import (
     progress_bar,
     results_directory,
 )
+
+#: Power below this share of the highest line is not drawn.
+_FLOOR = 1e-12
+#: Of a picture of runs beside each other.
+_DPI = 160
 
 
 def report(
@@ -135,35 +142,31 @@ def compare(
         fail(BAD_INPUT, "compare takes runs; or one run and a file of measurements, with --map and --shift of these")
     trajectories = [load_trajectory(results_directory(run)) for run in runs[: 1 if measured else None]]
     if measured:
-        found, draw = _beside_measured(trajectories[0], runs[1], names or [], shift)
+        found = _beside_measured(trajectories[0], runs[1], names or [], shift)
     else:
-        found, draw = _beside_one_another([str(run) for run in runs], trajectories)
+        found = _beside_one_another([str(run) for run in runs], trajectories)
     if no_plots:
         return replace(found, document={**found.document, "picture": None})
     out.parent.mkdir(parents=True, exist_ok=True)
-    draw(out)
+    found.pictures["comparison"]().savefig(out, dpi=_DPI)
     return replace(found, document={**found.document, "picture": out}, files=[("picture", out)], where=out)
 
 
-#: What was found, and what draws it into a file; matplotlib takes a second to load.
-_Compared = tuple[Findings, Callable[[Path], object]]
-
-
-def _beside_one_another(names: list[str], runs: list[Trajectory]) -> _Compared:
+def _beside_one_another(names: list[str], runs: list[Trajectory]) -> Findings:
     """Compare runs."""
 
-    def draw(path: Path) -> None:
-        from ..pictures.timeline import DPI, draw_compared
+    def draw() -> Any:
+        from ..pictures.timeline import draw_compared
 
-        draw_compared(dict(zip(names, runs, strict=True))).savefig(path, dpi=DPI)
+        return draw_compared(dict(zip(names, runs, strict=True)))
 
     keys, results = differing_keys([run.scene for run in runs]), results_of(runs)
     titles = {"keys that differ": keys, "results": results}
     shown = [table(("", *names), _rows(found), title) for title, found in titles.items()]
-    return Findings({"runs": names, "keys": keys, "results": results}, shown), draw
+    return Findings({"runs": names, "keys": keys, "results": results}, shown, pictures={"comparison": draw})
 
 
-def _beside_measured(run: Trajectory, file: Path, names: list[str], shift: float | None) -> _Compared:
+def _beside_measured(run: Trajectory, file: Path, names: list[str], shift: float | None) -> Findings:
     """Compare a run with measured curves."""
     from ..signals.expressions import Expression
     from ..signals.measured import model, read_measured, residuals, time_shift
@@ -174,13 +177,12 @@ def _beside_measured(run: Trajectory, file: Path, names: list[str], shift: float
     moved = time_shift(run, measured) if shift is None else shift
     found = residuals(run, measured, moved)
 
-    def draw(path: Path) -> None:
-        from ..pictures.plots import draw_measured
-
-        covered, curves = model(run, measured, moved)
-        pairs = {name: (curve, measured.values[name][covered]) for name, curve in curves.items()}
-        draw_measured(measured.time[covered] + moved, pairs, path)
-
+    covered, curves = model(run, measured, moved)
+    time, diagrams = measured.time[covered] + moved, []
+    for name, curve in curves.items():
+        both = {"measured": measured.values[name][covered], "run": curve}
+        points = {which: np.column_stack([time, values]) for which, values in both.items()}
+        diagrams.append(Diagram("time t [s]", name, points, log=False, dots=("measured",)))
     rows = [
         (row.signal, str(row.points), f"{row.rms:.4g}", f"{row.relative:.2%}", f"{row.largest:.4g}", f"{row.at:.6g}")
         for row in found
@@ -189,7 +191,9 @@ def _beside_measured(run: Trajectory, file: Path, names: list[str], shift: float
     by_what = ", found by correlation" * (shift is None)
     taken = [column for name in measured.values for column in Expression(name).names]
     shown = [table(columns, rows), f"shift     {moved:.6g} s{by_what}", *filter(None, [without_peak(run, taken)])]
-    return Findings({"shift": moved, "residuals": [row._asdict() for row in found]}, shown), draw
+    document = {"shift": moved, "residuals": [row._asdict() for row in found]}
+    draw = partial(draw_diagrams, diagrams, "", (8.2, 2.2), wide=1)
+    return Findings(document, shown, pictures={"comparison": draw})
 
 
 def differing_keys(scenes: list[Scene]) -> dict[str, list[Any]]:
@@ -271,37 +275,41 @@ def spectrum(
     found = spectra(trajectory, of or (), low, high, quality, since, segments)
     directory = out or run.with_name(f"{run.resolve().name}-spectrum")
     directory.mkdir(parents=True, exist_ok=True)
-    tables = {f"shock-{end}": shock._asdict() for end, shock in found.shock.items()}
+    columns = {f"shock-{end}": shock._asdict() for end, shock in found.shock.items()}
     for number, (what, power) in enumerate(found.power.items()):
-        tables[f"power-{what if what.isidentifier() else number}"] = power._asdict()
+        columns[f"power-{what if what.isidentifier() else number}"] = power._asdict()
     swept = {(what, chirp.load): chirp for what, several in found.responses.items() for chirp in several}
     for (what, load), chirp in swept.items():
         name = f"response-{what if what.isidentifier() else 'formula'}-load-{load}"
-        tables[name] = {"frequency": chirp.frequency, "amplitude": chirp.amplitude}
+        columns[name] = {"frequency": chirp.frequency, "amplitude": chirp.amplitude}
     if found.points is not None:
         times, points = found.points
-        tables["poincare"] = {"time": times, "position": points[:, 0], "velocity": points[:, 1]}
-    files = []
-    for name, columns in tables.items():
-        rows = [dict(zip(columns, row, strict=True)) for row in np.transpose(list(columns.values())).tolist()]
-        files.append(write_csv(directory / f"{name}.csv", rows))
-    if not no_plots:
-        from ..pictures.plots import draw_spectra
-
-        files.append(directory / "spectrum.png")
-        shocks = {f"shock at the {end}": (s.frequency, s.maximax) for end, s in found.shock.items()}
-        powers = {f"power of {what}": (p.frequency[1:], p.density[1:]) for what, p in found.power.items()}
-        answers = {f"{what} to load {load}, {c.way}": (c.frequency, c.amplitude) for (what, load), c in swept.items()}
-        once = None if found.points is None else found.points[1]
-        draw_spectra(shocks, powers, answers, once, trajectory.scene.title or str(run), files[-1])
+        columns["poincare"] = {"time": times, "position": points[:, 0], "velocity": points[:, 1]}
+    shocks = {f"shock at the {end}": np.transpose(s[:2]) for end, s in found.shock.items()}
+    powers = {f"power of {what}": np.transpose(p[:2])[1:] for what, p in found.power.items()}
+    powers = {name: points[points[:, 1] > _FLOOR * points[:, 1].max()] for name, points in powers.items()}
+    answers = {f"{what} to load {load}, {c.way}": np.transpose(c[1:]) for (what, load), c in swept.items()}
+    once = {} if found.points is None else {"points": found.points[1]}
+    diagrams = [
+        Diagram("frequency [Hz]", "largest acceleration [m/s²]", shocks),
+        Diagram("frequency [Hz]", "power density [unit²/Hz]", powers),
+        Diagram("frequency of the chirp [Hz]", "half the range [unit]", answers, log=False),
+        Diagram("position once a period of the drive [m]", "velocity [m/s]", once, log=False, dots=tuple(once)),
+    ]
+    drawn = [diagram for diagram in diagrams if diagram.curves]
+    draw = partial(draw_diagrams, drawn, trajectory.scene.title or str(run), (8.2, 2.6), wide=1)
+    tables = {
+        name: [dict(zip(of, row, strict=True)) for row in np.transpose(list(of.values())).tolist()]
+        for name, of in columns.items()
+    }
     settled = None if found.settled is None else {**found.settled._asdict(), "period": found.settled.period}
     document = {
-        "directory": directory,
-        "files": files,
         "shock": {end: shock._asdict() for end, shock in found.shock.items()},
         "jumps": found.jumps,
         "highest": {what: power.highest for what, power in found.power.items()},
         "settled": settled,
     }
     lines = [f"{what:<20} {words}" for what, words in found.in_words()]
-    return Findings(document, lines, [("results", file) for file in files], directory)
+    return Findings(document, lines, tables=tables, pictures={"spectrum": draw}).written(
+        directory, pictures=not no_plots
+    )

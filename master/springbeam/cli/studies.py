@@ -43,7 +43,8 @@ from .run import carry_out as carry_out_run
 from .run import picked, picked_in_words
 
 if TYPE_CHECKING:
-    from ..studies.study import Records, Row, Study
+    from ..studies.study import Records, Study
+    from ..studies.tables import Row
 else:
     Study = Any
 
@@ -102,18 +103,10 @@ def carry_out(study: Study, scene: str | None, frame: Frame) -> Findings:
 
     study.cases()
     records = _opened(study, study.kind if scene is None else f"{Path(scene).stem}-{study.kind}", frame)
-    directory = records.path.parent
     with _going_on(records, len(study.cases())):
         computed = _computed(study, records, frame)
-        files = study.write(computed, directory, pictures=not frame.no_plots)
-    found = study.findings(computed)
-    return replace(
-        found,
-        document={"directory": directory, "files": files, **found.document},
-        shown=[*study.remarks, *found.shown, *troubles(computed)],
-        files=[("results", file) for file in files],
-        where=directory,
-    )
+        found = study.findings(computed).written(records.path.parent, pictures=not frame.no_plots)
+    return replace(found, shown=[*study.remarks, *found.shown, *troubles(computed)])
 
 
 def _opened(study: Study, default: str, frame: Frame) -> Records:

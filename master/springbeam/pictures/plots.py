@@ -1,5 +1,4 @@
-"""Pictures of a run: the sub-figures (A)–(E) of Ahn & Tate's Figures 2–5; loads, accelerations and what the beam feels;
-its spectra, and the run beside what was measured.
+"""Pictures of a run: the sub-figures (A)–(E) of Ahn & Tate's Figures 2–5; loads, accelerations and what the beam feels.
 
 Besides colours, lines differ in width or dashes and events in shape, so that the pictures survive a black-and-white
 printer.
@@ -9,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -23,8 +21,6 @@ from ..results.trajectory import Trajectory
 from ..scene.statics import SHAPE_POINTS
 from .drawing import (
     BLACK,
-    BLUE,
-    COLOURS,
     GREY,
     LEVELS,
     drawable,
@@ -34,11 +30,9 @@ from .drawing import (
     readable_unit,
 )
 from .panels import panels
-from .timeline import DPI, REMARK, STYLE, blank, figure_for, line_style, rows_of_axes, timeline
+from .timeline import DPI, REMARK, STYLE, figure_for, line_style, timeline
 
 _SHAPES_EARLY, _SHAPES_LATER = 20, 24
-#: Power below this share of the highest line is not drawn.
-_FLOOR = 1e-12
 #: Early to late, dark to light, but not so light that a line is lost on paper.
 _CLOCK = ListedColormap(matplotlib.colormaps["cividis"](np.linspace(0.0, 0.9, 256)), "clock")
 
@@ -186,58 +180,3 @@ _OVER_TIME = {
 }  # fmt: skip
 #: The letters of `PICTURES` say which is which.
 _NAMES = [Path(file).stem[2:] for file in PICTURES]
-
-
-@matplotlib.rc_context(STYLE)
-def draw_spectra(
-    shock: Mapping[str, tuple[np.ndarray, np.ndarray]],
-    power: Mapping[str, tuple[np.ndarray, np.ndarray]],
-    responses: Mapping[str, tuple[np.ndarray, np.ndarray]],
-    points: np.ndarray | None,
-    title: str,
-    path: Path,
-) -> None:
-    """Draw spectra to ``path``: shock, power, responses to a chirp, and the points of a driven motion.
-
-    Parameters
-    ----------
-    shock, power, responses
-        Frequencies [Hz] and values by name, shapes (n,): accelerations [m/s²], power densities, half ranges.
-    points
-        Position [m] and velocity [m/s] once a period, shape (n, 2).
-    """
-    dots = {"linestyle": "none", "marker": ".", "markersize": 3.0}
-    position, velocity = "position once a period of the drive [m]", "velocity [m/s]"
-    groups: list[tuple[Mapping[str, Any], str, str, bool, dict[str, Any]]] = [
-        (shock, "frequency [Hz]", "largest acceleration [m/s²]", True, {}),
-        (power, "frequency [Hz]", "power density [unit²/Hz]", True, {}),
-        (responses, "frequency of the chirp [Hz]", "half the range [unit]", False, {}),
-        ({} if points is None else {"points": points.T}, position, velocity, False, dots),
-    ]
-    groups = [group for group in groups if group[0]]
-    figure = blank(title, 0.6 + 2.4 * len(groups))
-    axes = rows_of_axes(figure, [2.4] * len(groups), sharex=False)
-    for ax, (curves, across, up, logarithmic, look) in zip(axes, groups, strict=True):
-        for k, (name, (x, y)) in enumerate(curves.items()):
-            seen = y > _FLOOR * y.max(initial=0.0) if logarithmic else slice(None)
-            dashes: dict[str, Any] = {"dashes": (4, k)} if logarithmic and k else {}
-            ax.plot(x[seen], y[seen], color=COLOURS[k % len(COLOURS)], label=name, **look, **dashes)
-        scale = "log" if logarithmic else "linear"
-        ax.set(xlabel=across, ylabel=up, xscale=scale, yscale=scale)
-        ax.legend()
-        ax.grid(alpha=0.3)
-    figure.savefig(path, dpi=DPI)
-
-
-@matplotlib.rc_context(STYLE)
-def draw_measured(time: np.ndarray, curves: Mapping[str, tuple[np.ndarray, np.ndarray]], path: Path) -> None:
-    """Draw what a run gives beside what was measured, by name, at ``time`` [s]; shapes (n,)."""
-    figure = blank("", 0.6 + 2.0 * len(curves))
-    axes = rows_of_axes(figure, [2.0] * len(curves))
-    for ax, (name, (ours, theirs)) in zip(axes, curves.items(), strict=True):
-        ax.plot(time, theirs, ".", color=BLACK, markersize=2.5, label="measured")
-        ax.plot(time, ours, color=BLUE, label="run")
-        ax.set_ylabel(name)
-        ax.legend()
-    axes[-1].set_xlabel("time t [s]")
-    figure.savefig(path, dpi=DPI)

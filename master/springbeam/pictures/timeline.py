@@ -70,7 +70,8 @@ def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Fig
 
 def _painted(figure: Figure, panels: Sequence[Panel], clock: Unit) -> list[Axes]:
     """Return the axes of ``panels``, one below the other over a common time axis in the unit ``clock``."""
-    axes = rows_of_axes(figure, [panel.height for panel in panels])
+    heights = [panel.height for panel in panels]
+    axes: list[Axes] = list(figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
     for ax, panel in zip(axes, panels, strict=True):
         paint(ax, panel, clock)
         ax.label_outer()
@@ -162,12 +163,6 @@ def blank(title: str, height: float) -> Figure:
     wrapped = [textwrap.fill(line, _TITLE_WIDTH) for line in title.splitlines() if line]
     figure.suptitle("\n".join(wrapped), fontsize=10.0, x=0.01, ha="left")
     return figure
-
-
-def rows_of_axes(figure: Figure, heights: Sequence[float], *, sharex: bool = True) -> list[Axes]:
-    """Return new axes of ``figure``, one below the other, as high as ``heights`` [inch]."""
-    grid = figure.subplots(len(heights), 1, sharex=sharex, squeeze=False, height_ratios=heights)
-    return list(grid[:, 0])
 
 
 @matplotlib.rc_context(STYLE)

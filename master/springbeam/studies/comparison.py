@@ -31,7 +31,7 @@ from ..results.trajectory import TOLD, Trajectory, columns_of
 from ..run.runner import simulate
 from ..scene import Scene, SceneError, with_changes
 from ..scene.resolution import mesh_frequency, slowest_frequency, with_scheme_chosen
-from .study import Row
+from .tables import Row
 
 Verdict = Literal["agrees", "differs", "not comparable"]
 #: Largest change by halving the macro step, relative to the largest displacement (velocity), of a resolved motion.

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import groupby
 from typing import Any, ClassVar, NamedTuple
 
 from rich.text import Text
 from scipy.optimize import brentq
 
+from ..pictures.diagrams import Diagram, draw_diagrams
 from ..scene import Scene, SceneError
 from .metrics import Metric, heading, metrics_of
-from .study import Pictures, Row, Study
-from .tables import Findings, number, table
+from .study import Study
+from .tables import Findings, Row, number, table
 
 #: Quantities that are compared unless others are asked for, those that a scene has.
 QUANTITIES = (
@@ -106,67 +108,50 @@ class Converge(Study):
             cases[label] = {"refined": refined, "unknowns": mesh.modes_kept, **keys}
         return cases
 
-    def _settled(self, records: Mapping[str, Row]) -> dict[str, tuple[list[Row], dict[str, Settled]]]:
-        """Return the rows of each sequence, and how each quantity settles in it.
+    def findings(self, records: Mapping[str, Row]) -> Findings:
+        """Judge how the quantities settle: those asked for, or those that the scene has.
 
-        Quantities are those asked for, or those that the scene has. All modes of a mesh are its solution: no mode lies
-        beyond the last.
+        In the table errors are from the limits of a sequence. All modes of a mesh are its solution: no mode lies beyond
+        the last.
         """
-        rows, beam, found = super().rows(records), self.scene.beam, {}
-        names = [name for name in self.metrics if self.metric or rows[0][name] is not None]
+        rows, beam, document = self.rows(records), self.scene.beam, dict[str, Any]()
+        made, diagrams = list[Row](), list[Diagram]()
+        shown: list[Any] = [Text(self.scene.title or "(untitled scene)", style="bold")]
+        given = rows[0]
+        names = [name for name in self.metrics if self.metric or given[name] is not None]
         for refined, several in groupby(rows, lambda row: row["refined"]):
             mine = list(several)
             sizes = [row["beam.n_elements" if refined == "elements" else "unknowns"] for row in mine]
             complete = refined == "modes" and beam is not None and beam.modes_kept == beam.unknowns
-            of = {name: settled([row[name] for row in mine], sizes, complete=complete) for name in names}
-            found[refined] = mine, of
-        return found
-
-    def rows(self, records: Mapping[str, Row]) -> list[Row]:
-        """Return a row per run; errors are from the limits of its sequence."""
-        return [
-            row | {f"error_{name}": None if s.limit is None or row[name] is None else row[name] - s.limit
-                   for name, s in found.items()}
-            for rows, found in self._settled(records).values()
-            for row in rows
-        ]  # fmt: skip
-
-    def findings(self, records: Mapping[str, Row]) -> Findings:
-        """Judge how the quantities settle."""
-        document = dict[str, Any]()
-        shown: list[Any] = [Text(self.scene.title or "(untitled scene)", style="bold")]
-        given = next(iter(records.values()))
-        for refined, (rows, found) in self._settled(records).items():
-            document[refined] = {"levels": rows, "settled": {name: s._asdict() for name, s in found.items()}}
+            found = {name: settled([row[name] for row in mine], sizes, complete=complete) for name in names}
+            document[refined] = {"levels": mine, "settled": {name: s._asdict() for name, s in found.items()}}
             cells = [_cells(name, given[name], s) for name, s in found.items()]
             shown.append(table(("", "as given", "extrapolated", "error", "order"), cells, f"more {refined}"))
             meshes = (
-                f"{row['beam.n_elements']} el. {row['unknowns']} modes {row['cost_wall_time']:.2g} s" for row in rows
+                f"{row['beam.n_elements']} el. {row['unknowns']} modes {row['cost_wall_time']:.2g} s" for row in mine
             )
             shown.append(f"runs      {', '.join(meshes)}")
+            curves = {heading(name): list[tuple[float, float]]() for name in names}
+            labels = "unknowns of the beam", "distance from the limit, relative"
+            diagrams.append(Diagram(*labels, curves, f"more {refined}"))
+            for row in mine:
+                errors = {name: _off(row[name], s.limit) for name, s in found.items()}
+                made.append(row | {f"error_{name}": error for name, error in errors.items()})
+                for name, error in errors.items():
+                    share = abs((error or 0.0) / (found[name].limit or 1.0))
+                    if share > _ROUNDING:
+                        curves[heading(name)].append((row["unknowns"], share))
         shown.append("error: of the run as given; in brackets the last change, where the values show no limit")
-        return Findings(document, shown)
+        draw = partial(draw_diagrams, diagrams, f"{self.scene.title}: convergence with the mesh")
+        return Findings(document, shown, tables={self.kind: made}, pictures={self.kind: draw})
 
-    def draw(self, records: Mapping[str, Row]) -> Pictures:
-        """Draw how far each quantity is from its limit over the size of the mesh, a panel a sequence."""
-        from .picture import Point, curves
 
-        points = [
-            Point(f"more {refined}", heading(name), row["unknowns"], abs((row[name] - s.limit) / (s.limit or 1.0)))
-            for refined, (rows, found) in self._settled(records).items()
-            for row in rows
-            for name, s in found.items()
-            if s.limit is not None and row[name] is not None
-        ]
-        points = [point for point in points if point.y > _ROUNDING]
-        title = f"{self.scene.title}: convergence with the mesh"
-        return {"converge": curves(points, title, "unknowns of the beam", "distance from the limit, relative")}
+def _off(value: float | None, limit: float | None) -> float | None:
+    return None if value is None or limit is None else value - limit
 
 
 def _cells(name: str, given: float | None, settled: Settled) -> tuple[str, ...]:
     """Return a quantity for a terminal: of the mesh as given, and where finer ones or more modes lead."""
-    error = number(settled.change, ".1e")
-    error = f"({error})" if error else ""
-    if given is not None and settled.limit is not None:
-        error = f"{given - settled.limit:.1e}"
+    change = number(settled.change, ".1e")
+    error = number(_off(given, settled.limit), ".1e", f"({change})" if change else "")
     return heading(name), number(given, ".6g"), number(settled.limit, ".6g"), error, number(settled.order, ".1f")

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar
 
 import numpy as np
 from rich.text import Text
 
 from ..monolithic import event_driven
+from ..pictures.diagrams import Diagram, draw_diagrams
 from ..results.contact_times import contact_changes
 from ..results.trajectory import Event, Trajectory, columns_of
 from ..scene import Scene
 from .comparison import SHORT, Verdict, away_from, compare, macro_points, quantities, sample
-from .study import Pictures, Row, Study
-from .tables import Findings, number, table
+from .study import Study
+from .tables import Findings, Row, number, table
 
 #: Exit codes of the command.
 CODES: dict[Verdict, int] = {"agrees": 0, "differs": 1, "not comparable": 4}
@@ -44,12 +45,8 @@ class Crosscheck(Study):
         """Return what was found, as `compare` has it."""
         return compare(self.at(case))
 
-    def rows(self, records: Mapping[str, Row]) -> list[Row]:
-        """Return a row per quantity."""
-        return list(records[_CASE]["quantities"])
-
     def findings(self, records: Mapping[str, Row]) -> Findings:
-        """Show what was compared, quantities and changes of contact, and the verdict."""
+        """Show what was compared, quantities and changes of contact, and the verdict; the table is of quantities."""
         record, units = records[_CASE], columns_of(self.scene)
         shown: list[Any] = [*record["notes"]]
         if record["quantities"]:
@@ -69,9 +66,12 @@ class Crosscheck(Study):
         over = " over the run that was asked for" * (verdict == "not comparable")
         looks = {"agrees": "bold green", "differs": "bold red", "not comparable": "bold"}
         shown.append(Text(f"{verdict}{over}", style=looks[verdict]))
-        return Findings({name: found for name, found in record.items() if name != "runs"}, shown, code=CODES[verdict])
+        told = {name: found for name, found in record.items() if name != "runs"}
+        pictures = {self.kind: partial(self._drawn, record["runs"])} if record["runs"] else {}
+        tables = {self.kind: record["quantities"]}
+        return Findings(told, shown, code=CODES[verdict], tables=tables, pictures=pictures)
 
-    def draw(self, records: Mapping[str, Row]) -> Pictures:
+    def _drawn(self, recorded: Mapping[str, Row]) -> Any:
         """Draw both motions, forces and impulses."""
         from ..pictures.timeline import draw_compared
 
@@ -81,9 +81,9 @@ class Crosscheck(Study):
                 {column: np.array(values) for column, values in run["columns"].items()},
                 [Event(**event) for event in run["events"]],
             )
-            for name, run in records[_CASE]["runs"].items()
+            for name, run in recorded.items()
         }
-        return {"crosscheck": draw_compared(runs)} if runs else {}
+        return draw_compared(runs)
 
 
 def _ok(row: Mapping[str, Any]) -> str:
@@ -134,41 +134,25 @@ class Orders(Study):
                 found.append({"phase": phase, "begin": begin, "end": end, "quantity": name, "error": error})
         return {"errors": found}
 
-    def rows(self, records: Mapping[str, Row]) -> list[Row]:
-        """Return a row per stretch and quantity: the errors at all steps, and the orders between neighbours."""
-        found = []
-        for several in zip(*(record.get("errors", ()) for record in records.values()), strict=False):
-            errors = {step: row["error"] for step, row in zip(records, several, strict=True)}
-            orders = {
-                f"order_{step}": float(np.log2(a / b)) if a and b else None
-                for step, (a, b) in zip(errors, itertools.pairwise(errors.values()), strict=False)
-            }
-            same = {name: several[0][name] for name in ("phase", "begin", "end", "quantity")}
-            found.append(same | {f"error_{step}": error for step, error in errors.items()} | orders)
-        return found
-
     def findings(self, records: Mapping[str, Row]) -> Findings:
-        """Show the errors and the orders."""
-        rows, steps = self.rows(records), list(records)
-        cells = [
-            (row["phase"], f"{row['begin']:.4f}", row["quantity"],
-             *(f"{row[f'error_{step}']:.1e}" for step in steps),
-             " ".join(number(row[f"order_{step}"], ".1f", "–") for step in steps[:-1]))
-            for row in rows
-        ]  # fmt: skip
+        """Show the errors at all steps, and the orders between neighbours, of each stretch and quantity."""
+        rows, steps, cells = list[Row](), list(records), []
+        curves, sizes = dict[str, dict[str, Any]](), [case["coupling.macro_step"] for case in self.cases().values()]
+        for several in zip(*(record.get("errors", ()) for record in records.values()), strict=False):
+            errors = [row["error"] for row in several]
+            orders = [float(np.log2(a / b)) if a and b else None for a, b in itertools.pairwise(errors)]
+            row = {name: several[0][name] for name in ("phase", "begin", "end", "quantity")}
+            cells.append((
+                row["phase"], f"{row['begin']:.4f}", row["quantity"], *(f"{error:.1e}" for error in errors),
+                " ".join(number(order, ".1f", "–") for order in orders),
+            ))  # fmt: skip
+            of_stretch = curves.setdefault(f"{row['phase']} from {row['begin']:.4g} s", {})
+            of_stretch[row["quantity"]] = list(zip(sizes, errors, strict=True))
+            row |= {f"error_{step}": error for step, error in zip(steps, errors, strict=True)}
+            rows.append(row | {f"order_{step}": order for step, order in zip(steps, orders, strict=False)})
         names = ("phase", "from [s]", "quantity", *steps, "orders")
         shown = table(names, cells, "largest errors", words=("from [s]", "quantity"))
-        return Findings({"orders": rows}, [shown])
-
-    def draw(self, records: Mapping[str, Row]) -> Pictures:
-        """Draw errors over the macro step, a panel a stretch."""
-        from .picture import Point, curves
-
-        steps = {name: case["coupling.macro_step"] for name, case in self.cases().items()}
-        points = [
-            Point(f"{row['phase']} from {row['begin']:.4g} s", row["quantity"], H, row[f"error_{step}"])
-            for row in self.rows(records)
-            for step, H in steps.items()
-        ]
-        title = f"{self.scene.title}: largest errors"
-        return {"orders": curves(points, title, "macro step [s]", "unit of the quantity")}
+        labels = "macro step [s]", "unit of the quantity"
+        diagrams = [Diagram(*labels, lines, stretch) for stretch, lines in curves.items()]
+        draw = partial(draw_diagrams, diagrams, f"{self.scene.title}: largest errors")
+        return Findings({"orders": rows}, [shown], tables={self.kind: rows}, pictures={self.kind: draw})

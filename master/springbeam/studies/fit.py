@@ -25,8 +25,8 @@ from ..signals.expressions import signal
 from ..signals.measured import Measured, read_measured, time_shifts
 from .accuracy import simulate
 from .design import design, parse_axis
-from .study import Row, Study
-from .tables import Findings, number, table
+from .study import Study
+from .tables import Findings, Row, number, table
 
 _CASE = "fit"
 #: The unknown that moves the clock of the measurement [s], beside keys.
@@ -112,12 +112,11 @@ class Fit(Study):
             record = searches[-1].found()
         return {**record, "runs": [run for search in searches for run in search.runs]}
 
-    def rows(self, records: Mapping[str, Row]) -> list[Row]:
-        """Return a row per run: the keys, and the root mean square of what is left of each curve."""
-        return list(records[_CASE]["runs"])
-
     def findings(self, records: Mapping[str, Row]) -> Findings:
-        """Show the values with their intervals, or which of them the data does not determine."""
+        """Show the values with their intervals, or which of them the data does not determine.
+
+        The table has a row per run: the keys, and the root mean square of what is left of each curve.
+        """
         record = records[_CASE]
         keys = [
             (row["key"], f"{row['value']:.8g}", number(row["low"], ".6g"), number(row["high"], ".6g"))
@@ -130,8 +129,8 @@ class Fit(Study):
             f"{len(record['runs'])} runs; {record['message']}",
         ]
         shown += [Text(f"not determined: {why}", style="bold red") for why in record["undetermined"]]
-        return Findings({name: record[name] for name in ("keys", "left", "undetermined")}, shown,
-                        code=1 if record["undetermined"] else 0)  # fmt: skip
+        told = {name: record[name] for name in ("keys", "left", "undetermined")}
+        return Findings(told, shown, code=1 if record["undetermined"] else 0, tables={self.kind: record["runs"]})
 
 
 def mapping(names: Sequence[str]) -> dict[str, str]:

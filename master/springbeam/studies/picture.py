@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import itertools
-import textwrap
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.axis import XAxis, YAxis
-from matplotlib.cm import ScalarMappable
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from ..pictures.diagrams import figure_with
 from ..pictures.drawing import BLUE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import XAxis, YAxis
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.figure import Figure
 
 Rows = Sequence[Mapping[str, Any]]
 #: Values of an axis that are named on it, and columns of small multiples.
 _FEW, _MOST = 8, 6
 #: Values are named on an axis if the range is less than so many times the least distance of two of them.
 _APART = 5.0
-#: Letters of a title to an inch.
-_LETTERS = 9
-_MARKERS = "os^DvPX*<>"
 
 
 class Scale(NamedTuple):
@@ -48,22 +46,13 @@ class Scale(NamedTuple):
             some = levels[:: max(1, -(-len(levels) // _FEW))] if len(levels) > _FEW else levels
             axis.set_ticks([levels.index(value) for value in some], [_short(value) for value in some])
         elif self.log:
-            logarithmic(axis, np.array(levels, dtype=float))
+            axis.axes.set(**{f"{axis.axis_name}scale": "log"})
         elif np.ptp(levels) < _APART * np.diff(np.array(levels, float)).min(initial=np.inf):
             axis.set_ticks(levels)
 
 
 def _short(value: Any) -> str:
     return f"{value:.3g}" if isinstance(value, float) else str(value)
-
-
-def logarithmic(axis: XAxis | YAxis, values: np.ndarray) -> None:
-    """Make an axis logarithmic, with plain numbers at decades, and at 2 and 5 if there are few."""
-    (axis.axes.set_xscale if isinstance(axis, XAxis) else axis.axes.set_yscale)("log")
-    wide = np.max(values) > 20.0 * np.min(values)
-    axis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def column(rows: Rows, name: str) -> np.ndarray:
@@ -77,16 +66,6 @@ def singly(rows: Rows, name: str) -> Rows:
     return [{**row, name: value} for row, values in listed for value in values] if listed else rows
 
 
-def panels(count: int, wide: int, size: tuple[float, float], title: str) -> tuple[Figure, list[Axes]]:
-    """Return a figure with ``count`` axes, at most ``wide`` beside each other."""
-    wide = min(wide, count)
-    high = -(-count // wide)
-    figure = Figure(figsize=(size[0] * wide, size[1] * high + 0.5), layout="constrained")
-    if title:
-        figure.suptitle(textwrap.fill(title, round(_LETTERS * figure.get_figwidth())))
-    return figure, [figure.add_subplot(high, wide, place) for place in range(1, count + 1)]
-
-
 def multiples(rows: Rows, scales: Sequence[Scale], values: Mapping[str, str], title: str) -> Figure:
     """Return a figure of columns of ``rows``, given with their titles, over the axes of the table.
 
@@ -97,7 +76,7 @@ def multiples(rows: Rows, scales: Sequence[Scale], values: Mapping[str, str], ti
     of_grid = len(scales) == 1 or len(rows) == np.prod([len(level) for level in levels])
     picks: list[tuple[Any, ...]] = list(itertools.product(*levels[2:])) if of_grid else [(scale,) for scale in scales]
     picks = picks[:: -(-len(picks) // _MOST)]
-    figure, axes = panels(len(picks) * len(values), len(picks) if len(picks) > 1 else 3, (3.8, 3.0), title)
+    figure, axes = figure_with(len(picks) * len(values), len(picks) if len(picks) > 1 else 3, (3.8, 3.0), title)
     drawn = []
     for ax, ((name, words), pick) in zip(axes, itertools.product(values.items(), picks), strict=True):
         fixed = dict(zip((scale.name for scale in scales[2:]), pick, strict=True)) if of_grid else {}
@@ -153,33 +132,3 @@ def _borders(values: np.ndarray, log: bool) -> np.ndarray:
     around = np.pad(np.log(values) if log else values, 1, "reflect", reflect_type="odd")
     borders = 0.5 * (around[1:] + around[:-1])
     return np.asarray(np.exp(borders) if log else borders)
-
-
-class Point(NamedTuple):
-    """A value of a curve: of which panel, and of which line in it."""
-
-    panel: str
-    line: str
-    x: float
-    y: float
-
-
-def curves(points: Sequence[Point], title: str, x: str, y: str, size: tuple[float, float] = (5.0, 4.0)) -> Figure:
-    """Return a figure with a panel for each name of a panel, and its lines, both axes logarithmic; 0 is left out.
-
-    ``x`` and ``y`` are the labels of the axes; without ``x`` the name of the panel is.
-    """
-    names, every = (list(dict.fromkeys(getattr(point, what) for point in points)) for what in ("panel", "line"))
-    figure, axes = panels(len(names) or 1, 3, size, title)
-    for ax, name in zip(axes, names or [""], strict=True):
-        for k, line in enumerate(every):
-            mine = [point for point in points if (point.panel, point.line) == (name, line)]
-            across, up = (np.array([value or np.nan for value in values]) for values in
-                          ([point.x for point in mine], [point.y for point in mine]))  # fmt: skip
-            ax.plot(across, up, label=line, color=f"C{k % 10}", marker=_MARKERS[k % len(_MARKERS)], markersize=4.0,
-                    linewidth=1.1, linestyle=("-", "--", ":")[k // 10 % 3])  # fmt: skip
-        ax.set(yscale="log", title=name if x else "", xlabel=x or name, ylabel=y)
-        logarithmic(ax.xaxis, np.array([point.x for point in points if point.panel == name and point.x] or [1.0]))
-        ax.grid(alpha=0.3)
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", fontsize="small", ncols=5)
-    return figure

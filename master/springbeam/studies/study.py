@@ -8,7 +8,7 @@
   results as soon as its case is done. The first line there says which study it is, with which version and which FMUs.
   Nothing is written before the FMUs are found, and nothing stays where no case was done.
 * A case whose record is there is not computed again. A study with all records is shown at once.
-* Table (``KIND.parquet``, ``KIND.csv``), pictures and what is shown are made from the records alone.
+* `Findings` are made from the records alone: table (``KIND.parquet``, ``KIND.csv``), pictures and what is shown.
 
 `record_all` computes, `Records` is the file, `cli/studies.py` has the commands.
 """
@@ -41,7 +41,7 @@ from ..scene import Scene, SceneError, load_scene, with_changes
 from ..scene.scene import split_key
 from .accuracy import simulate
 from .metrics import Metric, costs
-from .tables import Findings, write_csv, write_parquet
+from .tables import Findings, Row
 
 FILE = "study.jsonl"
 #: Where `study_in` finds each kind.
@@ -54,10 +54,6 @@ _STUDIES = {
     "orders": ".crosscheck:Orders",
     "fit": ".fit:Fit",
 }
-#: Columns of a case and of its record, by name.
-Row = dict[str, Any]
-#: Pictures by the names of their files, figures of matplotlib.
-Pictures = dict[str, Any]
 #: ``report(record)``, called for each record that is new.
 Report = Callable[[Row], None]
 #: Cases under way: on a cluster, and for each process here.
@@ -134,26 +130,13 @@ class Study(BaseModel, ABC):
         return {"status": "lost", "error": cause, "warnings": ""}
 
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
-        """Return the table: a row per case, in their order."""
+        """Return a row per case, in their order: its axes and its record."""
         cases = self.cases()
         return [{"index": k, **cases[name], **record} for k, (name, record) in enumerate(records.items())]
 
     @abstractmethod
     def findings(self, records: Mapping[str, Row]) -> Findings:
-        """Judge the records, which come in the order of the cases."""
-
-    def draw(self, records: Mapping[str, Row]) -> Pictures:
-        """Return pictures by the names of their files."""
-        return {}
-
-    def write(self, records: Mapping[str, Row], directory: Path, *, pictures: bool) -> list[Path]:
-        """Write the table, and with ``pictures`` these, into ``directory``; return the files."""
-        rows, path = self.rows(records), directory / self.kind
-        files = [write_csv(path.with_suffix(".csv"), rows), write_parquet(path.with_suffix(".parquet"), rows)]
-        for name, figure in (self.draw(records) if pictures else {}).items():
-            files.append(directory / f"{name}.png")
-            figure.savefig(files[-1], dpi=110)
-        return files
+        """Judge the records, which come in the order of the cases. The table is named as the study's `kind`."""
 
     def settings(self) -> dict[str, Any]:
         """Return what tells one study from another, with the files that it needs. Raises FmuError if one is missing."""

@@ -10,20 +10,21 @@ critical peak is that at which the metric first reaches its limit, linear betwee
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from pathlib import Path
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from rich.table import Table
 
+from ..pictures.diagrams import Diagram, draw_diagrams
 from ..scene import Load, Scene, SceneError
 from ..scene.messages import unit_of
 from .design import Axis, Sampling, design, parse_axis
 from .metrics import PRINCIPAL, USUAL, Metric, heading, metrics_of
-from .study import Pictures, Row, Study
-from .tables import Findings, table, write_csv
+from .picture import Scale, column, multiples, singly
+from .study import Study
+from .tables import Findings, Row, table
 
 STATUSES = ("done", "stopped", "refused", "lost")
 #: How many rows are shown on the terminal; the files have all.
@@ -72,45 +73,39 @@ class Sweep(Study):
         return {str(index): dict(zip(names, several, strict=True)) for index, several in enumerate(values)}
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
-        """Count the rows by status, and show the first values of metrics that were asked for."""
-        counts = Counter(record["status"] for record in records.values())
-        lines = [f"runs      {', '.join(f'{counts[status]} {status}' for status in STATUSES if counts[status])}"]
+        """Count the rows by status; show the first values of metrics that were asked for, and the damage boundary."""
+        rows, critical, shown = self.rows(records), list[Row](), list[Any]()
+        counts = Counter(row["status"] for row in rows)
         document: dict[str, Any] = {"runs": {status: counts[status] for status in STATUSES}}
+        shown.append(f"runs      {', '.join(f'{counts[status]} {status}' for status in STATUSES if counts[status])}")
+        tables = {self.kind: rows}
         if self.boundary:
-            document["boundary"] = self._critical(records)
-            lines += _told(document["boundary"], self.boundary)
-        shown = [*lines, *([self._first(records)] if self.metric else [])]
-        return Findings(document, shown, code=2 if counts.keys() == {"refused"} else 0)
+            document["boundary"] = critical = self._critical(rows)
+            shown += _told(critical, self.boundary)
+        if critical:
+            tables["sweep-boundary"] = critical
+        if self.metric:
+            names = [*(axis.name for axis in self.axes), *self._shown]
+            cells = [[_in_words(row[name]) for name in names] for row in rows[:_FIRST_ROWS]]
+            several = f"the first {_FIRST_ROWS} of {len(rows)} rows" * (len(rows) > _FIRST_ROWS)
+            shown.append(table(names, cells, several))
+        code = 2 if counts.keys() == {"refused"} else 0
+        return Findings(document, shown, code=code, tables=tables, pictures=self._pictures(rows, critical))
 
-    def _first(self, records: Mapping[str, Row]) -> Table:
-        names = [*(axis.name for axis in self.axes), *self._shown]
-        rows = self.rows(records)
-        cells = [[_in_words(row[name]) for name in names] for row in rows[:_FIRST_ROWS]]
-        return table(names, cells, f"the first {_FIRST_ROWS} of {len(rows)} rows" if len(rows) > _FIRST_ROWS else "")
-
-    def write(self, records: Mapping[str, Row], directory: Path, *, pictures: bool) -> list[Path]:
-        """Write the table, the damage boundary if it is wanted, and with ``pictures`` these."""
-        files = super().write(records, directory, pictures=pictures)
-        if self.boundary and (found := self._critical(records)):
-            files.append(write_csv(directory / "sweep-boundary.csv", found))
-        return files
-
-    def draw(self, records: Mapping[str, Row]) -> Pictures:
-        """Draw what of the metrics the axes change, and the damage boundary: what lies above it damages."""
-        from .picture import Point, Scale, column, curves, multiples, singly
-
-        rows, axes, figures = self.rows(records), self.axes, Pictures()
-        words = [any(isinstance(row[axis.name], str) for row in rows) for axis in axes]
-        labelled = ((axis, self._labelled(axis)) for axis in axes)
-        scales = [Scale(a.name, label, a.log, word) for (a, label), word in zip(labelled, words, strict=True)]
+    def _pictures(self, rows: Sequence[Row], critical: Sequence[Row]) -> dict[str, Callable[[], Any]]:
+        """Return pictures of what of the metrics the axes change, and of the boundary: what lies above it damages."""
+        pictures: dict[str, Callable[[], Any]] = {}
+        words = [any(isinstance(row[axis.name], str) for row in rows) for axis in self.axes]
+        scales = [Scale(a.name, self._labelled(a), a.log, word) for a, word in zip(self.axes, words, strict=True)]
         if shown := {name: heading(name) for name in self._shown if _varies(column(singly(rows, name), name))}:
-            figures["sweep"] = multiples(rows, scales, shown, self.scene.title or "sweep")
-        if self.boundary and (found := self._critical(records)):
-            points = [Point("", self.boundary, pulse["velocity_change"], pulse["peak"]) for pulse in found]
+            pictures["sweep"] = partial(multiples, rows, scales, shown, self.scene.title or "sweep")
+        if critical:
+            points = [(pulse["velocity_change"], pulse["peak"]) for pulse in critical]
             unit = self._load(self._pulse).unit
             labels = (f"velocity change [{'m/s' if unit == 'm/s²' else f'{unit}·s'}]", f"peak [{unit}]")
-            figures["sweep-boundary"] = curves(points, f"damage boundary: {self.boundary}", *labels, (7.0, 4.0))
-        return figures
+            diagram = Diagram(*labels, {self.boundary: points}, "damage boundary")
+            pictures["sweep-boundary"] = partial(draw_diagrams, [diagram], self.scene.title, (7.0, 4.0))
+        return pictures
 
     def _labelled(self, axis: Axis) -> str:
         table, _, key = axis.name.rpartition(".")
@@ -144,7 +139,7 @@ class Sweep(Study):
             raise SceneError("--boundary: takes --vary loads.0.amplitude=… and --vary loads.0.duration=… of one pulse")
         return pulse
 
-    def _critical(self, records: Mapping[str, Row]) -> list[dict[str, float]]:
+    def _critical(self, rows: Sequence[Row]) -> list[Row]:
         """Return the critical pulses by duration; none at durations whose runs stay below the limit.
 
         A critical pulse has its ``duration`` [s], its ``peak``, in the load's unit, and its ``velocity_change``, the
@@ -152,7 +147,7 @@ class Sweep(Study):
         """
         pulse, (metric, limit), found = self._pulse, self._limit, []
         amplitude, duration, load = f"{pulse}.amplitude", f"{pulse}.duration", self._load(pulse)
-        known = [row for row in self.rows(records) if row[metric] is not None]
+        known = [row for row in rows if row[metric] is not None]
         for length in sorted({row[duration] for row in known}):
             pairs = sorted((abs(row[amplitude]), abs(row[metric])) for row in known if row[duration] == length)
             peaks, values = np.array([(0.0, 0.0), *pairs]).T

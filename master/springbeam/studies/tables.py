@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 from rich.text import Text
+
+_DPI = 110
+
+#: Columns of a row by name.
+Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -23,6 +28,25 @@ class Findings:
     code: int = 0  #: exit code of the command
     error: str = ""  #: why, in words
     draw: Callable[[], Findings] | None = None  #: draws pictures, which takes a while, and says where they are
+    #: What belongs into a directory, by the names of the files: tables, each as CSV and Parquet; texts; and pictures,
+    #: which are drawn where they are wanted.
+    tables: Mapping[str, Sequence[Row]] = field(default_factory=dict)
+    texts: Mapping[str, str] = field(default_factory=dict)
+    pictures: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
+
+    def written(self, directory: Path, *, pictures: bool) -> Findings:
+        """Write tables, texts, and with ``pictures`` these into ``directory``; return the findings with the files."""
+        files = []
+        for name, rows in self.tables.items():
+            path = directory / name
+            files += [write_csv(path.with_suffix(".csv"), rows), write_parquet(path.with_suffix(".parquet"), rows)]
+        for name, text in self.texts.items():
+            (directory / name).write_text(text, encoding="utf-8")
+        for name, draw in self.pictures.items() if pictures else ():
+            files.append(directory / f"{name}.png")
+            draw().savefig(files[-1], dpi=_DPI)
+        document = {"directory": directory, "files": files, **self.document}
+        return replace(self, document=document, files=[("results", file) for file in files], where=directory)
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str = "", words: Collection[str] = ()) -> Table:
@@ -41,7 +65,7 @@ def number(value: float | None, form: str, lacking: str = "") -> str:
     return lacking if value is None else format(value, form)
 
 
-def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
+def write_csv(path: Path, rows: Sequence[Row]) -> Path:
     """Write rows, ``None`` left empty, and return the path."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, _names(rows))
@@ -50,7 +74,7 @@ def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     return path
 
 
-def write_parquet(path: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
+def write_parquet(path: Path, rows: Sequence[Row]) -> Path:
     """Write rows, ``None`` as null, and return the path; a column without any value is one of numbers."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -61,5 +85,5 @@ def write_parquet(path: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     return path
 
 
-def _names(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+def _names(rows: Sequence[Row]) -> list[str]:
     return list(dict.fromkeys(name for row in rows for name in row))

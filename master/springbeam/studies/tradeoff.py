@@ -8,15 +8,16 @@ out, `converge` shows). scipy solves the same model as a good user would have it
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import cached_property
+from functools import cached_property, partial
 from time import perf_counter
 from typing import Any, ClassVar
 
 import numpy as np
 
 from ..monolithic import event_driven
+from ..pictures.diagrams import Diagram, draw_diagrams
 from ..results.trajectory import Trajectory
 from ..run.outcome import RunStopped
 from ..run.runner import simulate
@@ -26,8 +27,8 @@ from .comparison import SHORT_SHARE, comparable_until
 from .design import RIGID, SOFT
 from .metrics import costs, errors, motion_errors, worst
 from .rivals import TOLERANCES, Rival
-from .study import Pictures, Row, Study
-from .tables import Findings, number, table
+from .study import Study
+from .tables import Findings, Row, number, table
 
 #: A run that takes longer than this is given up, and finer ones of its family are not begun [s]; quick: ten times less.
 _LIMIT = 10.0
@@ -167,26 +168,23 @@ class Tradeoff(Study):
             table(("configuration", "error", "event [s]", "solve [ms]", "set-up [ms]", "doSteps"), on_front,
                   "Pareto front"),
         ]  # fmt: skip
-        return Findings({"until": until, "cheapest": best, "front": front}, shown)
+        told = {"until": until, "cheapest": best, "front": front}
+        return Findings(told, shown, tables={self.kind: rows}, pictures={self.kind: self._picture(rows, front)})
 
-    def draw(self, records: Mapping[str, Row]) -> Pictures:
-        """Draw the work–precision diagrams: error over time, and over doStep calls."""
-        from .picture import Point, curves
-
-        rows = [row for row in self.rows(records) if np.isfinite(worst(row))]
-        over = {"wall time [s]": "cost_wall_time", "doStep calls of both FMUs": "cost_do_steps"}
-        points = [
-            Point(words, row["family"], row[cost], min(worst(row), 1.0))
-            for words, cost in over.items()
-            for row in rows
-            if cost in row
-        ]
+    def _picture(self, rows: Sequence[Row], front: Sequence[Row]) -> Callable[[], Any]:
+        """Return what draws the work–precision diagrams: error over time, and over doStep calls."""
+        labels = {"cost_wall_time": "wall time [s]", "cost_do_steps": "doStep calls of both FMUs"}
+        diagrams = []
+        for cost, label in labels.items():
+            curves: dict[str, list[Any]] = {row["family"]: [] for row in rows}
+            for row in rows:
+                if cost in row and np.isfinite(worst(row)):
+                    curves[row["family"]].append((row[cost], min(worst(row), 1.0)))
+            if cost == "cost_wall_time":
+                curves["Pareto front"] = [(row[cost], worst(row)) for row in front]
+            diagrams.append(Diagram(label, "largest relative error of u_tip and y", curves))
         title = f"{self.scene.title}: errors up to t = {self.scene.time.t_end:.6g} s"
-        figure = curves(points, title, "", "largest relative error of u_tip and y", (6.0, 6.5))
-        front = pareto(rows)
-        figure.axes[0].plot([row["cost_wall_time"] for row in front], list(map(worst, front)), color="black",
-                            linewidth=6.0, alpha=0.15, zorder=0)  # fmt: skip
-        return {"tradeoff": figure}
+        return partial(draw_diagrams, diagrams, title, (6.0, 6.5))
 
 
 def pareto(rows: Iterable[Row]) -> list[Row]:

@@ -19,8 +19,8 @@ from __future__ import annotations
 
 import statistics
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -29,6 +29,7 @@ from rich.table import Table
 
 from ...bodies.protocol import FmuError
 from ...monolithic import event_driven
+from ...pictures.diagrams import figure_with
 from ...pictures.drawing import BLACK, BLUE, GREEN, ORANGE, SKY, STONE
 from ...results.trajectory import Trajectory
 from ...run.ledger import EXACT, bounds
@@ -38,12 +39,15 @@ from ...scene import SceneError, scene_from_dict
 from ...scene.resolution import with_scheme_chosen
 from ..comparison import PERTURBATION, perturbed
 from ..metrics import motion_errors, worst
-from ..study import Pictures, Row, Study
-from ..tables import Findings, table
+from ..picture import Scale, cells, column
+from ..study import Study
+from ..tables import Findings, Row, table
 from .cells import COUPLINGS, SLICES, UNITS, sampled_cells, scene_dict, slice_cells
 
 #: In the order in which pictures and tables show them; the last must stay empty.
 CLASSES = ("conserved", "dissipative", "approximate", "refused", "stopped", "garbage")
+#: What a coupling is, and columns of the table.
+_NAMES = ("law", "scheme", "degree")
 #: Of `CLASSES`; residuals outside are drawn in the colours of the ends.
 _COLOURS, _RESIDUALS = (BLUE, SKY, GREEN, STONE, ORANGE, BLACK), (1e-16, 1.0)
 #: Quick: the hypercube has so many times fewer cells, each axis of a slice half as many.
@@ -96,7 +100,8 @@ class Grid(Study):
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Count classes; passed if no cell is garbage."""
         bad = {name: record["reason"] for name, record in records.items() if record["kind"] == "garbage"}
-        garbage = [f"garbage   {_file(name)}: {reason}" for name, reason in bad.items()]
+        files = {name: f"stability-garbage-{name}.toml" for name in bad}
+        garbage = [f"garbage   {files[name]}: {reason}" for name, reason in bad.items()]
         errors = [record["error_motion"] for record in records.values() if record["error_motion"] is not None]
         resolved = sum(record["resolved"] for record in records.values())
         beside = f"{resolved} cells call themselves resolved, {len(errors)} were compared with the reference"
@@ -104,70 +109,56 @@ class Grid(Study):
             beside += f": errors {statistics.median(errors):.0e} in the median, at most {max(errors):.0e}"
         classes = Counter(record["kind"] for record in records.values())
         told = {"cells": len(records), "classes": classes, "resolved": resolved, "compared": len(errors)}
-        shown = [self._classes(records), beside, *garbage]
-        return Findings({**told, "garbage": bad}, shown, code=1 if bad else 0)
-
-    def _classes(self, records: Mapping[str, Row]) -> Table:
-        """Return a row per coupling, with the largest residual of the runs that were done."""
-        cells, rows = self.cases(), []
-        for coupling in (*COUPLINGS, None):
-            mine = [r for name, r in records.items() if coupling in (cells[name]["coupling"], None)]
-            counts = Counter(record["kind"] for record in mine)
-            done = [r["residual"] or 0.0 for r in mine if r["kind"] not in ("refused", "stopped")]
-            name = "all" if coupling is None else " ".join(map(str, coupling)).removeprefix("transmission ")
-            rows.append((name, *(str(counts[kind] or "") for kind in CLASSES), f"{max(done):.0e}" if done else ""))
-        names = ("coupling", *(f"{kind[:4]}." for kind in CLASSES), "residual")
-        return table(names, rows, f"{len(records)} cells")
-
-    def rows(self, records: Mapping[str, Row]) -> list[Row]:
-        """Return a row per cell."""
-        names = ("law", "scheme", "degree")
-        return [row | dict(zip(names, row.pop("coupling"), strict=True)) for row in super().rows(records)]
-
-    def write(self, records: Mapping[str, Row], directory: Path, *, pictures: bool) -> list[Path]:
-        """Write the table, the pictures, and the scenes of garbage."""
-        cells = self.cases()
-        for name, record in records.items():
-            if record["kind"] == "garbage":
-                (directory / _file(name)).write_text(tomli_w.dumps(scene_dict(cells[name])), encoding="utf-8")
-        return super().write(records, directory, pictures=pictures)
-
-    def draw(self, records: Mapping[str, Row]) -> Pictures:
-        """Draw maps of the slices: the class of each cell, and its energy residual."""
-        import matplotlib
-        from matplotlib.colors import ListedColormap, LogNorm
-
-        from ..picture import Scale, cells, panels
-
-        slices: dict[str, list[Row]] = {}
-        for row in self.rows(records):
-            number, residual = CLASSES.index(row["kind"]), max(row["residual"] or 0.0, _RESIDUALS[0])
-            if row["slice"]:
-                slices.setdefault(row["slice"], []).append(row | {"classes": number, "residuals": residual})
-        looks: dict[str, dict[str, Any]] = {
-            "classes": {"cmap": ListedColormap(_COLOURS), "vmin": -0.5, "vmax": len(CLASSES) - 0.5},
-            "residuals": {"cmap": matplotlib.colormaps["cividis"], "norm": LogNorm(*_RESIDUALS, clip=True)},
-        }
-        figures = Pictures()
-        for what, look in looks.items() if slices else ():
-            figure, axes = panels(len(slices), 4, (4.2, 3.6), f"Slices through the extremes: {what}")
-            for ax, (name, rows) in zip(axes, slices.items(), strict=True):
-                x, y = (Scale(key, f"{key} [{UNITS.get(key, '–')}]", words=True) for key in SLICES[name][:2])
-                refused = [row["residual"] is None and what == "residuals" for row in rows]
-                drawn = cells(ax, rows, x, y, np.where(refused, np.nan, [row[what] for row in rows]), **look)
-                ax.set(title=name, facecolor=STONE)  # where nothing was run
-                ax.tick_params(labelsize="small")
-                ax.tick_params(axis="x", labelrotation=30)
-            bar = figure.colorbar(drawn, ax=axes, shrink=0.6)
-            bar.set_label("largest energy residual / largest energy so far (grey: refused)" * (what == "residuals"))
-            if what == "classes":
-                bar.set_ticks(range(len(CLASSES)), labels=CLASSES)
-            figures[f"stability-{what}"] = figure
-        return figures
+        cells, rows = self.cases(), self.rows(records)
+        slices = any(row["slice"] for row in rows)
+        return Findings(
+            {**told, "garbage": bad},
+            [_classes(rows), beside, *garbage],
+            code=1 if bad else 0,
+            tables={self.kind: [row | dict(zip(_NAMES, row.pop("coupling"), strict=True)) for row in map(dict, rows)]},
+            texts={file: tomli_w.dumps(scene_dict(cells[name])) for name, file in files.items()},
+            pictures={f"stability-{what}": partial(_drawn, rows, what) for what in ("classes", "residuals") if slices},
+        )
 
 
-def _file(name: str) -> str:
-    return f"stability-garbage-{name}.toml"
+def _classes(rows: Sequence[Row]) -> Table:
+    """Return a row per coupling, with the largest residual of the runs that were done."""
+    shown = []
+    for coupling in (*COUPLINGS, None):
+        mine = [row for row in rows if coupling in (row["coupling"], None)]
+        counts = Counter(row["kind"] for row in mine)
+        done = [row["residual"] or 0.0 for row in mine if row["kind"] not in ("refused", "stopped")]
+        name = "all" if coupling is None else " ".join(map(str, coupling)).removeprefix("transmission ")
+        shown.append((name, *(str(counts[kind] or "") for kind in CLASSES), f"{max(done):.0e}" if done else ""))
+    names = ("coupling", *(f"{kind[:4]}." for kind in CLASSES), "residual")
+    return table(names, shown, f"{len(rows)} cells")
+
+
+def _drawn(rows: Sequence[Row], what: str) -> Any:
+    """Draw maps of the slices: ``classes`` of the cells, or their energy ``residuals``."""
+    from matplotlib.colors import ListedColormap, LogNorm
+
+    look: dict[str, Any] = {"cmap": ListedColormap(_COLOURS), "vmin": -0.5, "vmax": len(CLASSES) - 0.5}
+    if what == "residuals":
+        look = {"cmap": "cividis", "norm": LogNorm(*_RESIDUALS, clip=True)}
+    names = [name for name in SLICES if any(row["slice"] == name for row in rows)]
+    figure, axes = figure_with(len(names), 4, (4.2, 3.6), f"Slices through the extremes: {what}")
+    for ax, name in zip(axes, names, strict=True):
+        mine = [row for row in rows if row["slice"] == name]
+        x, y = (Scale(key, f"{key} [{UNITS.get(key, '–')}]", words=True) for key in SLICES[name][:2])
+        values = np.array([CLASSES.index(row["kind"]) for row in mine], dtype=float)
+        if what == "residuals":
+            values = np.maximum(column(mine, "residual"), _RESIDUALS[0])
+        drawn = cells(ax, mine, x, y, values, **look)
+        ax.set(title=name, facecolor=STONE)  # where nothing was run
+        ax.tick_params(labelsize="small")
+        ax.tick_params(axis="x", labelrotation=30)
+    bar = figure.colorbar(drawn, ax=axes, shrink=0.6)
+    if what == "classes":
+        bar.set_ticks(range(len(CLASSES)), labels=CLASSES)
+    else:
+        bar.set_label("largest energy residual / largest energy so far (grey: refused)")
+    return figure
 
 
 # -- how a cell ends --------------------------------------------------------------------------------------------------

@@ -1,0 +1,66 @@
+"""Diagrams: curves over something else than the time of a run, as errors over cost, spectra, what was measured.
+
+Nothing here loads matplotlib, which takes a second, before something is drawn.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Letters of a title, and inches of an entry of the key, to an inch of a figure.
+_LETTERS, _ENTRY = 9, 2.4
+_MARKERS, _DASHES = "os^DvPX*<", ("-", "--", ":")
+#: A curve of more points than this has no markers.
+_MARKED = 60
+
+
+class Diagram(NamedTuple):
+    """Curves by their names, each of shape (n, 2); and what stands along and above the axes."""
+
+    across: str
+    up: str
+    curves: Mapping[str, Any]
+    title: str = ""
+    log: bool = True  #: both axes; what is not above 0 is left out
+    dots: Collection[str] = ()  #: curves whose points are not joined
+
+
+def draw_diagrams(
+    diagrams: Sequence[Diagram], title: str, size: tuple[float, float] = (5.0, 4.0), wide: int = 3
+) -> Figure:
+    """Return a figure of diagrams of ``size`` [inch], ``wide`` of them side by side; names have one look in all."""
+    figure, axes = figure_with(len(diagrams), wide, size, title)
+    names, key = list(dict.fromkeys(name for diagram in diagrams for name in diagram.curves)), {}
+    for ax, diagram in zip(axes, diagrams, strict=True):
+        scale = "log" if diagram.log else "linear"
+        ax.set(title=diagram.title, xlabel=diagram.across, ylabel=diagram.up, xscale=scale, yscale=scale)
+        ax.grid(alpha=0.3)
+        for name, curve in diagram.curves.items():
+            k, dots, points = names.index(name), name in diagram.dots, np.reshape(np.array(curve, float), (-1, 2))
+            seen = points[np.all(points > 0.0, axis=1)] if diagram.log else points
+            marker = "." if dots else _MARKERS[k % len(_MARKERS)] if len(seen) <= _MARKED else ""
+            (key[name],) = ax.plot(*seen.T, color=f"C{k % 10}", marker=marker, markersize=4.0, linewidth=1.1,
+                                   linestyle="none" if dots else _DASHES[k % len(_DASHES)])  # fmt: skip
+    columns = max(1, int(figure.get_figwidth() / _ENTRY))
+    figure.legend(key.values(), key, loc="outside lower center", fontsize="small", ncols=columns)
+    return figure
+
+
+def figure_with(count: int, wide: int, size: tuple[float, float], title: str) -> tuple[Figure, list[Axes]]:
+    """Return a figure with ``count`` axes of ``size`` [inch], at most ``wide`` beside each other."""
+    from matplotlib.figure import Figure
+
+    wide = max(1, min(wide, count))
+    high = -(-count // wide)
+    figure = Figure(figsize=(size[0] * wide, size[1] * high + 0.5), layout="constrained")
+    if title:
+        figure.suptitle(textwrap.fill(title, round(_LETTERS * figure.get_figwidth())))
+    return figure, [figure.add_subplot(high, wide, place) for place in range(1, count + 1)]
