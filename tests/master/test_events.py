@@ -15,7 +15,7 @@ from springbeam.coupling.protocol import Step
 from springbeam.results.paths import Path
 from springbeam.run.detection import Detector
 from springbeam.run.macro_steps import MacroGrid
-from springbeam.run.separation import Separation
+from springbeam.run.separation import first_by_force
 from springbeam.run.stepping import Pair
 from springbeam.scene import load_scene, with_changes
 
@@ -96,7 +96,7 @@ def test_a_motion_that_jumps_with_the_size_of_the_step_has_no_event(jump, refuse
 
 
 def pushing(monkeypatch, push, seated=False):
-    """A `Separation` of ends that touch, and its state and attempts: in a step of H, ``push(H)`` [N] is what may end.
+    """A pair whose ends touch, and its state: in a step of H, ``push(H)`` [N] is what may end.
 
     A force that turns a mismatch round, 3 N of the contact's, is no part of it.
     """
@@ -119,7 +119,7 @@ def pushing(monkeypatch, push, seated=False):
 def test_the_zero_of_a_force_is_where_the_step_that_tells_it_best_has_it(monkeypatch, seated):
     """0.5 N + 100 N/s · H − 1 kN/s · τ in a step of H: with H = τ/s its zero is at 0.5/(1000 − 100/s) s."""
     pair, state = pushing(monkeypatch, lambda size: (0.5 + 100.0 * size, -1000.0, 0.0), seated)
-    step, event = Separation(pair, 1e-9).first_event(state, pair.attempt(state, 1e-3, pair.ends()), 1e-3)
+    step, event = first_by_force(pair, state, pair.attempt(state, 1e-3, pair.ends()), 1e-3)
     assert event == ("unseated" if seated else "separation")
     assert step.size == pytest.approx(0.5 / (1000.0 - 100.0 / pair.joined.sharpest), abs=1e-11)
 
@@ -127,7 +127,7 @@ def test_the_zero_of_a_force_is_where_the_step_that_tells_it_best_has_it(monkeyp
 def test_a_force_that_longer_trial_steps_know_nothing_of_vanishes_where_its_own_step_has_it(monkeypatch):
     """A step of 0.1 H, in which it falls to 0 in the middle; steps of 0.25 H begin below 0. It did so at the start."""
     pair, state = pushing(monkeypatch, lambda size: (0.05 if size <= 1e-4 else -0.01, -1000.0, 0.0))
-    step, event = Separation(pair, 1e-9).first_event(state, pair.attempt(state, 1e-4, pair.ends()), 1e-3)
+    step, event = first_by_force(pair, state, pair.attempt(state, 1e-4, pair.ends()), 1e-3)
     assert (event, step.size) == ("separation", pytest.approx(5e-5, abs=1e-15))
 
 

@@ -15,9 +15,7 @@ import numpy as np
 
 from ..scene import Load
 from .force import combined, work_on
-from .protocol import NO_FORCE, Body, Energies, Force, Motion
-
-_SIZES_REMEMBERED = 64
+from .protocol import NO_FORCE, SIZES_REMEMBERED, Body, Energies, Force, Motion
 
 
 class EndLoaded(Body):
@@ -78,7 +76,7 @@ class SpringDamper(EndLoaded):
         self.mass, self._stiffness, self._damping, self._rest = mass, stiffness, damping, rest
         self._load, self._sign = external_force, 1.0
         self.state = MassState(Motion(displacement, velocity, 0.0, 0.0))
-        self._maps = lru_cache(_SIZES_REMEMBERED)(self._map)
+        self._maps = lru_cache(SIZES_REMEMBERED)(self._map)
 
     def take_place(self, *, upper: bool) -> None:
         self._sign = 1.0 if upper else -1.0

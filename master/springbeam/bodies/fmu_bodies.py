@@ -5,7 +5,7 @@ One module, though longer than others: every step of a run passes through all of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from math import isfinite
 from struct import Struct
@@ -20,7 +20,19 @@ from .elements import EndLoaded
 from .fmu import Fmu, Value
 from .force import combined
 from .functions import DISCARD, OK, WARNING, Failure
-from .protocol import NO_FORCE, BeamBody, Body, BodyFailed, Energies, Felt, FmuError, Force, Motion, StepRefused
+from .protocol import (
+    NO_FORCE,
+    BeamBody,
+    Body,
+    BodyFailed,
+    Energies,
+    Felt,
+    FmuError,
+    Force,
+    Motion,
+    StepRefused,
+    made_of,
+)
 
 #: The numbers by which the beam FMU knows its alternatives.
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
@@ -147,13 +159,6 @@ class FmuState(NamedTuple):
     dissipated: float = 0.0  #: before the FMU was last started again [J]
 
 
-#: ``Motion(*values)`` and its like in a third of the time.
-_motion_of: Callable[[type[Motion], tuple[float, ...]], Motion] = tuple.__new__
-_energies_of: Callable[[type[Energies], tuple[float, ...]], Energies] = tuple.__new__
-_felt_of: Callable[[type[Felt], tuple[float, ...]], Felt] = tuple.__new__
-_state_of: Callable[[type[FmuState], tuple[Motion, tuple[float, ...], float, float]], FmuState] = tuple.__new__
-
-
 class FmuBody(Body):
     """A body of an FMU: what the numbers mean that go through its port."""
 
@@ -278,8 +283,8 @@ class OwnBody(FmuBody):
         return self._take(self._port.step(time, size, c, n, *values, impulse, dc, ddc, dn, ddn, *slopes))
 
     def _take(self, told: tuple[float, ...]) -> Motion:
-        motion = _motion_of(Motion, told[:4])
-        self.state = _state_of(FmuState, (motion, told, 0.0, self.state.dissipated))
+        motion = made_of(Motion, told[:4])
+        self.state = made_of(FmuState, (motion, told, 0.0, self.state.dissipated))
         return motion
 
     def energies(self) -> Energies:
@@ -289,7 +294,7 @@ class OwnBody(FmuBody):
             of_loads = -self._constants["external_force"] * motion.displacement
         else:
             of_loads = -load[0] if self._shares else load[0]
-        return _energies_of(Energies, (kinetic, potential, before + dissipated, of_loads))
+        return made_of(Energies, (kinetic, potential, before + dissipated, of_loads))
 
     def close(self) -> None:
         self.fmu.give_back()
@@ -348,7 +353,7 @@ class FmuBeam(OwnBody, BeamBody):
         return [(f"distributed_load_{i}" if i else "distributed_load", s) for i, s in enumerate(shape) if s != 0.0]
 
     def felt(self) -> Felt:
-        return _felt_of(Felt, self._felt())
+        return made_of(Felt, self._felt())
 
     def shape(self) -> np.ndarray:
         """See `BeamBody.shape`."""

@@ -83,7 +83,7 @@ def _check(fmu: Fmu, name: str, key: str, wanted: str) -> None:
 def _told(spec: ForeignFmu, found: Findings) -> dict[str, str]:
     """Return the names of what an FMU tells after a step by their keys: first of its motion, then of its energies."""
     keys = (*spec.MOTION, *(spec.ENERGIES if found.abilities.energies else ()))
-    return {key: name for key, name in zip(keys, spec.named(keys), strict=True) if name is not None}
+    return {key: name for key in keys if (name := getattr(spec, key)) is not None}
 
 
 class ForeignState(NamedTuple):

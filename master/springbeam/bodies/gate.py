@@ -11,7 +11,7 @@ from dataclasses import replace
 from math import inf
 from typing import Any
 
-from ..scene import Scene, SceneError
+from ..scene import SAME, Scene, SceneError
 from ..scene.messages import Rule, told
 from ..scene.tables import ORDINARY_SCHEMES
 from .protocol import Abilities, Body
@@ -28,8 +28,6 @@ _LACKS = {
 }
 _TO_BE_STRUCK = ("state", "any_size", "velocity", "impulse")
 _LEFT_OUT, _MULTIPLE = 'leave it out, or use scheme = "energy"', "use a multiple of {coupling.macro_step}"
-#: A share of a step that is rounding.
-_SAME = 1e-9
 
 
 def _exchanges(scene: Scene) -> bool:
@@ -41,7 +39,7 @@ def _falls_between(scene: Scene) -> bool:
     H, start = scene.coupling.H, scene.contact_time or 0.0
     kinks = [t for load in scene.loads if not load.is_finer_than(H) for t in load.kinks]
     steps = [(t - start) / H for t in kinks if start <= t < scene.time.t_end]
-    return any(abs(n - round(n)) > _SAME for n in steps)
+    return any(abs(n - round(n)) > SAME for n in steps)
 
 
 def _followed(scene: Scene, body: Abilities, table: str) -> dict[str, Any]:

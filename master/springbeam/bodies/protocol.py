@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
@@ -13,6 +13,8 @@ from ..scene import Load, SceneError
 
 #: A force over one step, as FMI carries it: (F, Ḟ, F̈) at the step's start [N, N/s, N/s²].
 Force = tuple[float, float, float]
+#: Step sizes for which a body or a coupling remembers its response: the macro step's, and some of steps cut by events.
+SIZES_REMEMBERED = 64
 #: An impulse that changes the velocity by less than this share is rounding.
 ROUNDED_IMPULSE = 1e-12
 #: No force over the whole step.
@@ -39,6 +41,10 @@ class Motion(NamedTuple):
     integral: float  #: ∫ w dτ over the last step [m·s]
     integral_2: float  #: ∫∫ w dτ dτ over the last step [m·s²]
 
+
+_T = TypeVar("_T", bound=tuple[Any, ...])
+#: ``made_of(kind, values)`` is ``kind(*values)`` of a named tuple in a third of the time.
+made_of: Callable[[type[_T], tuple[Any, ...]], _T] = tuple.__new__
 
 #: The interface ends (tip, lower end): the spring top, or without a spring the foundation.
 Ends = tuple[Motion, Motion]

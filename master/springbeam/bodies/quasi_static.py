@@ -29,9 +29,7 @@ from numpy.polynomial import legendre
 from ..scene import Beam, statics
 from ..scene.statics import SHAPE_POINTS
 from . import force
-from .protocol import NO_FORCE, BeamBody, Energies, Force, Motion
-
-_SIZES_REMEMBERED = 16
+from .protocol import NO_FORCE, SIZES_REMEMBERED, BeamBody, Energies, Force, Motion
 
 
 class BendState(NamedTuple):
@@ -70,7 +68,7 @@ class QuasiStaticBeam(BeamBody):
         self._load_shear, self._load_moment = statics.load_forces(beam, self._arm)
         self._rest, self._load_energy = statics.tip_load_deflection(beam), statics.load_energy(beam)
         self.state = BendState(tip - self._rest, velocity)
-        self._responses = lru_cache(_SIZES_REMEMBERED)(self._response)
+        self._responses = lru_cache(SIZES_REMEMBERED)(self._response)
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         k = self._stiffness

@@ -9,30 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
-
-import numpy as np
 
 from ..bodies.protocol import Ends
-from ..results.paths import Means, Sample
+from ..results.paths import EPS, Means, Sample
 from ..results.trajectory import EventKind
 from ..scene import Beam, Scene, Spring
 from ..scene.statics import tip_compliance, tip_load_deflection
 from .laws import SoftLaw
 from .phases import Joint, Phase
 
-_EPS = float(np.finfo(float).eps)
 _MAX_EVALUATIONS = 60
-
-
-class EventFunction(Protocol):
-    """f of the ends (tip, lower end), positive while nothing happens."""
-
-    def __call__(self, ends: Ends) -> Sample:
-        """Return f and ḟ."""
-
-    def means(self, ends: Ends, size: float) -> Means | None:
-        """Return the means of f over the step of ``size`` [s] that has ended at ``ends``; ``None`` if nobody knows."""
 
 
 class Gap:
@@ -88,6 +74,11 @@ class Holding:
 
     def means(self, ends: Ends, size: float) -> None:
         return None
+
+
+#: f of the ends (tip, lower end), positive while nothing happens. A call returns f and ḟ, `means` those of f over the
+#: step of a size [s] that has ended at ``ends``, ``None`` if nobody knows.
+EventFunction = Gap | Height | Holding
 
 
 class EventFunctions:
@@ -147,7 +138,7 @@ class EventFunctions:
 def position_tolerance(ends: Ends, level: float, macro_step: float) -> float:
     """What positions can be told apart to [m]: rounding of the displacements, and of the foundation's ``level``."""
     (u, v, _, _), (y, z, _, _) = ends
-    return 8.0 * _EPS * max(u, -u, y, -y, level, -level) + 1e-15 * max(v, -v, z, -z) * macro_step
+    return 8.0 * EPS * max(u, -u, y, -y, level, -level) + 1e-15 * max(v, -v, z, -z) * macro_step
 
 
 def no_dip(start: Sample, end: Sample, size: float, fastest: float) -> bool:
@@ -169,7 +160,7 @@ def locate(evaluate: Callable[[float], Sample], guess: float, size: float, toler
     is only the first guess of df/dh: where both ends differ in velocity, the force of a step, and with it the motion,
     changes with h.
     """
-    low, high, h = 0.0, size, max(guess, _EPS * size)
+    low, high, h = 0.0, size, max(guess, EPS * size)
     last: tuple[float, float] | None = None
     for _ in range(_MAX_EVALUATIONS):
         value, rate = evaluate(h)
@@ -179,7 +170,7 @@ def locate(evaluate: Callable[[float], Sample], guess: float, size: float, toler
             low = h
         else:
             high = h
-        if high - low <= 4.0 * _EPS * max(abs(time), size):
+        if high - low <= 4.0 * EPS * max(abs(time), size):
             return h
         slope = rate
         if last is not None:

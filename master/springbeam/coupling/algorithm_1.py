@@ -16,7 +16,7 @@ from ..contact.laws import Compliance
 from ..contact.phases import Impact, Joint, Phase
 from ..results.trajectory import EventKind
 from ..scene import Scene
-from .protocol import Booking, Counts, Coupling, Settled, Step
+from .protocol import Booking, Counts, Coupling, Step
 
 _MAX_ITERATIONS = 50
 #: Newton's tolerance of the spring's and the tip's position (section 6: ε = 1e-12) [m].
@@ -103,17 +103,17 @@ class Algorithm1(Coupling):
         ends = (upper.motion(), lower.motion())
         return Step(time, size, (contact, 0.0, 0.0), (foundation, 0.0, 0.0), start, ends)
 
-    def settle(self, time: float, upper: Body, lower: Body) -> Settled:
+    def settle(self, time: float, upper: Body, lower: Body) -> tuple[Phase, EventKind | None, Impact]:
         """Return the phase; the first contact is where a step ends with the tip at Ψ or below, or the run begins so."""
         (phase, impulse), tip = self.state.made or (_FREE, 0.0), upper.motion()
         if self.state.touched or tip.displacement > self._spring.equilibrium:
             event = EventKind.STOP_IMPACT if phase is _SEATED else None
-            return Settled(phase, event, Impact(of_foundation=impulse))
+            return phase, event, Impact(of_foundation=impulse)
         self.state.touched, self.state.acting = True, self._stiffness
         # Line 5, or ẏ(t_c) as the scene has it.
         z = tip.velocity if self._impact == "tip" else lower.motion().velocity
         lower.restart(time, self._spring.equilibrium, z, lower.energies().dissipated)
-        return Settled(phase if self.state.made else _TIED, EventKind.IMPACT)
+        return phase if self.state.made else _TIED, EventKind.IMPACT, Impact()
 
     def booking(self, ends: Ends) -> Booking:
         return Booking(law_force=self.state.law_force)

@@ -23,7 +23,7 @@ import numpy as np
 
 from ..bodies.protocol import Ends
 from ..contact.laws import SoftLaw
-from ..results.paths import sign_changes
+from ..results.paths import EPS, sign_changes
 from .protocol import Booking, Counts, Coupling, Step
 from .small import Matrix, Vector, transposed
 from .solver import SCHEMES
@@ -33,7 +33,6 @@ _Path = tuple[float, float, float, float]
 #: Points s of a quadrature on [−1, 1], and their weights.
 _Rule = Sequence[tuple[float, float]]
 
-_EPS = 2.0**-52
 #: p̃ keeps its size, or keeps off zero, if the least of its Bézier points is above this share of the largest.
 _STEADY, _OFF_ZERO = 0.9, 0.3
 #: Relative change of p over a step up to which the quotient ΔΦ/Δp would lose more than two digits.
@@ -165,7 +164,7 @@ class Projection:
         w0, w1, w2 = b1 * moments[0], 2.0 * b2 * moments[1], 3.0 * b3 * moments[2]
         before, after = self.law.potential(start), self.law.potential(end)
         missing = after - before - w0 - w1 - w2
-        if abs(missing) <= 8.0 * _EPS * (before + after + abs(w0) + abs(w1) + abs(w2)):
+        if abs(missing) <= 8.0 * EPS * (before + after + abs(w0) + abs(w1) + abs(w2)):
             return 0.0
         square = 2.0 * (b1 + b3) ** 2 + 8.0 / 3.0 * b2 * b2 + 1.6 * b3 * b3
         return missing / square if square > 0.0 else 0.0

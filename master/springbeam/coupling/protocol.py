@@ -26,10 +26,6 @@ class Step(NamedTuple):
     end: Ends
 
 
-#: ``Step(*values)`` in a third of the time.
-step_of: Callable[[type[Step], tuple[float, float, Force, Force, Ends, Ends]], Step] = tuple.__new__
-
-
 class Booking(NamedTuple):
     """What a coupling adds to a record: the force of its law [N], and energies beside those of the bodies [J]."""
 
@@ -40,14 +36,6 @@ class Booking(NamedTuple):
 
 
 NOTHING_BOOKED = Booking()
-
-
-class Settled(NamedTuple):
-    """What a coupling that decides phases has made of a step; both bodies already show it."""
-
-    phase: Phase
-    event: EventKind | None = None  #: its kind
-    impact: Impact = Impact()
 
 
 class Scales(NamedTuple):
@@ -104,8 +92,11 @@ class Coupling(Stateful):
     def accept(self, step: Step) -> None:
         """Count from now on what ``step``, which is made, has dissipated."""
 
-    def settle(self, time: float, upper: Body, lower: Body) -> Settled:
-        """Return the phase at ``time`` [s], at the start of the run or at the end of a step, of one that `decides`."""
+    def settle(self, time: float, upper: Body, lower: Body) -> tuple[Phase, EventKind | None, Impact]:
+        """Return what one that `decides` has made of the last step, or of the start of the run, at ``time`` [s].
+
+        That is the phase, and the kind of an event, if there was one, with its impact; both bodies show it already.
+        """
         raise NotImplementedError
 
     def report(self) -> tuple[dict[str, Any], list[str]]:

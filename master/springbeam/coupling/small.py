@@ -58,8 +58,6 @@ def inverse(A: Matrix) -> Matrix:
         determinant = a * first + b * second + c * third
     if determinant == 0.0 or not isfinite(determinant):
         raise np.linalg.LinAlgError
-    if len(A) == 1:
-        return [[1.0 / determinant]]
     return [[minor / determinant for minor in row] for row in minors]
 
 

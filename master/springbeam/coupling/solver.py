@@ -20,8 +20,8 @@ import msgspec
 import numpy as np
 
 from ..bodies import force
-from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Motion
-from .protocol import Conditions, Counts, Coupling, NotConverged, Step, step_of
+from ..bodies.protocol import NO_FORCE, SIZES_REMEMBERED, Body, Ends, Force, Motion, made_of
+from .protocol import Conditions, Counts, Coupling, NotConverged, Step
 from .small import Matrix, Vector, broyden, inverse, less, secant, times, transposed
 
 _log = logging.getLogger(__name__)
@@ -31,9 +31,6 @@ _MAX_ITERATIONS = 20
 _ROUNDING = 16.0 * float(np.finfo(float).eps)
 #: An iteration that takes so long has met the bodies' own rounding: so many tolerances, or that of the tip's modes.
 _LATE, _NOISE = 8, 1e3
-
-#: Step sizes whose responses are remembered: the macro step's, and some of steps cut by events.
-SIZES_REMEMBERED = 64
 
 
 def _end(m: Motion, size: float) -> tuple[float, ...]:
@@ -133,7 +130,7 @@ class StepSolver(Coupling):
         r_lower = conditions(lower_end, size)
         gap = list(map(sub, r_upper, r_lower))
         if not any(a) and self.no_contact(gap, size, start):
-            return step_of(Step, (time, size, acting, NO_FORCE, start, (upper_end, lower_end)))
+            return made_of(Step, (time, size, acting, NO_FORCE, start, (upper_end, lower_end)))
         B, descent, measured = remembered = self.state.of_size.get(size, _UNKNOWN)
         predicted = B is None  # whether the upper body is elsewhere than at its end under ``a``
         if B is None:
@@ -206,7 +203,7 @@ class StepSolver(Coupling):
         state.of_size[size] = (B, descent, measured)
         if len(state.of_size) > SIZES_REMEMBERED:  # the one that was used least recently is forgotten
             del state.of_size[next(iter(state.of_size))]
-        return step_of(Step, (time, size, acting, NO_FORCE, start, (upper_end, lower_end)))
+        return made_of(Step, (time, size, acting, NO_FORCE, start, (upper_end, lower_end)))
 
     def _free_response(self, lower: Body, size: float) -> Matrix:
         if lower.mass == inf:

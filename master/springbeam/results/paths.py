@@ -23,7 +23,7 @@ _EVEN, _ODD = 1.0 / 16.0, 0.0178885438
 #: By how much the last of the moments moves a path at most, over the size of its coefficient of s⁵, 2 odd: about the
 #: error of the path, where that is not small.
 LAST_MOMENT = 0.5 * _ODD
-_EPS, _MAX_ITERATIONS = 2.0**-52, 100
+EPS, _MAX_ITERATIONS = 2.0**-52, 100
 
 
 class Path(NamedTuple):
@@ -136,6 +136,6 @@ def _zero(coefficients: Sequence[float], slopes: Sequence[float], below: float, 
         x = x - found / slope if slope else inf
         if not min(below, above) < x < max(below, above):
             x = before if found == 0.0 else 0.5 * (below + above)
-        if abs(x - before) <= _EPS * abs(x):
+        if abs(x - before) <= EPS * abs(x):
             break
     return x

@@ -12,9 +12,9 @@ from ..bodies.protocol import Memory, Stateful
 from ..contact.phases import Phase
 from ..coupling.protocol import Scales, Step
 from ..results.paths import Path
-from ..scene import Scene
+from ..scene import SAME, Scene
 from ..scene.statics import tip_compliance
-from .macro_steps import SAME, SHORT_REMAINDER
+from .macro_steps import SHORT_REMAINDER
 from .outcome import RunStopped
 from .stepping import Pair, State
 

@@ -20,18 +20,16 @@ from ..contact.phases import VELOCITY_ROUNDING, Joint, common_velocity
 from ..coupling.protocol import Step
 from ..results.paths import Path, Place, Sample
 from ..results.trajectory import Event, EventKind
-from ..scene import Scene
+from ..scene import SAME, Scene
 from .adaptive import AdaptiveSteps
 from .macro_steps import MacroGrid
-from .separation import Separation
+from .separation import first_by_force, no_step
 from .stepping import Pair, State
 
 #: Trial steps to the bottom of a dip.
 _MAX_DIP_TRIALS = 8
 #: Position tolerances by which the motion at a located event may be off before it is none.
 _JUMP = 1e5
-#: An event closer to the start of a step than this fraction of H happens at the start.
-_NO_TIME = 1e-9
 
 
 class Detector:
@@ -40,7 +38,6 @@ class Detector:
     def __init__(self, scene: Scene, pair: Pair, steps: MacroGrid | AdaptiveSteps) -> None:
         self._pair, self._steps = pair, steps
         tip_share = common_velocity(1.0, 0.0, pair.upper.mass, pair.lower.mass)
-        self._separation = Separation(pair, _NO_TIME)
         self._functions = EventFunctions(scene, pair.law, tip_share, pair.equilibrium)
         self._level = pair.stop or 0.0
 
@@ -49,9 +46,9 @@ class Detector:
         return position_tolerance(ends, self._level, self._steps.size)
 
     def simultaneity_tolerance(self, ends: Ends) -> float:
-        """Position tolerance plus the distance covered in `_NO_TIME`·H [m]; events within it are simultaneous."""
+        """Position tolerance plus the distance covered in `SAME`·H [m]; events within it are simultaneous."""
         speed = max(abs(end.velocity) for end in ends)
-        return self.tolerance(ends) + _NO_TIME * self._steps.size * speed
+        return self.tolerance(ends) + SAME * self._steps.size * speed
 
     def _rest(self, state: State, ends: Ends) -> float:
         """Speed below which ends do not move against each other [m/s].
@@ -84,7 +81,7 @@ class Detector:
                 step, found = self._first_by_position(state, touched)
         if step.size == 0.0:
             return step, found
-        unilateral = self._separation.first_event(state, step, self._steps.size)
+        unilateral = first_by_force(self._pair, state, step, self._steps.size)
         if unilateral is None:
             return self._pair.repeated(state, step), found
         cut, kind = unilateral
@@ -121,9 +118,9 @@ class Detector:
                 break
             guess, found, function, bracket = min(candidates, key=lambda c: c[0])
             step = self._located(state, function, bracket, guess)
-            if step.size < _NO_TIME * self._steps.size:
+            if step.size < SAME * self._steps.size:
                 # Too short for a contact force: velocities that differ would be turned round by an infinite one.
-                return self._separation.no_step(step), found
+                return no_step(self._pair, step), found
         return step, found
 
     # -- events told by positions -----------------------------------------------------------------------------------

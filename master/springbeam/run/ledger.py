@@ -164,7 +164,7 @@ class Neglect:
             share > allowed,
             lambda row: (
                 f"coupling.feedback = {self._coupling.feedback!r} may by now neglect {motion[row]:.3g} m of the "
-                f"driving end's motion, {share[row]:.2g} of the largest penetration; allowed is coupling.feedback_tolerance = "
-                f"{allowed:g}. Take 'two_way', or allow more"
+                f"driving end's motion, {share[row]:.2g} of the largest penetration; allowed is "
+                f"coupling.feedback_tolerance = {allowed:g}. Take 'two_way', or allow more"
             ),
         )

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..bodies import force
 from ..bodies.protocol import NO_FORCE, Body, Force
-from ..scene import Load, Scene
+from ..scene import SAME, Load, Scene
 from ..scene.loads import LINES_IN_STEP
 
 #: Which loads act on which body.
@@ -24,8 +24,6 @@ ON_BEAM, ON_SPRING = ("beam", "tip", "base"), ("spring", "base")
 #: Points of the quadrature of a table, whose pieces are cubic at most, and of another signal, which has one more for
 #: each radian that it turns.
 _OF_TABLE, _POINTS = 3, 8
-#: A jump closer to an end of a step than this share of it is at that end.
-_SAME = 1e-9
 #: (2k + 1)/2, by which a moment against P_k on [−1, 1] becomes the coefficient of P_k.
 _NORMS = np.array([0.5, 1.5, 2.5])
 _gauss = lru_cache(maxsize=64)(np.polynomial.legendre.leggauss)
@@ -55,7 +53,7 @@ class Signal:
 
     def over(self, time: float, size: float) -> Force:
         """Return the projection onto a step of ``size`` [s] from ``time`` [s] on."""
-        load, middle, same = self._load, time + 0.5 * size, _SAME * size
+        load, middle, same = self._load, time + 0.5 * size, SAME * size
         if time >= self._end:
             return NO_FORCE
         cuts = self._edges[bisect_right(self._edges, time + same) : bisect_left(self._edges, time + size - same)]

@@ -5,14 +5,12 @@ from __future__ import annotations
 from math import inf
 
 from ..bodies.protocol import Stateful
-from ..scene.scene import SHORTEST_STEP
+from ..scene.scene import SAME, SHORTEST_STEP
 
 #: A remainder of the macro grid shorter than this fraction of H joins the next step.
 SHORT_REMAINDER = 0.25
 #: The first step after an impact, as a fraction of H: ends that have just met often part or meet again within H.
 _AFTER_IMPACT = 0.125
-#: Times closer than this fraction of H are one.
-SAME = 1e-9
 
 
 class MacroGrid(Stateful):

@@ -24,7 +24,7 @@ from ..results.recording import Recorder
 from ..results.steps import BEAM_TELLS, SPRING_TELLS, STEP, packed
 from ..results.totals import totals
 from ..results.trajectory import Event, EventKind
-from ..scene import Scene
+from ..scene import SAME, Scene
 from ..scene.resolution import force_window, peak_force_doubt, with_scheme_chosen
 from .adaptive import AdaptiveSteps
 from .detection import Detector
@@ -35,8 +35,6 @@ from .observed import mismatch, not_shown, why_not_resolved
 from .outcome import RunStopped, cause_of
 from .stepping import SIMULTANEOUS, Pair, State
 
-#: A load that jumps or bends within this fraction of H has done so.
-_SAME_TIME = 1e-9
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
 _NOTHING_FELT = (0.0, 0.0, 0.0, 0.0)
@@ -156,10 +154,10 @@ class Master(Stateful):
 
     def _step(self) -> None:
         state, steps, pair = self.state, self._steps, self._pair
-        kink = pair.loads.next_kink(state.time + _SAME_TIME * steps.size, steps.size) if pair.loads.any else inf
+        kink = pair.loads.next_kink(state.time + SAME * steps.size, steps.size) if pair.loads.any else inf
         target, size = steps.next(state.time, kink, struck=state.struck == state.time)
         step, event = self._advance(size, to_kink=target == kink)
-        whole = event is None and abs(step.size - size) <= 1e-9 * steps.size
+        whole = event is None and abs(step.size - size) <= SAME * steps.size
         end = target if whole else state.time + step.size
         if event is not None:
             state.count_event(end, steps.size)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -25,7 +25,7 @@ from .outcome import Progress, RunStopped
 from .stepping import State
 
 
-class Simulation:
+class Simulation(AbstractContextManager["Simulation"]):
     """One run of a scene, a step at a time.
 
     Parameters
@@ -85,9 +85,6 @@ class Simulation:
             path = self.recorder.directory.checkpoint
             raise CheckpointRefused(f"{path}: written by another version: {error}") from error
         self.recorder.restore(start.results)
-
-    def __enter__(self) -> Simulation:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -16,6 +16,7 @@ from ..contact.phases import Joint, Phase
 from ..coupling.protocol import Step
 from ..results.paths import Sample, sign_changes
 from ..results.trajectory import EventKind
+from ..scene import SAME
 from .stepping import Pair, State
 
 #: Of the macro step: the shortest trial step to find where the contact force vanishes, and how well it is found.
@@ -24,96 +25,94 @@ _SHORTEST_LOOK, _SHARP = 0.25, 1e-9
 _EARLY = 0.1
 
 
-class Separation:
-    """Finds where the force of a unilateral phase vanishes; the bodies are left where the returned step ends.
+def first_by_force(pair: Pair, state: State, step: Step, macro_step: float) -> tuple[Step, EventKind] | None:
+    """Return ``step`` cut to the event that a force tells of, and its kind; ``None`` if none is due.
 
-    ``no_time`` is the fraction of H below which an event happens at the start of its step.
+    It is of size 0 if the event is at its start; the bodies are left at its end.
     """
+    event = _ending(pair, state.phase)
+    if event is None:
+        return None
+    coupling, f = pair.coupling(state.phase), _push(pair, state.phase, step)
+    by_line = coupling.degree == 0 and (state.phase.joint is not Joint.FREE or f[1:] == (0.0, 0.0))
+    if by_line:
+        middle = state.time + 0.5 * step.size, force.mean(f, step.size)
+        f, state.pushed = _line(state.pushed, middle, state.time), middle
+    if f[0] < 0.0:
+        # The sign at the start may be a false alarm: it is one if the ends, let go, close.
+        if not (state.reclosed and state.steps_in_phase == 0) and _opens(pair, state, step, event):
+            return no_step(pair, step), event
+        step = pair.repeated(state, step)
+    falling = [tau for tau in sign_changes((f[0], f[1], 0.5 * f[2]), 0.0, step.size) if f[1] + tau * f[2] < 0.0]
+    if not falling:
+        return None
+    zero = falling[0]
+    if not by_line:
+        zero = _sharpened(pair, zero, abs(f[1] + zero * f[2]), state, step, macro_step)
+    return pair.attempt(state, zero, step.start), event
 
-    def __init__(self, pair: Pair, no_time: float) -> None:
-        self._pair, self._no_time = pair, no_time
 
-    def first_event(self, state: State, step: Step, macro_step: float) -> tuple[Step, EventKind] | None:
-        """Return ``step`` cut to the event, of size 0 if it is at the start, and its kind; ``None`` if none is due."""
-        event = self._ending(state.phase)
-        if event is None:
-            return None
-        coupling, f = self._pair.coupling(state.phase), self._push(state.phase, step)
-        by_line = coupling.degree == 0 and (state.phase.joint is not Joint.FREE or f[1:] == (0.0, 0.0))
-        if by_line:
-            middle = state.time + 0.5 * step.size, force.mean(f, step.size)
-            f, state.pushed = _line(state.pushed, middle, state.time), middle
-        if f[0] < 0.0:
-            # The sign at the start may be a false alarm: it is one if the ends, let go, close.
-            if not (state.reclosed and state.steps_in_phase == 0) and self._opens(state, step, event):
-                return self.no_step(step), event
-            step = self._pair.repeated(state, step)
-        falling = [tau for tau in sign_changes((f[0], f[1], 0.5 * f[2]), 0.0, step.size) if f[1] + tau * f[2] < 0.0]
-        if not falling:
-            return None
-        zero = falling[0]
-        if not by_line:
-            zero = self._sharpened(zero, abs(f[1] + zero * f[2]), state, step, macro_step)
-        return self._pair.attempt(state, zero, step.start), event
+def no_step(pair: Pair, step: Step) -> Step:
+    """Return no step at all, the bodies back at the mark."""
+    pair.rewind()
+    return step._replace(size=0.0, end=step.start)
 
-    def no_step(self, step: Step) -> Step:
-        """Return no step at all, the bodies back at the mark."""
-        self._pair.rewind()
-        return step._replace(size=0.0, end=step.start)
 
-    def _ending(self, phase: Phase) -> EventKind | None:
-        """Return the event that ends ``phase`` where a force that can only push would pull; ``None`` if all may."""
-        pair = self._pair
-        if phase.seated and not pair.alone:
-            return EventKind.UNSEATED
-        touches = phase.joint is Joint.TOUCH and pair.law is None and not pair.upper.massless
-        return EventKind.SEPARATION if phase.seated or touches else None
+def _ending(pair: Pair, phase: Phase) -> EventKind | None:
+    """Return the event that ends ``phase`` where a force that can only push would pull; ``None`` if all may."""
+    if phase.seated and not pair.alone:
+        return EventKind.UNSEATED
+    touches = phase.joint is Joint.TOUCH and pair.law is None and not pair.upper.massless
+    return EventKind.SEPARATION if phase.seated or touches else None
 
-    def _push(self, phase: Phase, step: Step) -> Force:
-        """Return the force that can only push, without what the scheme adds to the contact's."""
-        contact = self._pair.force_without_mismatch(phase, step)
-        if not phase.seated:
-            return contact
-        return force.combined((1.0, 1.0, -1.0), (step.foundation, contact, step.contact))
 
-    def _sharpened(self, zero: float, slope: float, state: State, step: Step, macro_step: float) -> float:
-        """Return where the force of a step vanishes, near ``zero`` [s], where it falls by ``slope`` [N/s].
+def _push(pair: Pair, phase: Phase, step: Step) -> Force:
+    """Return the force that can only push, without what the scheme adds to the contact's."""
+    contact = pair.force_without_mismatch(phase, step)
+    if not phase.seated:
+        return contact
+    return force.combined((1.0, 1.0, -1.0), (step.foundation, contact, step.contact))
 
-        Trial steps bring the zero to where in a step the force is the most accurate.
-        """
-        best = self._pair.coupling(state.phase).sharpest
-        room = self._pair.loads.next_kink(state.time + self._no_time * macro_step, macro_step) - state.time
 
-        tolerance, left = _SHARP * macro_step * slope, inf
+def _sharpened(pair: Pair, zero: float, slope: float, state: State, step: Step, macro_step: float) -> float:
+    """Return where the force of a step vanishes, near ``zero`` [s], where it falls by ``slope`` [N/s].
 
-        def evaluate(zero: float) -> Sample:
-            nonlocal left
-            size = min(max(zero / best, _SHORTEST_LOOK * macro_step), room)
-            f = self._push(state.phase, self._pair.attempt(state, size, step.start))
-            left = force.value(f, zero)
-            return left, f[1] + zero * f[2]
+    Trial steps bring the zero to where in a step the force is the most accurate.
+    """
+    best = pair.coupling(state.phase).sharpest
+    room = pair.loads.next_kink(state.time + SAME * macro_step, macro_step) - state.time
 
-        found = locate(evaluate, zero, step.size, tolerance, state.time)
-        # The force of a longer trial step may vanish nowhere in this one, which then tells best.
-        return found if abs(left) <= tolerance else zero
+    tolerance, left = _SHARP * macro_step * slope, inf
 
-    def _opens(self, state: State, step: Step, event: EventKind) -> bool:
-        """Do the ends part if they are let go for the step, or early in it, to meet again before its end?
+    def evaluate(zero: float) -> Sample:
+        nonlocal left
+        size = min(max(zero / best, _SHORTEST_LOOK * macro_step), room)
+        f = _push(pair, state.phase, pair.attempt(state, size, step.start))
+        left = force.value(f, zero)
+        return left, f[1] + zero * f[2]
 
-        (`EventKind.UNSEATED`: does the lower end leave the foundation?)
-        """
-        phase, pair = state.phase, self._pair
-        if event is EventKind.UNSEATED:
-            assert pair.stop is not None
-            height: EventFunction = Height(1, pair.stop, share=0.0)
-            let_go = Phase(phase.joint)
-        else:
-            height, let_go = gap, Phase(Joint.FREE, phase.seated and not pair.alone)
-        if height(pair.attempt(state, step.size, step.start, let_go).end)[0] > 0.0:
-            return True
-        drift = abs(height(step.start)[1])  # what the scheme leaves open of the ends' velocities, no parting
-        early = _EARLY * step.size
-        return height(pair.attempt(state, early, step.start, let_go).end)[0] > drift * early
+    found = locate(evaluate, zero, step.size, tolerance, state.time)
+    # The force of a longer trial step may vanish nowhere in this one, which then tells best.
+    return found if abs(left) <= tolerance else zero
+
+
+def _opens(pair: Pair, state: State, step: Step, event: EventKind) -> bool:
+    """Do the ends part if they are let go for the step, or early in it, to meet again before its end?
+
+    (`EventKind.UNSEATED`: does the lower end leave the foundation?)
+    """
+    phase = state.phase
+    if event is EventKind.UNSEATED:
+        assert pair.stop is not None
+        height: EventFunction = Height(1, pair.stop, share=0.0)
+        let_go = Phase(phase.joint)
+    else:
+        height, let_go = gap, Phase(Joint.FREE, phase.seated and not pair.alone)
+    if height(pair.attempt(state, step.size, step.start, let_go).end)[0] > 0.0:
+        return True
+    drift = abs(height(step.start)[1])  # what the scheme leaves open of the ends' velocities, no parting
+    early = _EARLY * step.size
+    return height(pair.attempt(state, early, step.start, let_go).end)[0] > drift * early
 
 
 def _line(before: tuple[float, float] | None, middle: tuple[float, float], start: float) -> Force:

@@ -10,11 +10,12 @@ come with the package.
 from .loads import Load
 from .messages import key_kind, scene_keys
 from .reading import load_scene, parse_value, scene_from_dict, shipped_scenes, with_changes
-from .scene import Scene
+from .scene import SAME, Scene
 from .suspicions import suspicions
 from .tables import Beam, Contact, Coupling, SceneError, Spring, Stop, Time
 
 __all__ = [
+    "SAME",
     "Beam",
     "Contact",
     "Coupling",

@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Discriminator, Tag
@@ -41,10 +40,6 @@ class ForeignFmu(Table):
     dissipated_energy: str | None = key("J", "output, since the start", None)
     load_potential: str | None = key("J", "output: −(work of loads inside)", None)
     parameters: dict[str, float | int | bool | str] = key("–", "values of the FMU's parameters, by name", {})
-
-    def named(self, keys: Sequence[str]) -> tuple[str | None, ...]:
-        """Return the names of variables by their keys, as `INPUTS`, `MOTION` and `ENERGIES`."""
-        return tuple(getattr(self, key) for key in keys)
 
 
 class PointMass(Table):

@@ -13,9 +13,8 @@ from .partners import ForeignFmu, LowerBody, Partner, UpperBody
 from .statics import tip_compliance, tip_load_deflection
 from .tables import Beam, Contact, Coupling, Spring, Stop, Table, Time, key
 
-#: Remainders of the macro grid, as fractions of H: shorter than the first is rounding; shorter than the second, a step
-#: would drown in rounding.
-_SAME, SHORTEST_STEP = 1e-9, 1e-6
+#: Times closer than the first of these fractions of H are one; a step shorter than the second would drown in rounding.
+SAME, SHORTEST_STEP = 1e-9, 1e-6
 
 
 class Height(NamedTuple):
@@ -182,7 +181,7 @@ class Scene(Table):
         H, span = self.coupling.H, self.duration
         whole = math.floor(span / H * (1.0 + 1e-12))
         rest = span - whole * H
-        if rest <= _SAME * H:
+        if rest <= SAME * H:
             return whole, 0.0
         return (whole, rest) if rest >= SHORTEST_STEP * H or whole == 0 else (whole - 1, rest + H)
 
