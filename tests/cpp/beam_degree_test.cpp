@@ -16,11 +16,13 @@
 namespace beam {
 namespace {
 
+using testing::bending;
 using testing::clamped_free_frequencies;
 using testing::frequencies;
 using testing::general_beam;
 using testing::mesh_tip_compliance;
 using testing::Noise;
+using testing::shearing;
 using testing::static_tip_compliance;
 using testing::unit_beam;
 using testing::with_integrator;
@@ -153,9 +155,6 @@ TEST(BeamDegree, FormsAreTheIntegralsOfTheirDefinition) {
     }
   }
 }
-
-double bending(const Parameters& p) { return p.young_modulus * p.second_moment_of_area; }
-double shearing(const Parameters& p) { return p.shear_modulus * p.shear_coefficient * p.area; }
 
 TEST(BeamDegree, OneElementHasTheExactTipComplianceFromDegreeThree) {
   // The static shape under a tip force has θ of degree 2 and u of degree 3, so it lies in the space from p = 3 on; with

@@ -13,14 +13,13 @@
 namespace beam {
 namespace {
 
+using testing::bending;
 using testing::general_beam;
 using testing::mesh_tip_compliance;
+using testing::shearing;
 using testing::static_tip_compliance;
 using testing::unit_beam;
 using testing::with_integrator;
-
-double bending(const Parameters& p) { return p.young_modulus * p.second_moment_of_area; }
-double shearing(const Parameters& p) { return p.shear_modulus * p.shear_coefficient * p.area; }
 
 /// u(L) of the discrete beam under a unit tip force. In element e the moment is M_e = L − x_mid; with
 /// Σ h M_e² = L³/3 − L h²/12:

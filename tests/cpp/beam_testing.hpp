@@ -38,6 +38,11 @@ inline Parameters general_beam(int n_elements, int element_degree = 1) {
   return p;
 }
 
+inline double bending(const Parameters& p) { return p.young_modulus * p.second_moment_of_area; }  ///< EI
+inline double shearing(const Parameters& p) {  ///< KAG
+  return p.shear_modulus * p.shear_coefficient * p.area;
+}
+
 /// m M + k K of the mesh, a product a column.
 inline Eigen::MatrixXd assembled(const Timoshenko& mesh, double m, double k) {
   const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(mesh.size(), mesh.size());

@@ -11,6 +11,7 @@
 namespace spring_test {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
+constexpr double pi = 3.14159265358979323846;
 
 /// Jacobi's sn, cn, dn of argument u and parameter 0 ≤ m < 1 by the descending Landen (AGM) transformation;
 /// Abramowitz & Stegun 16.4. Good to a few ulp for |u| up to some periods.

@@ -25,8 +25,6 @@ Parameters compliant(double lambda, double exponent) {
   return p;
 }
 
-constexpr double pi = 3.14159265358979323846;
-
 }  // namespace
 
 // p = 1 in contact: two springs in parallel, m ÿ + (k + λ) y = λ (u₀ + v t).

@@ -15,15 +15,16 @@
 #include "flat.hpp"
 #include "held_contact.hpp"
 #include "spring.hpp"
+#include "spring_support.hpp"
 
 using spring::Compliance;
 using spring::flat;
 using spring::HeldContact;
 using spring::TipMessage;
+using spring_test::pi;
 
 namespace {
 
-constexpr double pi = 3.14159265358979323846;
 constexpr double m_tip = 0.3, m_top = 1.1;  // [kg]
 constexpr double v = -0.8;                  // of the tip, which arrives [m/s]
 

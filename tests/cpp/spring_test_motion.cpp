@@ -25,13 +25,13 @@ Parameters duffing(double k1, double k2, double y, double z) {
   return p;
 }
 
+}  // namespace
+
 struct DuffingCase {
   double k1, k2, amplitude, period;
 };
 
 class DuffingTest : public testing::TestWithParam<DuffingCase> {};
-
-}  // namespace
 
 // Periods by an independent quadrature of the energy integral.
 TEST_P(DuffingTest, PeriodOfTheReference) {
