@@ -29,7 +29,7 @@ from springbeam.results.directory import (
 from springbeam.results.files import export, load_summary, load_trajectory, read_run
 from springbeam.results.recording import FileRecorder, MemoryRecorder
 from springbeam.results.steps import PHASE_NAMES, STEP_COLUMNS
-from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, TOLD, Event
+from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, TOLD, Event, columns_of
 from springbeam.run.log import Log
 from springbeam.run.outcome import RunStopped
 from springbeam.scene import SceneError, with_changes
@@ -47,8 +47,12 @@ def filed(path, *blocks, scene=PAIR):
 # -- columns ------------------------------------------------------------------------------------------------------
 
 
+SPRING = {"equilibrium": -0.01, "mass": 2.0, "damping": 3.0, "external_force": 0.4, "cubic_stiffness": 5.0}
+LOADS = [{"on": "spring", "amplitude": 0.7}, {"on": "base", "amplitude": -11.0}, {"on": "tip", "amplitude": 9.0}]
 LAWS = {
-    "transmission": with_changes(PAIR, contact={"stiffness": 7.0, "exponent": 1.5}, spring={"equilibrium": -0.01}),
+    "transmission": with_changes(
+        PAIR, beam={"approach": "elastic"}, contact={"stiffness": 7.0, "exponent": 1.5}, spring=SPRING, loads=LOADS
+    ),
     "tie": with_changes(PAIR, contact={"law": "tie"}, stop=None),
     "compliance": with_changes(PAIR, contact={"law": "compliance"}),
     "link": with_changes(PAIR, contact={"law": "link"}, stop=None),
@@ -98,13 +102,40 @@ def test_columns_are_what_the_page_says_of_each_record(law):
         }
         spring, y, z = scene.spring, r["y_after"], r["z_after"]
         elastic = spring.linear_stiffness * y + spring.cubic_stiffness * y**3
-        force = spring.external_force - spring.damping * z - elastic - contact
+        expected |= {f"load_{k}": load.amplitude for k, load in enumerate(scene.loads)}
+        of_loads = 0.7 + 2.0 * 11.0 if scene.loads else 0.0  # the base falls away under 2 kg
+        force = spring.external_force + of_loads - spring.damping * z - elastic - contact
         expected["a_y"] = 0.0 if r["phase"] >= 3.0 else force / spring.mass
         together = not apart and law in ("transmission", "tie")
         expected["a_tip"] = expected["a_y"] if together else r["tip_acceleration"]
         assert found["phase"][i] == ("free", "tied", "touch", "seated", "seated", "seated")[int(r["phase"])]
         for name in set(found) - {"phase"}:
             assert found[name][i] == pytest.approx(expected[name], rel=1e-14, abs=1e-15), (name, i)
+
+
+def test_columns_have_the_units_of_what_they_are():
+    loads = [{"on": "beam"}, {"on": "beam", "at": 0.5}, {"on": "tip"}, {"on": "spring"}, {"on": "base"}]
+    section = {"area": None, "second_moment_of_area": None, "width": 0.1, "height": 0.2}
+    scene = with_changes(PAIR, beam={"approach": "elastic", **section}, loads=loads)
+    columns_by_unit = {
+        "s": "time", "": "phase", "m": "u_tip y gap", "m/s": "v_tip z velocity_mismatch", "Pa": "bending_stress",
+        "N": "contact_force contact_force_smoothed compliance_force tie_reaction foundation_force clamp_force "
+        "load_1 load_2 load_3", "N/m": "load_0", "m/s²": "load_4 a_tip a_y", "N·m": "clamp_moment",
+        "J": "e_beam e_spring e_contact e_dissipated e_impact_loss e_load e_total energy_residual",
+    }  # fmt: skip
+    expected = {name: unit for unit, names in columns_by_unit.items() for name in names.split()}
+    assert columns_of(scene) == expected
+
+
+def test_normal_compliance_above_another_body_counts_from_where_that_has_started():
+    another = {"element": "point_mass", "mass": 2.0}
+    scene = with_changes(
+        PAIR, beam={"approach": "elastic"}, spring=another, contact={"stiffness": 7.0, "exponent": 1.0}
+    )
+    steps, _, _ = block(20)
+    deep = np.maximum(steps["y_after"][0] - steps["u_tip_after"][5:], 0.0)
+    assert deep.any()
+    assert columns(scene, steps[5:], steps[:1])["compliance_force"] == pytest.approx(7.0 * deep, rel=1e-14)
 
 
 @pytest.mark.parametrize("name", STEP_COLUMNS)

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from commands import printed, refused
+from rich.console import Console
 
 from springbeam.run.runner import simulate
 from springbeam.scene import load_scene, with_changes
@@ -19,6 +20,24 @@ def test_a_sequence_of_one_order_gives_it_and_its_limit(order, sizes):
     found = settled([3.0 + 0.1 * n**-order for n in sizes], sizes)
     assert (found.order, found.limit) == pytest.approx((order, 3.0), rel=1e-9)
     assert found.error == pytest.approx(0.1 * sizes[-1] ** -order, rel=1e-6)
+
+
+def test_what_hardly_converges_has_no_limit():
+    assert [settled([n**-order for n in (1, 2, 4)], (1, 2, 4)).limit is None for order in (0.4, 0.6)] == [True, False]
+
+
+def test_errors_are_from_the_limit_and_as_given_is_the_mesh_of_the_scene():
+    """1 m + (20/n)² m by 20, 40 and 80 elements; all numbers of modes leave 7 m."""
+    study = Converge(scene=with_changes(load_scene("soft"), beam={"n_elements": 20}), metric=("u_tip_end",), levels=3)
+    ends = {"elements": lambda row: 1.0 + (20.0 / row["beam.n_elements"]) ** 2, "modes": lambda row: 7.0}
+    cases = study.cases().items()
+    records = {name: {"u_tip_end": ends[case["refined"]](case), "cost_wall_time": 1.0} for name, case in cases}
+    errors = [row["error_u_tip_end"] for row in study.rows(records)]
+    assert errors[:3] == pytest.approx([1.0, 0.25, 0.0625], rel=1e-9)
+    with (console := Console(width=80)).capture() as shown:
+        console.print(*study.findings(records).shown, sep="\n")
+    told = [line.split() for line in shown.get().splitlines() if "u_tip_end" in line]
+    assert told[0] == ["u_tip_end", "[m]", "2", "1", "1.0e+00", "2.0"]  # given, extrapolated, its error, order
 
 
 def test_beyond_all_modes_there_is_nothing():

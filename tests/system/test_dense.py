@@ -24,12 +24,17 @@ SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2})
             "stop": {"position": -1e-4, "restitution": 0.0},
         },
         {"contact": {"law": "link", "stiffness": 1e3, "damping": 0.1}, "stop": None},
+        {
+            "contact": {"law": "compliance", "stiffness": 0.1, "exponent": 1.0},
+            "coupling": {"feedback": "beam_drives", "feedback_tolerance": 0.1},
+            "stop": None,
+        },
         {"stop": {"restitution": 0.5}, "spring": {"damping": 0.1}},
         {"spring": None},
         {"beam": {"fidelity": "quasi_static", "distributed_load": -20.0}},
         {"beam": None, "stop": {"position": -0.02, "restitution": 0.5}, "spring": {"initial_velocity": -1.0}},
     ],
-    ids=["energy", "energy 2", "compliance", "link", "losses", "no spring", "no mass", "no beam"],
+    ids=["energy", "energy 2", "compliance", "link", "one way", "losses", "no spring", "no mass", "no beam"],
 )
 def test_rows_are_themselves_and_between_them_every_column_holds(changes):
     run = simulate(with_changes(SOFT, **changes))
@@ -55,6 +60,10 @@ def test_rows_are_themselves_and_between_them_every_column_holds(changes):
             assert np.abs(middles.gap[joined]).max() < 1e-12
             mismatch = 0.5 * (begin["v_tip_after"] - begin["z_after"] + steps["v_tip"] - steps["z"])
             assert (middles.v_tip - middles.z)[joined] == pytest.approx(mismatch[joined], abs=1e-12)
+    rows = np.flatnonzero(run.steps["size"] > 0.0)
+    for name in {"clamp_force", "clamp_moment", "e_contact", "e_dissipated"} & set(run.columns):
+        straight, largest = 0.5 * (run[name][rows - 1] + run[name][rows]), np.abs(run[name]).max()
+        assert middles[name] == pytest.approx(straight, rel=1e-12, abs=1e-12 * largest), name
     # Forces are those applied, ends keep the integral of their step, and what is seated stays so up to the next row.
     tau = 0.5 * steps["size"]
     for name in {"contact_force", "foundation_force"} & set(run.columns):

@@ -60,6 +60,30 @@ def test_at_an_event_the_tip_has_the_acceleration_before_it():
     assert np.abs(run.a_tip - run.a_y)[rows].max() < 15.0 < 0.1 * np.abs(run.a_tip[run.phase == "free"]).max()
 
 
+@pytest.mark.parametrize(
+    ("given", "force", "moment"),
+    [
+        ({"beam": {"distributed_load": 3.0}}, 6.0, 6.0),
+        # The hat of the last element, 0.5 m long: a triangle about 1/3 of that from the tip.
+        ({"beam": {"tip_load_coefficient": 8.0}}, 2.0, 2.0 * (2.0 - 0.5 / 3.0)),
+        ({"loads": [{"on": "beam", "shape": [0.0, 1.0], "amplitude": 5.0}]}, 5.0, 20.0 / 3.0),
+        ({"loads": [{"on": "beam", "at": 0.25, "amplitude": 7.0}]}, 7.0, 3.5),
+        ({"loads": [{"on": "tip", "amplitude": 2.0}]}, 2.0, 4.0),
+        ({"loads": [{"on": "base", "amplitude": 0.5}]}, -6.0, -6.0),
+    ],
+)
+@pytest.mark.parametrize("simulated", [simulate, event_driven.simulate])
+def test_the_clamp_bears_what_loads_a_beam_at_rest(given, force, moment, simulated):
+    """ρA = 6 kg/m, L = 2 m; N and N·m of the load about the clamp, on the beam and on its reference."""
+    beam = {"density": 2.0, "area": 3.0, "length": 2.0, "n_elements": 4, "approach": "elastic"}
+    time = {"t_end": 1e-3, "initial_state": "static"}
+    beam["initial_velocity_slope"] = 0.0
+    scene = with_changes(load_scene("soft"), beam=beam, spring=None, stop=None, time=time)
+    run = simulated(with_changes(scene, coupling={"macro_step": 1e-3}, **given))
+    for row in (0, -1):
+        assert (run.clamp_force[row], run.clamp_moment[row]) == pytest.approx((-force, -moment), rel=1e-10)
+
+
 #: A beam that turns as its clamp does not let it: the clamp feels 50 times as much at the start as later.
 TURNS = with_changes(load_scene("steel-bumper"), time={"t_end": 2e-3})
 
@@ -81,3 +105,5 @@ def test_what_a_turning_beam_feels_at_its_start_is_no_largest_value():
 def test_a_start_that_the_clamp_allows_counts():
     run = simulate(with_changes(SOFT, beam={"initial_velocity_slope": 0.0}, loads=LOADS[2:3]))
     assert run.felt() is run
+    leaning = {"initial_velocity_slope": 0.0, "initial_deflection_slope": 0.01, "approach": "elastic"}
+    assert simulate(with_changes(SOFT, beam=leaning, time={"t_end": 1e-3})).felt().time[0] > 0.0

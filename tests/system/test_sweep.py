@@ -72,12 +72,10 @@ def test_each_metric_is_the_number_that_it_names():
     ends |= {"e_dissipated": (0.0, 8.0), "e_impact_loss": (0.0, 9.0)}
     events = [Event(0.05 * n + 0.001 * k, kind) for n, kind in enumerate(EventKind, 1) for k in range(n)]
     run = a_trajectory(events=events, **{name: np.linspace(*values, 400) for name, values in ends.items()})
-    expected = {
-        **{"u_tip_min": -3.0, "u_tip_max": 2.0, "u_tip_end": 2.0, "y_min": -4.0, "y_max": 5.0, "y_end": -4.0},
-        **{"z_max": 2.0, "max_z": 2.0, "max_y": 5.0, "gap_max": 6.0, "dissipated": 8.0, "impact_loss": 9.0},
-        **{f"number_of_{kind}": float(n) for n, kind in enumerate(EventKind, 1)},
-        **{f"first_{kind}": 0.05 * n for n, kind in enumerate(EventKind, 1)},
-    }
+    expected = {"u_tip_min": -3.0, "u_tip_max": 2.0, "u_tip_end": 2.0, "y_min": -4.0, "y_max": 5.0, "y_end": -4.0}
+    expected |= {"z_max": 2.0, "max_z": 2.0, "max_y": 5.0, "gap_max": 6.0, "dissipated": 8.0, "impact_loss": 9.0}
+    expected |= {f"number_of_{kind}": float(n) for n, kind in enumerate(EventKind, 1)}
+    expected |= {f"first_{kind}": 0.05 * n for n, kind in enumerate(EventKind, 1)}
     assert {name: METRICS_THERE_ARE[name](run) for name in expected} == expected
 
 
