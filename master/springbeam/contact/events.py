@@ -142,9 +142,9 @@ def position_tolerance(ends: Ends, level: float, macro_step: float) -> float:
 
 
 def no_dip(start: Sample, end: Sample, size: float, fastest: float) -> bool:
-    """Tell whether what both samples hold stays above 0 between them, at sight: it has no time to fall to 0 and to rise.
+    """Tell whether what both samples hold stays above 0 between them, at sight: it has no time to fall to 0 and rise.
 
-    Not if each end is as much as twice as fast as the ``fastest`` so far [m/s], nor by the cubic through the samples.
+    Not even if both ends move against each other as fast as the ``fastest`` so far [m/s], nor by the cubic.
     """
     (f0, d0), (f1, d1) = start, end
     low = f0 if f0 < f1 else f1
