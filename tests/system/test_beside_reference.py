@@ -105,7 +105,8 @@ CASES = {
         {"motion": 1e-10},
     ),
     "let go of the stop": (OURS, named("let go of the stop"), {"motion": 2e-3}),  # 4e-2 if a velocity is left it
-    "let go after a rest": (OURS, named("let go after a rest"), {"motion": 2e-3}),  # 6e-2 if a velocity is left it
+    # 6e-2 if a velocity is left it; what takes that away is no stroke of the stop.
+    "let go after a rest": (OURS, named("let go after a rest"), {"motion": 2e-3, "times": 1e-4, "stop": 1e-3}),
     "struck in the second dip": (OURS, named("struck in the second dip"), {"motion": 1e-10}),  # 4e-2 without a search
     "struck between slow ends": (OURS, named("struck between slow ends"), {"motion": 1e-10}),  # 0.2 if the ends decide
     # What the stop gives is that of the reference, with one rest more: 1.6e-3 less without it.
