@@ -104,7 +104,7 @@ has_header() {
   for dir in ${SPRINGBEAM_PREFIX:-} ${CMAKE_PREFIX_PATH:-}; do
     flags+=(-I"$dir/include" -I"$dir/include/eigen3")
   done
-  echo "#include <$1>" | "${CXX:-c++}" -std=c++17 -fsyntax-only "${flags[@]}" -x c++ - 2>/dev/null
+  echo "#include <$1>" | "${CXX:-c++}" -std=c++17 -E "${flags[@]}" -x c++ - >/dev/null 2>&1
 }
 
 # get_sundials — names the source of SUNDIALS in SPRINGBEAM_SUNDIALS_SOURCE, unless that is set.
