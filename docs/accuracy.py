@@ -20,7 +20,7 @@ from springbeam.scene.resolution import choice
 from springbeam.studies import rivals, tradeoff
 from springbeam.studies.metrics import worst
 from springbeam.studies.study import record_all, troubles
-from springbeam.studies.tables import Row, number
+from springbeam.studies.tables import Row, in_words
 from springbeam.studies.tradeoff import Tradeoff, cheapest
 
 
@@ -49,7 +49,7 @@ def cell(row: Row | None) -> str:
 
 def choices(rows: list[Row]) -> list[str]:
     cells = [
-        [f"{best['error']:.0e}", cell(best["co_simulation"]), cell(best["scipy"]), number(best["ratio"], ".2g")]
+        [f"{best['error']:.0e}", cell(best["co_simulation"]), cell(best["scipy"]), in_words(best["ratio"], ".2g")]
         for best in cheapest(rows)
     ]
     return table(["error", "cheapest here: solve [ms]", "cheapest of scipy: solve [ms]", "ratio"], cells)

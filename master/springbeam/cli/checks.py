@@ -23,7 +23,7 @@ from ..bodies.archive import own_fmu
 from ..bodies.protocol import FmuError
 from ..scene import Beam, Scene, Spring, load_scene
 from ..scene.partners import kind_of
-from ..studies.tables import Findings, number, table
+from ..studies.tables import Findings, table
 from .common import BAD_INPUT, DISAGREES, JsonOption, SettingsOption, console_for
 
 _PACKAGES = (
@@ -113,7 +113,7 @@ def _examine(scene: Scene) -> Findings:
             ("yes", key, shown_by, having) if told[key] > 0 else ("no", key, shown_by, lacking)
             for key, shown_by, having, lacking in OFFERED
         ]
-        shown.append(table(names, rows, words=names))
+        shown.append(table(names, rows))
     refused = refusals(scene, {table: finding.abilities for table, finding in found.items()})
     document = {"bodies": {name: asdict(finding) for name, finding in found.items()}, "refused": refused}
     if faults := [*(fault for finding in found.values() for fault in finding.faults), *refused]:
@@ -126,7 +126,7 @@ if TYPE_CHECKING:
     from ..studies.verify.alone import Check, Section
 
 
-_COLUMNS = ("quantity", "exact", "computed", "error", "bound", "")
+_COLUMNS = ("quantity", "exact:.6g", "computed:.6g", "error:.1e", "bound:.1e", "")
 
 
 def verify(as_json: JsonOption = False) -> Findings:
@@ -153,7 +153,11 @@ def report(sections: Iterable[Section], console: Console) -> dict[str, list[Chec
         checks = found[section.title] = list(section())
         reasons = dict.fromkeys(check.reason for check in checks)
         marks = dict(zip(reasons, "abcdefghijklmnopqrstuvwxyz", strict=False))
-        console.print(table(_COLUMNS, [_row(check, marks) for check in checks], section.title))
+        rows = [
+            (c.quantity, c.exact, c.computed, c.error, c.bound, f"{'pass' if c.passed else 'FAIL'} {marks[c.reason]}")
+            for c in checks
+        ]
+        console.print(table(_COLUMNS, rows, section.title))
         notes = Table.grid(padding=(0, 1))
         for reason, mark in marks.items():
             notes.add_row(Text(mark), Text(reason))
@@ -162,10 +166,3 @@ def report(sections: Iterable[Section], console: Console) -> dict[str, list[Chec
     counts = f"{verdicts.count(True)} passed, {verdicts.count(False)} failed"
     console.print(f"{counts}; {perf_counter() - began:.0f} s")
     return found
-
-
-def _row(check: Check, marks: dict[str, str]) -> tuple[str, ...]:
-    """Return a check in words, with the mark of its reason."""
-    numbers = ((check.exact, ".6g"), (check.computed, ".6g"), (check.error, ".1e"), (check.bound, ".1e"))
-    verdict = f"{'pass' if check.passed else 'FAIL'} {marks[check.reason]}"
-    return check.quantity, *(number(value, form, "–") for value, form in numbers), verdict

@@ -162,7 +162,8 @@ def _beside_one_another(names: list[str], runs: list[Trajectory]) -> Findings:
 
     keys, results = differing_keys([run.scene for run in runs]), results_of(runs)
     titles = {"keys that differ": keys, "results": results}
-    shown = [table(("", *names), _rows(found), title) for title, found in titles.items()]
+    columns = ("", *(f"{name}:.5g" for name in names))
+    shown = [table(columns, [(name, *of) for name, of in found.items()], title) for title, found in titles.items()]
     return Findings({"runs": names, "keys": keys, "results": results}, shown, pictures={"comparison": draw})
 
 
@@ -183,14 +184,10 @@ def _beside_measured(run: Trajectory, file: Path, names: list[str], shift: float
         both = {"measured": measured.values[name][covered], "run": curve}
         points = {which: np.column_stack([time, values]) for which, values in both.items()}
         diagrams.append(Diagram("time t [s]", name, points, log=False, dots=("measured",)))
-    rows = [
-        (row.signal, str(row.points), f"{row.rms:.4g}", f"{row.relative:.2%}", f"{row.largest:.4g}", f"{row.at:.6g}")
-        for row in found
-    ]
-    columns = ("curve", "points", "rms", "of its spread", "largest", "at t [s]")
+    columns = ("curve", "points:", "rms:.4g", "of its spread:.2%", "largest:.4g", "at t [s]:.6g")
     by_what = ", found by correlation" * (shift is None)
     taken = [column for name in measured.values for column in Expression(name).names]
-    shown = [table(columns, rows), f"shift     {moved:.6g} s{by_what}", *filter(None, [without_peak(run, taken)])]
+    shown = [table(columns, found), f"shift     {moved:.6g} s{by_what}", *filter(None, [without_peak(run, taken)])]
     document = {"shift": moved, "residuals": [row._asdict() for row in found]}
     draw = partial(draw_diagrams, diagrams, "", (8.2, 2.2), wide=1)
     return Findings(document, shown, pictures={"comparison": draw})
@@ -228,11 +225,6 @@ def _over_one_window(runs: list[Trajectory]) -> list[dict[str, Any]]:
                 found = totals(run.scene, run.steps, run.events, common)
                 summary |= {"contact_force_max": found["contact_force_max"], "contact_force_window": common}
     return summaries
-
-
-def _rows(found: dict[str, list[Any]]) -> list[list[str]]:
-    return [[name, *("" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value)
-                     for value in values)] for name, values in found.items()]  # fmt: skip
 
 
 def spectrum(

@@ -254,16 +254,19 @@ def picked_in_words(accuracy: Mapping[str, Any]) -> str:
 
 def _event_table(events: list[Event], more: int, scene: Scene) -> Table:
     position, speed = ("u_tip", "v_tip") if scene.lower is None else ("y", "z")
-    names = ("time\n[s]", f"{position}\n[m]", f"{speed}\n[m/s]", "on the\ntip [N·s]", "of the\nstop [N·s]", "lost\n[J]")
+    columns = (
+        *("event", "time\n[s]:.8f", f"{position}\n[m]:", f"{speed}\n[m/s]:"),
+        *("on the\ntip [N·s]:.3g", "of the\nstop [N·s]:.3g", "lost\n[J]:.3g"),
+    )
     scales = {name: max(abs(getattr(event, name) or 0.0) for event in events) for name in (position, speed)}
     rows = [
         (
             event.kind,
-            f"{event.time:.8f}",
+            event.time,
             *("" if getattr(event, name) is None else rounded(getattr(event, name), scales[name]) for name in scales),
-            *(f"{x:.3g}" if x else "" for x in (event.impulse_contact, event.impulse_foundation, event.energy_loss)),
+            *(x or None for x in (event.impulse_contact, event.impulse_foundation, event.energy_loss)),
         )
         for event in events
     ]
-    unseen = [("⋮", f"{more} more", *[""] * 5)] * (more > 0)
-    return table(("event", *names), rows + unseen)
+    unseen: list[tuple[Any, ...]] = [("⋮", f"{more} more", *[None] * 5)] * (more > 0)
+    return table(columns, rows + unseen)

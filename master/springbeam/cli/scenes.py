@@ -15,7 +15,7 @@ from rich.text import Text
 from ..results.files import as_json as json_of
 from ..scene import load_scene, shipped_scenes
 from ..scene.messages import MODELS
-from ..studies.tables import Findings, number, table
+from ..studies.tables import Findings, table
 from .common import BAD_INPUT, JsonOption, SceneArgument, SettingsOption, fail
 
 
@@ -36,8 +36,8 @@ def scenes(as_json: JsonOption = False) -> Findings:
         listed.append({
             "name": name, "contains": contents, "t_end": scene.time.t_end, "title": scene.title, "file": path
         })  # fmt: skip
-    rows = [(row["name"], ", ".join(row["contains"]), f"{row['t_end']:g}", row["title"]) for row in listed]
-    shown = table(("scene", "contains", "t_end [s]", "title"), rows, words=("contains", "title"))
+    rows = [(row["name"], row["contains"], row["t_end"], row["title"]) for row in listed]
+    shown = table(("scene", "contains", "t_end [s]:g", "title"), rows)
     return Findings(listed, [shown, ""], [("files:", path.parent)])
 
 
@@ -123,8 +123,8 @@ def predict(
     shown: list[Any] = [Text(what.title or "(untitled scene)", style="bold")]
     shown += [f"{name:<10}{text}" for name, text in _lines(p)]
     if p["schemes"]:
-        names = ("scheme", "degree", "spectral radius − 1", "critical H [s]", "")
-        shown.append(table(names, [_scheme(**s, threshold=p["threshold"]) for s in p["schemes"]], words=("",)))
+        names = ("scheme", "degree:", "spectral radius − 1:.1e", "critical H [s]:.3g", "")
+        shown.append(table(names, [_scheme(**s, threshold=p["threshold"]) for s in p["schemes"]]))
     shown += [f"note      {note}" for note in p["notes"]]
     if p["auto"] is not None:
         scheme, degree, because = p["auto"]
@@ -170,8 +170,8 @@ def _listed(*told: tuple[str, float | None]) -> str:
 
 def _scheme(
     scheme: str, degree: int, spectral_radius: float, critical_step: float | None, threshold: float
-) -> tuple[str, ...]:
+) -> tuple[Any, ...]:
     """Return the row of a scheme."""
     excess = spectral_radius - 1.0
-    size = "0" if abs(excess) < 1e-11 else f"{excess:.1e}"
-    return scheme, str(degree), size, number(critical_step, ".3g", "none"), "unstable" * (excess > threshold)
+    step = "none" if critical_step is None else critical_step
+    return scheme, degree, excess if abs(excess) >= 1e-11 else 0, step, "unstable" * (excess > threshold)

@@ -19,7 +19,7 @@ from ..pictures.diagrams import Diagram, draw_diagrams
 from ..scene import Scene, SceneError
 from .metrics import Metric, heading, metrics_of
 from .study import Study
-from .tables import Findings, Row, number, table
+from .tables import Findings, Row, difference, table
 
 #: Quantities that are compared unless others are asked for, those that a scene has.
 QUANTITIES = (
@@ -125,8 +125,11 @@ class Converge(Study):
             complete = refined == "modes" and beam is not None and beam.modes_kept == beam.unknowns
             found = {name: settled([row[name] for row in mine], sizes, complete=complete) for name in names}
             document[refined] = {"levels": mine, "settled": {name: s._asdict() for name, s in found.items()}}
-            cells = [_cells(name, given[name], s) for name, s in found.items()]
-            shown.append(table(("", "as given", "extrapolated", "error", "order"), cells, f"more {refined}"))
+            columns = ("", "as given:.6g", "extrapolated:.6g", "error:.1e", "order:.1f")
+            cells = [
+                (heading(name), given[name], s.limit, _error(given[name], s), s.order) for name, s in found.items()
+            ]
+            shown.append(table(columns, cells, f"more {refined}"))
             meshes = (
                 f"{row['beam.n_elements']} el. {row['unknowns']} modes {row['cost_wall_time']:.2g} s" for row in mine
             )
@@ -135,7 +138,7 @@ class Converge(Study):
             labels = "unknowns of the beam", "distance from the limit, relative"
             diagrams.append(Diagram(*labels, curves, f"more {refined}"))
             for row in mine:
-                errors = {name: _off(row[name], s.limit) for name, s in found.items()}
+                errors = {name: difference(row[name], s.limit) for name, s in found.items()}
                 made.append(row | {f"error_{name}": error for name, error in errors.items()})
                 for name, error in errors.items():
                     share = abs((error or 0.0) / (found[name].limit or 1.0))
@@ -146,12 +149,8 @@ class Converge(Study):
         return Findings(document, shown, tables={self.kind: made}, pictures={self.kind: draw})
 
 
-def _off(value: float | None, limit: float | None) -> float | None:
-    return None if value is None or limit is None else value - limit
-
-
-def _cells(name: str, given: float | None, settled: Settled) -> tuple[str, ...]:
-    """Return a quantity for a terminal: of the mesh as given, and where finer ones or more modes lead."""
-    change = number(settled.change, ".1e")
-    error = number(_off(given, settled.limit), ".1e", f"({change})" if change else "")
-    return heading(name), number(given, ".6g"), number(settled.limit, ".6g"), error, number(settled.order, ".1f")
+def _error(given: float | None, found: Settled) -> float | str | None:
+    """Return the error of the mesh as given, or the last change in brackets."""
+    if found.limit is None and found.change is not None:
+        return f"({found.change:.1e})"
+    return difference(given, found.limit)

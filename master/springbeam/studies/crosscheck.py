@@ -17,7 +17,7 @@ from ..results.trajectory import Event, Trajectory, columns_of
 from ..scene import Scene
 from .comparison import SHORT, Verdict, away_from, compare, macro_points, quantities, sample
 from .study import Study
-from .tables import Findings, Row, number, table
+from .tables import Findings, Row, difference, in_words, table
 
 #: Exit codes of the command.
 CODES: dict[Verdict, int] = {"agrees": 0, "differs": 1, "not comparable": 4}
@@ -51,13 +51,18 @@ class Crosscheck(Study):
         shown: list[Any] = [*record["notes"]]
         if record["quantities"]:
             cells = [
-                (f"{row['quantity']} [{units[row['quantity']]}]", f"{row['error']:.2e}", f"{row['at']:.6g}",
-                 f"{row['l2']:.1e}", f"{row['bound']:.1e}", _ok(row))
+                (f"{row['quantity']} [{units[row['quantity']]}]", *(row[key] for key in ("error", "at", "l2", "bound")),
+                 _ok(row))
                 for row in record["quantities"]
             ]  # fmt: skip
-            shown.append(table(("quantity", "max error", "at t [s]", "L2 error", "bound", ""), cells))
-            names = ("contact", "t [s]", "reference [s]", "error [s]", "bound [s]", "")
-            shown += [table(names, map(_contact, record["events"]))] * bool(record["events"])
+            shown.append(table(("quantity", "max error:.2e", "at t [s]:.6g", "L2 error:.1e", "bound:.1e", ""), cells))
+            names = ("contact", "t [s]:.10f", "reference [s]:.10f", "error [s]:.1e", "bound [s]:.1e", "")
+            cells = [
+                (row["kind"], "none" if row["time"] is None else row["time"], row["reference"],
+                 difference(row["time"], row["reference"]), row["bound"], _ok(row))
+                for row in record["events"]
+            ]  # fmt: skip
+            shown += [table(names, cells)] * bool(cells)
             shown.append(
                 f"comparable from {record['from']:.9g} to {record['horizon']:.9g} s of {record['t_end']:.9g} s; there "
                 f"a perturbation of the reference has grown {record['growth']:.3g} times"
@@ -88,13 +93,6 @@ class Crosscheck(Study):
 
 def _ok(row: Mapping[str, Any]) -> str:
     return "ok" if row["passed"] else "DIFFERS"
-
-
-def _contact(row: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the row of a change of contact, which the co-simulation may lack."""
-    time, exact = row["time"], row["reference"]
-    ours, error = ("none", "") if time is None else (f"{time:.10f}", f"{time - exact:.1e}")
-    return row["kind"], ours, f"{exact:.10f}", error, f"{row['bound']:.1e}", _ok(row)
 
 
 class Orders(Study):
@@ -143,15 +141,15 @@ class Orders(Study):
             orders = [float(np.log2(a / b)) if a and b else None for a, b in itertools.pairwise(errors)]
             row = {name: several[0][name] for name in ("phase", "begin", "end", "quantity")}
             cells.append((
-                row["phase"], f"{row['begin']:.4f}", row["quantity"], *(f"{error:.1e}" for error in errors),
-                " ".join(number(order, ".1f", "–") for order in orders),
+                row["phase"], row["begin"], row["quantity"], *errors,
+                " ".join(in_words(order, ".1f") or "–" for order in orders),
             ))  # fmt: skip
             of_stretch = curves.setdefault(f"{row['phase']} from {row['begin']:.4g} s", {})
             of_stretch[row["quantity"]] = list(zip(sizes, errors, strict=True))
             row |= {f"error_{step}": error for step, error in zip(steps, errors, strict=True)}
             rows.append(row | {f"order_{step}": order for step, order in zip(steps, orders, strict=False)})
-        names = ("phase", "from [s]", "quantity", *steps, "orders")
-        shown = table(names, cells, "largest errors", words=("from [s]", "quantity"))
+        names = ("phase", "from [s]:.4f", "quantity", *(f"{step}:.1e" for step in steps), "orders")
+        shown = table(names, cells, "largest errors")
         labels = "macro step [s]", "unit of the quantity"
         diagrams = [Diagram(*labels, lines, stretch) for stretch, lines in curves.items()]
         draw = partial(draw_diagrams, diagrams, f"{self.scene.title}: largest errors")

@@ -26,7 +26,7 @@ from ..signals.measured import Measured, read_measured, time_shifts
 from .accuracy import simulate
 from .design import design, parse_axis
 from .study import Study
-from .tables import Findings, Row, number, table
+from .tables import Findings, Row, table
 
 _CASE = "fit"
 #: The unknown that moves the clock of the measurement [s], beside keys.
@@ -118,14 +118,11 @@ class Fit(Study):
         The table has a row per run: the keys, and the root mean square of what is left of each curve.
         """
         record = records[_CASE]
-        keys = [
-            (row["key"], f"{row['value']:.8g}", number(row["low"], ".6g"), number(row["high"], ".6g"))
-            for row in record["keys"]
-        ]
-        left = [(name, f"{rms:.4g}", f"{share:.2%}") for name, (rms, share) in record["left"].items()]
+        keys = [(row["key"], row["value"], row["low"], row["high"]) for row in record["keys"]]
+        left = [(name, rms, share) for name, (rms, share) in record["left"].items()]
         shown: list[Any] = [
-            table(("key", "value", "95 % from", "to"), keys),
-            table(("curve", "left, rms", "of its spread"), left),
+            table(("key", "value:.8g", "95 % from:.6g", "to:.6g"), keys),
+            table(("curve", "left, rms:.4g", "of its spread:.2%"), left),
             f"{len(record['runs'])} runs; {record['message']}",
         ]
         shown += [Text(f"not determined: {why}", style="bold red") for why in record["undetermined"]]

@@ -86,9 +86,9 @@ class Sweep(Study):
             tables["sweep-boundary"] = critical
         if self.metric:
             names = [*(axis.name for axis in self.axes), *self._shown]
-            cells = [[_in_words(row[name]) for name in names] for row in rows[:_FIRST_ROWS]]
+            cells = [[row[name] for name in names] for row in rows[:_FIRST_ROWS]]
             several = f"the first {_FIRST_ROWS} of {len(rows)} rows" * (len(rows) > _FIRST_ROWS)
-            shown.append(table(names, cells, several))
+            shown.append(table([f"{name}:.6g" for name in names], cells, several))
         code = 2 if counts.keys() == {"refused"} else 0
         return Findings(document, shown, code=code, tables=tables, pictures=self._pictures(rows, critical))
 
@@ -157,12 +157,6 @@ class Sweep(Study):
                 mean = float(unit.value((np.arange(_POINTS) + 0.5) * length / _POINTS).mean())
                 found.append({"duration": length, "velocity_change": peak * mean * length, "peak": peak})
         return found
-
-
-def _in_words(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return ", ".join(map(_in_words, value)) if isinstance(value, (list, tuple)) else "" if value is None else str(value)
 
 
 def _varies(values: np.ndarray) -> bool:

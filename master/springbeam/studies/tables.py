@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -49,20 +49,34 @@ class Findings:
         return replace(self, document=document, files=[("results", file) for file in files], where=directory)
 
 
-def table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str = "", words: Collection[str] = ()) -> Table:
-    """Return a table: the first column and those named in ``words`` hold words, which may wrap, the others numbers."""
+def table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = "") -> Table:
+    """Return a table whose ``columns`` are headings: of words, which may wrap, or with a colon of numbers.
+
+    What stands behind the colon is the format of floating-point numbers, as in ``error [m]:.1e``.
+    """
     made = Table(box=None, pad_edge=False, header_style="bold", title=title or None, title_justify="left")
-    for k, name in enumerate(columns):
-        left = k == 0 or name in words
-        made.add_column(Text(name), justify="left" if left else "right", overflow="fold")
+    forms = []
+    for column in columns:
+        heading, colon, form = column.rpartition(":")
+        made.add_column(Text(heading if colon else column), justify="right" if colon else "left", overflow="fold")
+        forms.append(form)
     for row in rows:
-        made.add_row(*map(Text, row))
+        made.add_row(*(Text(in_words(value, form)) for value, form in zip(row, forms, strict=True)))
     return made
 
 
-def number(value: float | None, form: str, lacking: str = "") -> str:
-    """Return a number as ``form`` says, or ``lacking`` where there is none."""
-    return lacking if value is None else format(value, form)
+def in_words(value: Any, form: str) -> str:
+    """Return what a cell shows: nothing for ``None``, floating-point numbers as ``form`` says, what a list holds."""
+    if isinstance(value, float):
+        return format(value, form)
+    return (
+        ", ".join(in_words(v, form) for v in value) if isinstance(value, list) else str("" if value is None else value)
+    )
+
+
+def difference(first: float | None, second: float | None) -> float | None:
+    """Return ``first`` − ``second``, ``None`` where one is lacking."""
+    return None if first is None or second is None else first - second
 
 
 def write_csv(path: Path, rows: Sequence[Row]) -> Path:

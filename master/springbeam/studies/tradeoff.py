@@ -28,7 +28,7 @@ from .design import RIGID, SOFT
 from .metrics import costs, errors, motion_errors, worst
 from .rivals import TOLERANCES, Rival
 from .study import Study
-from .tables import Findings, Row, number, table
+from .tables import Findings, Row, table
 
 #: A run that takes longer than this is given up, and finer ones of its family are not begun [s]; quick: ten times less.
 _LIMIT = 10.0
@@ -151,23 +151,19 @@ class Tradeoff(Study):
         """Name the cheapest configurations, and those that nothing beats."""
         rows, until = self.rows(records), self.scene.time.t_end
         best, front = cheapest(rows), pareto(rows)
-        cells = [
-            (f"{c['error']:.0e}", *_shown(c["co_simulation"]), *_shown(c["scipy"]), number(c["ratio"], ".1f"))
-            for c in best
-        ]
-        names = ("error", "co-simulation", "[ms]", "scipy", "[ms]", "ratio")
+        cells = [(c["error"], *_shown(c["co_simulation"]), *_shown(c["scipy"]), c["ratio"]) for c in best]
+        names = ("error:.0e", "co-simulation", "[ms]:.3g", "scipy", "[ms]:.3g", "ratio:.1f")
         on_front = [
-            (_label(row), f"{worst(row):.1e}", number(row.get("error_event_time"), ".1e"),
-             *(f"{1e3 * row[cost]:.3g}" for cost in ("cost_wall_time", "cost_setup")),
-             str(row.get("cost_do_steps") or ""))
+            (_label(row), worst(row), row.get("error_event_time"), 1e3 * row["cost_wall_time"], 1e3 * row["cost_setup"],
+             row.get("cost_do_steps"))
             for row in front
         ]  # fmt: skip
+        columns = ("configuration", "error:.1e", "event [s]:.1e", "solve [ms]:.3g", "set-up [ms]:.3g", "doSteps:")
         shown = [
             f"{self.scene.title}: up to t = {until:.6g} s, {len(rows)} configurations",
-            table(names, cells, "cheapest for an error (solve time)", words=("co-simulation", "scipy")),
-            table(("configuration", "error", "event [s]", "solve [ms]", "set-up [ms]", "doSteps"), on_front,
-                  "Pareto front"),
-        ]  # fmt: skip
+            table(names, cells, "cheapest for an error (solve time)"),
+            table(columns, on_front, "Pareto front"),
+        ]
         told = {"until": until, "cheapest": best, "front": front}
         return Findings(told, shown, tables={self.kind: rows}, pictures={self.kind: self._picture(rows, front)})
 
@@ -223,8 +219,8 @@ def _label(case: Row) -> str:
     return f"{case['family']}, {case['setting']}"
 
 
-def _shown(row: Row | None) -> tuple[str, str]:
-    return ("none gets there", "") if row is None else (_label(row), f"{1e3 * row['cost_wall_time']:.3g}")
+def _shown(row: Row | None) -> tuple[str, float | None]:
+    return ("none gets there", None) if row is None else (_label(row), 1e3 * row["cost_wall_time"])
 
 
 def _configurations(scene: Scene) -> Iterator[Row]:

@@ -129,8 +129,8 @@ def _classes(rows: Sequence[Row]) -> Table:
         counts = Counter(row["kind"] for row in mine)
         done = [row["residual"] or 0.0 for row in mine if row["kind"] not in ("refused", "stopped")]
         name = "all" if coupling is None else " ".join(map(str, coupling)).removeprefix("transmission ")
-        shown.append((name, *(str(counts[kind] or "") for kind in CLASSES), f"{max(done):.0e}" if done else ""))
-    names = ("coupling", *(f"{kind[:4]}." for kind in CLASSES), "residual")
+        shown.append((name, *(counts[kind] or None for kind in CLASSES), max(done, default=None)))
+    names = ("coupling", *(f"{kind[:4]}.:" for kind in CLASSES), "residual:.0e")
     return table(names, shown, f"{len(rows)} cells")
 
 

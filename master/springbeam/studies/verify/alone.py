@@ -23,6 +23,7 @@ from ...bodies.protocol import NO_FORCE, StepRefused
 from ...run.outcome import RunStopped
 from ...run.runner import simulate
 from ...scene import Beam, Scene, Spring, scene_from_dict
+from ..tables import difference
 
 EPS = float(np.finfo(float).eps)
 
@@ -52,7 +53,7 @@ class Check:
     @property
     def error(self) -> float | None:
         """computed − exact."""
-        return None if self.exact is None or self.computed is None else self.computed - self.exact
+        return difference(self.computed, self.exact)
 
     @property
     def passed(self) -> bool:
