@@ -255,6 +255,9 @@ def test_energy_that_appears_is_named(scheme, degree, share, warns, stops):
     trajectory, stopped = stopping(scene, wrapped(energies=energies))
     named = [w for w in trajectory.summary["warnings"] if "changed the energy" in w]
     assert (len(named), trajectory.summary["resolved"]) == (warns, not warns)
+    for warning in named:
+        percent = float(warning.partition(" by ")[2].partition(" %")[0])
+        assert percent == pytest.approx(100.0 * share / (1.0 + share), rel=0.2)
     assert (stopped is not None) is stops
     assert not stops or named[0] in str(stopped)
 

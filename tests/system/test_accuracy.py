@@ -68,6 +68,7 @@ FAR, NEAR = {"motion": 8e-3, "force": 1e-5}, {"motion": 1e-5, "force": 1.9e-3}
         ([{"motion": 8e-3}, {"motion": 1.9e-3}], 3),  # order 2: the finer run has a third of their difference
         ([{"motion": 8e-3}, {"motion": 2.1e-3}, {"motion": 6e-4}], 4),
         ([{"motion": 2.2e-3}, {"motion": 1.9e-3}, {"motion": 6e-4}], 4),  # order 1 at least
+        ([{"motion": 8e-2}, {"motion": 2.1e-3}, {"motion": 6e-4}], 4),  # and 2 at most
         ([FAR, NEAR, {"motion": 1e-5, "force": 6e-4}], 4),  # the order of the motion says nothing of the force
         ([{"motion": 8e-3}, None, {"motion": 1.9e-3}, {"motion": 6e-4}], 6),  # nor does a run before one that stopped
     ],
@@ -93,6 +94,19 @@ def test_steps_are_halved_until_the_estimate_of_each_error_does(apart, runs, mon
     assert len(sizes) == runs
     assert found.summary["accuracy"]["pilot_runs"] == runs - 1
     np.testing.assert_allclose(sizes, sizes[0] / 2.0 ** np.arange(runs), rtol=1e-12)
+
+
+def test_runs_differ_by_the_largest_of_their_motion_and_by_their_peak_force():
+    contact = {"law": "compliance", "stiffness": 1e4, "exponent": 1.0}
+    scene = with_changes(load_scene("soft"), contact=contact, beam={"n_elements": 4}, time={"t_end": 0.05})
+    coarse, fine = (simulate(with_changes(scene, coupling={"macro_step": size})) for size in (2e-3, 1e-3))
+    found = search.differences(coarse, fine, 1e-3)
+    peaks = [run.summary["contact_force_max"] for run in (coarse, fine)]
+    assert found["force"] == pytest.approx(1.0 - min(peaks) / max(peaks), rel=1e-12)
+    ends = [run.at(np.linspace(0.0, 0.05, 2001)) for run in (coarse, fine)]
+    ways = {name: np.abs(fine[name] - fine[name][0]).max() for name in ("u_tip", "y")}
+    apart = max(np.abs(ends[0][name] - ends[1][name]).max() / way for name, way in ways.items())
+    assert found["motion"] == pytest.approx(apart, rel=0.05)
 
 
 @pytest.mark.parametrize("number", [9, 19])

@@ -141,6 +141,12 @@ def test_another_fmu_is_refused(interrupted, tmp_path, fmu_folder, monkeypatch, 
         springbeam.resume(interrupted)
 
 
+def test_the_time_that_a_run_has_taken_is_that_of_all_its_parts(interrupted):
+    before = Checkpoint.read(interrupted / "run.checkpoint").wall_time  # by the clock of `interrupted_into`
+    assert before > 100.0
+    assert springbeam.resume(interrupted).summary["wall_time"] > before
+
+
 # -- atomic ---------------------------------------------------------------------------------------------------------
 
 
