@@ -9,6 +9,7 @@ import json
 import os
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -17,7 +18,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported: 
 
 import numpy as np
 from draw import KINDS
-from judge import WAYS, from_dict, judge
+from judge import WAYS, Verdict, judge
 
 sys.path.append(str(Path(__file__).parents[2] / "docs"))
 from pages import table, write_section
@@ -28,7 +29,7 @@ HEAD = ("", "well-conditioned", "wrong, told", "wrong, untold (above 2)", "right
 def read(path):
     if not path.exists():
         return []
-    return [from_dict(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]
+    return [Verdict(**json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
 def row(name, group):
@@ -77,7 +78,7 @@ def main():
     options.results.parent.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(options.processes, get_context("spawn")) as pool, options.results.open("a") as file:
         for done, found in enumerate(pool.map(partial(judge, options.seed), *zip(*todo, strict=True)), 1):
-            file.writelines(json.dumps(v.as_dict()) + "\n" for v in found)
+            file.writelines(json.dumps(asdict(v)) + "\n" for v in found)
             file.flush()
             print(f"{done}/{len(todo)}", *worst(found), sep="\n  ", flush=True)
     verdicts = read(options.results)

@@ -1,6 +1,6 @@
 """One scene, run in each way, beside the event-driven reference."""
 
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from draw import KINDS, drawn
@@ -30,6 +30,8 @@ FIXED = 1e-2
 ROWS, POINTS, TIME_LIMIT = 25, 200, 30.0
 #: Relative changes of a stiffness that show the conditioning, and how many times larger the motion's may be.
 PERTURBATIONS, WELL_CONDITIONED = (1e-5, 1e-3, -1e-3), 30.0
+#: What became of a run that raised an error.
+OUTCOMES = {SceneError: "refused", RunStopped: "stopped"}
 
 
 @dataclass(frozen=True)
@@ -71,13 +73,6 @@ class Verdict:
     def silent(self):
         return self.judged and self.factor > 1.0 and not self.told
 
-    def as_dict(self):
-        return asdict(self)
-
-
-def from_dict(values):
-    return Verdict(**{field.name: values[field.name] for field in fields(Verdict)})
-
 
 def judge(seed, number, ways):
     """Run scene ``number`` of ``seed`` in each of ``ways``."""
@@ -85,9 +80,9 @@ def judge(seed, number, ways):
     runs = {way: _run(scene, way) for way in ways}
     done = {way: run for way, run in runs.items() if isinstance(run, Trajectory)}
     found = [
-        Verdict(seed, number, way, *_failure(failed))
-        for way, failed in runs.items()
-        if not isinstance(failed, Trajectory)
+        Verdict(seed, number, way, OUTCOMES[type(run)], told=True, why=str(run))
+        for way, run in runs.items()
+        if way not in done
     ]
     if not done:
         return found
@@ -116,11 +111,6 @@ def _run(scene, way):
         return simulate(with_changes(scene, coupling=coupling))
     except (SceneError, RunStopped) as failed:
         return failed
-
-
-def _failure(failed):
-    outcome = "refused" if isinstance(failed, SceneError) else "stopped"
-    return outcome, 0.0, True, 0.0, 0.0, 0.0, 0.0, 0, str(failed)
 
 
 def _verdict(seed, number, way, run, reference, condition):

@@ -186,6 +186,7 @@ REFUSED3 = {
         (lambda k: k.status(k.slave.getFloat32, [0]), "GetFloat32: there are no variables of type Float32"),
         (lambda k: k.status(k.slave.setUInt64, [0], [1]), "SetUInt64: there are no variables of type UInt64"),
         (lambda k: k.call("DoStep", 0.0, 1.0, *[None] * 5), "DoStep: eventHandlingNeeded is"),
+        (lambda k: k.call("EnterEventMode"), "EnterEventMode: .*eventModeUsed = false"),
     ],
 }
 
@@ -224,7 +225,8 @@ def test_parameters_that_are_impossible_together_are_refused_by_name(loaded, nam
     assert re.search(said, k.message)
 
 
-def test_limits_of_the_description_are_the_true_ones(case):
+@pytest.mark.parametrize("version", ["2.0"])
+def test_limits_of_the_description_are_the_true_ones(case, fmus):
     """At a limit that the XML gives the instance comes up; beyond it the value is refused when it is set."""
     # Limits of numbers that go together are reached only beside others that allow them.
     beside = {
@@ -236,15 +238,17 @@ def test_limits_of_the_description_are_the_true_ones(case):
     for v in case.description.modelVariables:
         if v.causality != "parameter" or v.type == "Boolean":
             continue
+        in_fmi3 = fmus["3.0"][case.name].variables[v.name]
+        assert (in_fmi3.min, in_fmi3.max) == (v.min, v.max)
         for limit, away in ((v.min, -1.0), (v.max, 1.0)):
             if limit is None or float(limit) == 1e6:  # a million elements take their time
                 continue
             tried += 1
             positive = 0.0 < float(limit) < 1e-300  # itself no beam, beside numbers of ordinary size
-            case.running(**{**beside.get(v.name, {}), v.name: 1e-3 if positive else float(limit)}).free()
+            at_limit = {v.name: 1e-3 if positive else float(limit)}
+            case.running(**(beside.get(v.name, {}) if float(limit) else {}), **at_limit).free()
+            outside = float(limit) + away if v.type == "Integer" else np.nextafter(float(limit), away * np.inf)
             k = case.instance()
-            whole = v.type in ("Integer", "Int32")
-            outside = float(limit) + away if whole else np.nextafter(float(limit), away * np.inf)
             assert k.try_set(v.name, 0.0 if positive else outside) == ERROR, v.name
             assert v.name in k.message
     assert tried >= 15
@@ -264,20 +268,14 @@ def test_reset_starts_all_over(case):
 
 
 @pytest.mark.parametrize("version", ["3.0"])
-@pytest.mark.parametrize("events", [True, False])
-def test_event_mode_is_entered_and_left_where_it_is_used(case, events):
-    k = case.instance(events=events).start()
+def test_event_mode_applies_an_impulse_at_once_and_once(case):
+    k = case.instance(events=True).start()
     told = [ct.byref(ct.c_bool(True)) for _ in range(5)]
     update = (*told, ct.byref(ct.c_double()))
-    if not events:
-        k.step(0.0, 0.01)
-        assert k.call("EnterEventMode") == ERROR
-        assert "eventModeUsed = false" in k.message
-        return
     mass = k.get("tip_mass") if case.name == "beam" else 1.0
     after = k.get(case.velocity) + 0.5 / mass
     k.set(case.impulse, 0.5)
-    for _ in range(2):  # at once, and once
+    for _ in range(2):
         assert k.call("UpdateDiscreteStates", *update) == OK
         assert [flag._obj.value for flag in told] == [False] * 5
         assert k.get(case.velocity, case.impulse) == [pytest.approx(after), 0.0]
@@ -326,14 +324,13 @@ def run(instance, parameters, i):
 def test_memory_is_flat_over_many_instances(case):
     """What malloc gave out and did not get back over 3000 of them, after those that fill caches: 7 bytes each.
 
-    An instance in twenty that is kept shows that it would be seen. One Python object serves all.
+    A pointer that is lost takes 32. One Python object serves all.
     """
     information, instance = ct.CDLL(None).mallinfo2, case.instance()
     information.restype = MallocInfo
     instance.free()
-    kept = []
 
-    def growth(cycles, keep=0):
+    def growth(cycles):
         gc.collect()
         before = information()
         for i in range(1, cycles + 1):
@@ -342,17 +339,9 @@ def test_memory_is_flat_over_many_instances(case):
             if i % 10 == 0:
                 assert instance.call("Reset") == OK
                 run(instance, PARAMETERS[case.name], 1)
-            if keep and i % keep == 0:
-                kept.append(instance.slave.component)
-            else:
-                instance.free()
+            instance.free()
         gc.collect()
         return (information().in_use + information().hblkhd) - (before.in_use + before.hblkhd)
 
     growth(1000)
     assert growth(3000) < 7 * 3000
-    leaked = growth(500, keep=20)
-    for component in kept:
-        instance.slave.component = component
-        instance.free()
-    assert leaked > 7 * 500

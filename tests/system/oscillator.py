@@ -1,4 +1,7 @@
-"""`oscillator.c` as FMUs: a plain C FMU that is not ours, with the capabilities that a test wants it to have."""
+"""`oscillator.c` as FMUs: a plain C FMU that is not ours, with the capabilities that a test wants it to have.
+
+Its descriptions are `oscillator2.xml` and `oscillator3.xml`.
+"""
 
 import functools
 import subprocess
@@ -6,9 +9,6 @@ import tempfile
 import zipfile
 from pathlib import Path
 
-#: Names in the order of value references, with their causality.
-_INPUTS, _OUTPUTS = ("F", "J"), ("x", "v", "ix", "ix2", "Ek", "Ep", "Ed", "El")
-_PARAMETERS = {"m": 1.0, "k": 0.0, "c": 0.0, "load": 0.0, "x0": 0.0, "v0": 0.0, "sign": 1.0, "lie": 0.0}
 #: Values of the parameter ``lie``.
 LIES = {
     name: float(number)
@@ -46,47 +46,16 @@ def _library(lacks):
     return content
 
 
-def _description(version, **flags):
-    variables, outputs = [], ""
-    for number, name in enumerate([*_INPUTS, *_OUTPUTS, *_PARAMETERS]):
-        said, start = f'name="{name}" valueReference="{number}" ', ""
-        if name in _PARAMETERS:
-            said, start = f'{said} causality="parameter" variability="fixed"', f' start="{_PARAMETERS[name]}"'
-        elif name in _INPUTS:
-            said, start = f'{said} causality="input"', ' start="0"'
-        else:
-            said += 'causality="output"'
-        if version == "2.0":
-            variables.append(f"<ScalarVariable {said}><Real{start}/></ScalarVariable>")
-        else:
-            variables.append(f"<Float64 {said}{start}/>")
-        if name in _OUTPUTS:
-            outputs += f'<Unknown index="{number + 1}"/>' if version == "2.0" else f"<Output {said.split()[1]}/>"
-    if version == "3.0":
-        variables.append('<Float64 name="time" valueReference="99" causality="independent" variability="continuous"/>')
-    else:
-        outputs = f"<Outputs>{outputs}</Outputs><InitialUnknowns>{outputs}</InitialUnknowns>"
-    said = " ".join(f'{flag}="{str(value).lower()}"' for flag, value in flags.items())
-    token = "guid" if version == "2.0" else "instantiationToken"
-    return (
-        f'<?xml version="1.0"?><fmiModelDescription fmiVersion="{version}" modelName="oscillator" {token}="{{1}}">'
-        f'<CoSimulation modelIdentifier="oscillator" {said}/><ModelVariables>{"".join(variables)}</ModelVariables>'
-        f"<ModelStructure>{outputs}</ModelStructure></fmiModelDescription>"
-    )
-
-
-def made(path, *, version="2.0", lacks=None, slopes=True, **flags):
+def made(path, *, version="2.0", lacks=None, state=True, slopes=True, variable=True):
     """Write the FMU ``path`` of a version of FMI, without one of its functions, and return the path.
 
-    ``flags`` are "state" and "variable", of the size of its steps; it can do what is not said.
+    It saves its ``state``, follows ``slopes`` of the force, or makes steps of ``variable`` size unless told otherwise.
     """
-    said = dict.fromkeys(("canGetAndSetFMUstate", "canSerializeFMUstate"), flags.get("state", True))
-    said["canHandleVariableCommunicationStepSize"] = flags.get("variable", True)
-    if version == "2.0":
-        folder, said["canInterpolateInputs"] = "linux64", slopes
-    else:
-        folder, said = "x86_64-linux", {name.replace("state", "State"): value for name, value in said.items()}
+    template = Path(__file__).with_name(f"oscillator{version[0]}.xml").read_text(encoding="utf-8")
+    can = {"state": state, "slopes": slopes, "variable": variable}
+    description = template.format(**{name: str(value).lower() for name, value in can.items()})
+    folder = {"2.0": "linux64", "3.0": "x86_64-linux"}[version]
     with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", _description(version, **said))
+        archive.writestr("modelDescription.xml", description)
         archive.writestr(f"binaries/{folder}/oscillator.so", _library(lacks))
     return path

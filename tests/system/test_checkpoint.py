@@ -198,7 +198,7 @@ def test_rows_reach_the_disk_before_the_checkpoint_that_counts_them(tmp_path, mo
 # -- the command, as a process --------------------------------------------------------------------------------------
 
 
-LONG = ["run", "soft", *CHANGES, "--set", "time.t_end=8", "--no-plots", "-q"]
+LONG = ["run", "soft", *CHANGES, "--set", "time.t_end=4", "--no-plots", "-q"]
 
 
 @pytest.fixture(scope="module")

@@ -72,16 +72,14 @@ def swung(A, start, times):
     return ((modes * np.linalg.solve(modes, start)) @ np.exp(np.outer(values, times))).real
 
 
-def linked(times, upper=0.0, lower=0.0, rate=0.0):
-    """The exact displacements of both ends from V and rest under amplitude·sin(rate t) on each, shape (2, n)."""
+def linked(times):
+    """The exact displacements of both ends from V and rest, shape (2, n)."""
     k, c = STIFFNESS, DAMPING
-    A = np.zeros((6, 6))
-    A[:2, 2:4] = np.eye(2)
-    A[2:4, :2] = np.array([[-k, k], [k, -k - K]]) / [[M1], [M2]]
-    A[2:4, 2:4] = np.array([[-c, c], [c, -c - C]]) / [[M1], [M2]]
-    A[2:4, 4] = upper / M1, lower / M2
-    A[4, 5], A[5, 4] = rate, -rate
-    return swung(A, [0.0, 0.0, V, 0.0, 0.0, 1.0], times)[:2]
+    A = np.zeros((4, 4))
+    A[:2, 2:] = np.eye(2)
+    A[2:, :2] = np.array([[-k, k], [k, -k - K]]) / [[M1], [M2]]
+    A[2:, 2:] = np.array([[-c, c], [c, -c - C]]) / [[M1], [M2]]
+    return swung(A, [0.0, 0.0, V, 0.0], times)[:2]
 
 
 def tied(times, velocity=M1 * V / (M1 + M2)):

@@ -221,8 +221,8 @@ def swept(first, last, seconds, cubic=0.0, **spring):
         {**common, "frequency": first, "frequency_end": last},
         {**common, "frequency": last, "frequency_end": first, "start": seconds, "phase": float(turned % (2.0 * pi))},
     ]
-    scene = with_changes(oscillator(t_end=2.0 * seconds), loads=loads, spring={"cubic_stiffness": cubic, **spring})
-    return simulate(scene)
+    changes = {"spring": {"cubic_stiffness": cubic, **spring}, "coupling": {"macro_step": 5e-3}}
+    return simulate(with_changes(oscillator(t_end=2.0 * seconds), loads=loads, **changes))
 
 
 def test_a_slow_sweep_of_a_linear_oscillator_is_its_frequency_response():

@@ -18,7 +18,7 @@ from springbeam.contact.laws import law_of
 from springbeam.coupling import coupling_of
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.run.ledger import APPROXIMATE, EXACT, bounds
+from springbeam.run.ledger import APPROXIMATE, EXACT
 from springbeam.run.master import Master
 from springbeam.studies.stability import grid
 from springbeam.studies.stability.cells import AT_REST, PARAMETERS, SLICES, sampled_cells, slice_cells
@@ -41,48 +41,42 @@ def changed(run, warnings=None, **columns):
     return replace(run, columns={**run.columns, **columns}, summary=summary)
 
 
-def residual(run, share):
-    """A residual that ends at ``share`` of the energy."""
-    return np.linspace(0.0, share, len(run.time)) * run.e_total[0]
-
-
 # -- classes --------------------------------------------------------------------------------------------------------
 
 
-def test_what_auto_takes_decides_how_it_is_judged():
-    """`hermite` 2 changes the energy by its own error, `energy` 0 does not."""
-    for run, taken in ((done("auto"), "hermite"), (done("auto", integrator="generalized_alpha"), "energy")):
-        assert run.summary["coupling"]["scheme"] == taken
-        off = changed(run, (), energy_residual=residual(run, 10.0 * EXACT))
-        assert judged(off)["kind"] == ("approximate" if taken == "hermite" else "garbage")
-    damped = done("auto", integrator="generalized_alpha", rho_inf=0.5)
-    assert judged(changed(damped, (), energy_residual=residual(damped, -0.5)))["kind"] == "dissipative"
+SAID, CAUSE = ("something has changed the energy",), "energy of degree 1 has changed the energy by 1 %"
+DAMPED = {"integrator": "generalized_alpha", "rho_inf": 0.5}
 
 
-@pytest.mark.parametrize("scheme", ["energy", "hermite"])
-def test_energy_that_changes_is_approximate_if_said_and_garbage_if_not(scheme):
-    """The bound is 1e-8 for a coupling that creates none, 1e-3 for one that does."""
-    run = done(scheme, 1)
-    bound, _ = bounds(run.scene)
-    assert bound == (EXACT if scheme == "energy" else APPROXIMATE)
-    for share, warnings, kind in (
-        (0.9 * bound, (), "approximate" if bound > EXACT else "dissipative"),
-        (1.1 * bound, (), "garbage"),
-        (1.1 * bound, ("not resolved",), "garbage"),
-        (1.1 * bound, ("something has changed the energy",), "approximate"),
-    ):
-        outcome = judged(changed(run, warnings, energy_residual=residual(run, share)))
-        assert outcome["kind"] == kind
-        assert outcome["residual"] == pytest.approx(share, rel=1e-6)
-
-
-@pytest.mark.parametrize("cause", ["", "energy of degree 1 has changed the energy by 1 %"])
-def test_a_coupling_that_changes_no_energy_is_not_excused_by_what_it_says(cause):
-    """A warning or a stop excuses `hermite`, whose error it is; of `energy` a hundredth of it is a fault."""
-    said = ("something has changed the energy",)
-    for scheme, kind in (("energy", "garbage"), ("hermite", "stopped" if cause else "approximate")):
-        run = done(scheme, 1)
-        assert judged(changed(run, said, energy_residual=residual(run, 1e-2)), cause)["kind"] == kind
+@pytest.mark.parametrize(
+    ("scheme", "beam", "share", "warnings", "cause", "kind"),
+    [
+        # The bound is 1e-8 for a coupling that creates none, 1e-3 for one that does.
+        ("energy", {}, 0.9 * EXACT, (), "", "dissipative"),
+        ("energy", {}, 1.1 * EXACT, (), "", "garbage"),
+        ("energy", {}, 1.1 * EXACT, ("not resolved",), "", "garbage"),
+        ("energy", {}, 1.1 * EXACT, SAID, "", "approximate"),
+        ("hermite", {}, 0.9 * APPROXIMATE, (), "", "approximate"),
+        ("hermite", {}, 1.1 * APPROXIMATE, (), "", "garbage"),
+        ("hermite", {}, 1.1 * APPROXIMATE, ("not resolved",), "", "garbage"),
+        ("hermite", {}, 1.1 * APPROXIMATE, SAID, "", "approximate"),
+        # A warning or a stop excuses `hermite`, whose error it is; of `energy` a hundredth of it is a fault.
+        ("energy", {}, 1e-2, SAID, "", "garbage"),
+        ("energy", {}, 1e-2, SAID, CAUSE, "garbage"),
+        ("hermite", {}, 1e-2, SAID, "", "approximate"),
+        ("hermite", {}, 1e-2, SAID, CAUSE, "stopped"),
+        # `auto` is judged as what it takes: `hermite`, and `energy` for a beam by generalized-α.
+        ("auto", {}, 10.0 * EXACT, (), "", "approximate"),
+        ("auto", {"integrator": "generalized_alpha"}, 10.0 * EXACT, (), "", "garbage"),
+        ("auto", DAMPED, -0.5, (), "", "dissipative"),
+    ],
+)
+def test_energy_that_changes_is_judged_by_the_scheme_and_by_what_is_said(scheme, beam, share, warnings, cause, kind):
+    run = done(scheme, 0 if scheme == "auto" else 1, **beam)
+    outcome = judged(changed(run, warnings, energy_residual=share * np.linspace(0.0, run.e_total[0], len(run))), cause)
+    assert outcome["kind"] == kind
+    if kind != "stopped":
+        assert outcome["residual"] == pytest.approx(abs(share), rel=1e-6)
 
 
 def test_a_cell_is_stopped_by_what_its_last_steps_show_when_it_is_cut(monkeypatch):
@@ -206,15 +200,11 @@ def test_the_grid_covers_the_ranges():
         if axis.values:
             assert {cell[axis.name] for cell in cells} == set(axis.values)
             continue
-        values = sorted(cell[axis.name] for cell in cells if cell[axis.name] != 0.0)
-        if not axis.log:
-            tolerance = 0.01 * (axis.high - axis.low)
-            assert values[0] == pytest.approx(axis.low, abs=tolerance)
-            assert values[-1] == pytest.approx(axis.high, abs=tolerance)
-        else:
-            ratio = (axis.high / axis.low) ** 0.01
-            assert axis.low <= values[0] <= axis.low * ratio
-            assert axis.high / ratio <= values[-1] <= axis.high
+        place = np.log if axis.log else np.asarray
+        values = place(sorted(cell[axis.name] for cell in cells if cell[axis.name] != 0.0))
+        low, high = place([axis.low, axis.high])
+        assert values[0] == pytest.approx(low, abs=0.01 * (high - low))
+        assert values[-1] == pytest.approx(high, abs=0.01 * (high - low))
     assert sampled_cells(300, 1) == cells != sampled_cells(300, 2)
 
 

@@ -96,11 +96,9 @@ def test_a_beam_without_inertia_starts_where_it_rests():
     beam = {**BEAM, "fidelity": "quasi_static", "distributed_load": -5.0, "alpha_b": 0.01}
     what = scene(beam=beam, spring=SPRING, loads=None)
     run = simulate(what)
-    columns = run.columns
-    EI, KAG = (
-        what.beam.young_modulus * what.beam.second_moment_of_area,
-        5 / 6 * what.beam.area * what.beam.shear_modulus,
-    )
+    columns, loaded = run.columns, what.beam
+    EI = loaded.young_modulus * loaded.second_moment_of_area
+    KAG = 5 / 6 * loaded.area * loaded.shear_modulus
     free = -5.0 * (0.8**4 / (8.0 * EI) + 0.8**2 / (2.0 * KAG))
     np.testing.assert_allclose(columns["y"], free / (1.0 + K1 * tip_compliance(what.beam)), rtol=1e-10)
     C, arm = columns["contact_force"][0], 0.8 * (1.0 - np.linspace(0.0, 1.0, 21))

@@ -32,7 +32,9 @@ class Deadly(sweep.Sweep):
 
 
 def plan(kind=sweep.Sweep, masses="1,2", **options):
-    return kind(scene=load_scene("duffing"), vary=(f"spring.mass={masses}",), metric=("y_min",), **options)
+    return kind(
+        scene=load_scene("duffing", ["time.t_end=0.1"]), vary=(f"spring.mass={masses}",), metric=("y_min",), **options
+    )
 
 
 def test_only_cases_without_a_record_are_computed(tmp_path):

@@ -21,29 +21,18 @@ def small(**changes):
     return with_changes(load_scene("soft"), beam={"n_elements": 6}, coupling={"macro_step": 1e-3}, **changes)
 
 
-@pytest.fixture(scope="module")
-def rows():
-    study = Tradeoff.of(small(), until=0.06, repeats=1)
-    with pytest.MonkeyPatch.context() as patch:  # on a busy machine, too, nothing is given up
-        patch.setattr(tradeoff, "_LIMIT", HANGS)
-        return study.rows(record_all(study))
-
-
-def by_family(rows, family):
-    return [row for row in rows if row["family"] == family]
-
-
-def test_a_curve_between_few_points_is_judged_too(rows):
+def test_a_curve_between_few_points_is_judged_too(monkeypatch):
     """Between them one step of the cubic start of a scheme is worse than at them: 16 ms, 4 steps."""
-    coarse = by_family(rows, "energy 2")[0]
-    scene = with_changes(
-        small(), time={"t_end": 0.06}, coupling={"degree": 2, "macro_step": coarse["coupling.macro_step"]}
-    )
+    monkeypatch.setattr(tradeoff, "_LIMIT", HANGS)  # on a busy machine, too, nothing is given up
+    study = Tradeoff.of(small(), until=0.06, repeats=1)
+    coarse = next(case for case in study.cases().values() if case["family"] == "energy 2")
+    scene = study.at(coarse)
     run = tradeoff.simulate(scene)
     at_points = event_driven.simulate(scene, sample_times=run.time)
     index = np.searchsorted(at_points.time, run.time)
     scale = np.abs(at_points.u_tip - at_points.u_tip[0]).max()
-    assert coarse["error_u_tip"] > 3.0 * np.abs(run.u_tip - at_points.u_tip[index]).max() / scale
+    error = study.record(coarse)["error_u_tip"]
+    assert error > 3.0 * np.abs(run.u_tip - at_points.u_tip[index]).max() / scale
 
 
 def test_what_a_configuration_costs_and_where_it_errs_is_that_of_its_run():

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import partialmethod
 
 import pytest
 from commands import command, printed
@@ -44,120 +45,112 @@ def test_they_are_told_in_a_table_of_80_columns(told):
 # -- a wrong parameter fails ----------------------------------------------------------------------------------------
 
 
-def changed(body, key, factor):
-    """The body gets ``key`` times ``factor`` instead of what it was asked to have."""
-    right = body.__init__
+@pytest.fixture
+def changed(monkeypatch):
+    """Let every body of a kind get ``key`` times ``change``, or another name, instead of what it was asked to have."""
 
-    def wrong(self, parameters, *rest):
-        right(self, parameters.model_copy(update={key: factor * getattr(parameters, key)}), *rest)
+    def change(body, key, change):
+        right = body.__init__
 
-    def mistake(patch):
-        patch.setattr(body, "__init__", wrong)
+        def wrong(self, parameters, *rest):
+            value = change if isinstance(change, str) else change * getattr(parameters, key)
+            right(self, parameters.model_copy(update={key: value}), *rest)
 
-    mistake.__name__ = f"{key}-{factor}"
-    return mistake
+        monkeypatch.setattr(body, "__init__", wrong)
+
+    return change
 
 
-def force_off(patch):
+@pytest.mark.parametrize(
+    ("section", "body", "key", "change"),
+    [
+        (verify.static_deflection, FmuBeam, "young_modulus", 1.01),
+        (verify.static_deflection, FmuBeam, "shear_modulus", 1.01),
+        (verify.frequencies, FmuBeam, "density", 1.01),
+        (verify.frequencies, FmuBeam, "second_moment_of_area", 0.99),
+        (verify.frequencies, FmuBeam, "shear_modulus", 1.01),
+        (verify.frequencies, FmuBeam, "mass_matrix", "consistent"),  # its sixth frequency is 0.5 % higher
+        (verify.duffing, FmuSpring, "mass", 1.01),
+        (verify.duffing, FmuSpring, "cubic_stiffness", 1.01),
+        (verify.bar_impact, FmuBeam, "density", 1.01),
+        (verify.two_masses, FmuSpring, "linear_stiffness", 1.01),
+        (verify.compliant_impact, FmuSpring, "mass", 1.01),
+        (verify.compliant_impact, FmuBeam, "density", 1.01),
+        (verify.link, FmuBeam, "shear_modulus", 1.01),
+        (verify.link, FmuSpring, "linear_stiffness", 1.01),
+        (verify.tie, FmuSpring, "mass", 1.01),
+        (verify.resonance, FmuBeam, "alpha_b", 1.01),
+        (verify.pulse, FmuSpring, "linear_stiffness", 1.01),
+        (verify.slow_ramp, FmuBeam, "shear_modulus", 1.01),
+    ],
+    ids=lambda given: getattr(given, "solution", given).__name__ if callable(given) else str(given),
+)
+def test_a_body_that_is_off_by_one_percent_fails(section, body, key, change, changed, none_kept):
+    changed(body, key, change)
+    assert any(not check.passed for check in section())
+
+
+RIGHT = {method: getattr(FmuBeam, method) for method in ("advance", "energies")}
+RESISTANCE = Compliance.resistance
+
+
+def pushed(self, time, size, force, *rest):
     """The beam gets 1.01 C."""
-    right = FmuBeam.advance
-    patch.setattr(
-        FmuBeam, "advance", lambda self, t, size, c, *rest: right(self, t, size, (1.01 * c[0], *c[1:]), *rest)
-    )
+    return RIGHT["advance"](self, time, size, (1.01 * force[0], *force[1:]), *rest)
 
 
-def energy_off(part):
+def energies(self, part):
     """The beam tells 1.01 of one of its energies."""
-    right = FmuBeam.energies
-
-    def wrong(self):
-        told = right(self)
-        return told._replace(**{part: 1.01 * getattr(told, part)})
-
-    def mistake(patch):
-        patch.setattr(FmuBeam, "energies", wrong)
-
-    mistake.__name__ = f"energy_off_{part}"
-    return mistake
+    told = RIGHT["energies"](self)
+    return told._replace(**{part: 1.01 * getattr(told, part)})
 
 
-def consistent(patch):
-    """Every mesh has the consistent mass: its sixth frequency is 0.5 % higher."""
-    right = FmuBeam.__init__
-
-    def wrong(self, beam, *rest):
-        right(self, beam.model_copy(update={"mass_matrix": "consistent"}), *rest)
-
-    patch.setattr(FmuBeam, "__init__", wrong)
+def hardly_damped(law, p, rate):
+    """The contact takes 1 % less than χ would."""
+    return RESISTANCE(replace(law, damping=0.99 * law.damping), p, rate)
 
 
-def gap_left_open(patch):
-    """The scheme's conditions are met 1e-4 H late."""
+def base_as_force(self, load):
+    """The spring takes the acceleration of its base for a force."""
+    return [("external_force", 1.0)]
+
+
+@pytest.mark.parametrize(
+    ("section", "owner", "method", "wrong"),
+    [
+        (verify.energy_scheme, FmuBeam, "advance", pushed),
+        (verify.energy_scheme, FmuBeam, "energies", partialmethod(energies, "kinetic")),
+        (verify.energy_scheme, FmuBeam, "energies", partialmethod(energies, "potential")),
+        (verify.energy_scheme, FmuBeam, "energies", partialmethod(energies, "dissipated")),
+        (verify.hunt_crossley, Compliance, "resistance", hardly_damped),
+        (verify.moving_base, FmuSpring, "_inputs_of", base_as_force),
+    ],
+    ids=["force", "kinetic", "potential", "dissipated", "damping", "base"],
+)
+def test_a_part_that_is_wrong_fails(section, owner, method, wrong, monkeypatch, none_kept):
+    monkeypatch.setattr(owner, method, wrong)
+    assert any(not check.passed for check in section())
+
+
+def test_a_scheme_whose_conditions_are_met_late_fails(monkeypatch, none_kept):
+    """By 1e-4 H."""
     for degree, right in SCHEMES["energy"].items():
 
         def wrong(m, size, right=right):
             return tuple(r + 1e-4 * size * m.velocity for r in right(m, size))
 
-        patch.setitem(SCHEMES["energy"], degree, wrong)
+        monkeypatch.setitem(SCHEMES["energy"], degree, wrong)
+    assert any(not check.passed for check in verify.energy_scheme())
 
 
-def undamped(patch):
-    """The contact takes 1 % less than χ would."""
-    right = Compliance.resistance
-    patch.setattr(
-        Compliance, "resistance", lambda law, p, rate: right(replace(law, damping=0.99 * law.damping), p, rate)
-    )
-
-
-def base_as_force(patch):
-    """The spring takes the acceleration of its base for a force."""
-    patch.setattr(FmuSpring, "_inputs_of", lambda self, load: [("external_force", 1.0)])
-
-
-@pytest.mark.parametrize(
-    ("section", "mistake"),
-    [
-        (verify.static_deflection, changed(FmuBeam, "young_modulus", 1.01)),
-        (verify.static_deflection, changed(FmuBeam, "shear_modulus", 1.01)),
-        (verify.frequencies, changed(FmuBeam, "density", 1.01)),
-        (verify.frequencies, changed(FmuBeam, "second_moment_of_area", 0.99)),
-        (verify.frequencies, changed(FmuBeam, "shear_modulus", 1.01)),
-        (verify.frequencies, consistent),
-        (verify.energy_scheme, force_off),
-        (verify.energy_scheme, energy_off("kinetic")),
-        (verify.energy_scheme, energy_off("potential")),
-        (verify.energy_scheme, energy_off("dissipated")),
-        (verify.duffing, changed(FmuSpring, "mass", 1.01)),
-        (verify.duffing, changed(FmuSpring, "cubic_stiffness", 1.01)),
-        (verify.bar_impact, changed(FmuBeam, "density", 1.01)),
-        (verify.two_masses, changed(FmuSpring, "linear_stiffness", 1.01)),
-        (verify.energy_scheme, gap_left_open),
-        (verify.compliant_impact, changed(FmuSpring, "mass", 1.01)),
-        (verify.compliant_impact, changed(FmuBeam, "density", 1.01)),
-        (verify.hunt_crossley, undamped),
-        (verify.link, changed(FmuBeam, "shear_modulus", 1.01)),
-        (verify.link, changed(FmuSpring, "linear_stiffness", 1.01)),
-        (verify.tie, changed(FmuSpring, "mass", 1.01)),
-        (verify.resonance, changed(FmuBeam, "alpha_b", 1.01)),
-        (verify.pulse, changed(FmuSpring, "linear_stiffness", 1.01)),
-        (verify.slow_ramp, changed(FmuBeam, "shear_modulus", 1.01)),
-        (verify.moving_base, base_as_force),
-    ],
-    ids=lambda given: getattr(given, "solution", given).__name__,
-)
-def test_a_mistake_of_one_percent_fails(section, mistake, monkeypatch, none_kept):
-    mistake(monkeypatch)
-    assert any(not check.passed for check in section())
-
-
-def test_json_is_the_checks_and_a_failed_one_is_exit_code_1(monkeypatch, none_kept):
+def test_json_is_the_checks_and_a_failed_one_is_exit_code_1(monkeypatch, changed, none_kept):
     monkeypatch.setattr(verify, "SECTIONS", (verify.duffing, verify.static_deflection))
     document = json.loads(printed("verify", "--json"))
     assert document["passed"] is True
     assert [section["title"] for section in document["sections"]] == [section.title for section in verify.SECTIONS]
     for row, check in zip(document["sections"][0]["checks"], verify.duffing(), strict=True):
         assert (row["exact"], row["computed"], row["passed"]) == (check.exact, check.computed, check.passed)
-    changed(FmuSpring, "mass", 1.01)(monkeypatch)
+    changed(FmuSpring, "mass", 1.01)
     result = command("verify", "--json")
     assert result.exit_code == 1
     assert json.loads(result.stdout)["passed"] is False
