@@ -1,7 +1,8 @@
-"""Steps as long as their error allows; a step itself tells how wrong it is.
+"""Where macro steps end: on the grid t₀ + k H, which events do not shift, or where their error asks for it.
 
-Nothing is computed twice for it: conditions of higher order than those the scheme has imposed are looked at where the
-step has them anyway (``docs/coupling.md``, "Adaptive macro steps").
+Of steps as long as their error allows, each tells itself how wrong it is. Nothing is computed twice for it: conditions
+of higher order than those the scheme has imposed are looked at where the step has them anyway (``docs/coupling.md``,
+"Adaptive macro steps").
 """
 
 from __future__ import annotations
@@ -13,11 +14,15 @@ from ..contact.phases import Phase
 from ..coupling.protocol import Scales, Step
 from ..results.paths import Path
 from ..scene import SAME, Scene
+from ..scene.scene import SHORTEST_STEP
 from ..scene.statics import tip_compliance
-from .macro_steps import SHORT_REMAINDER
 from .outcome import RunStopped
 from .stepping import Pair, State
 
+#: A remainder of the macro grid shorter than this fraction of H joins the next step.
+_SHORT_REMAINDER = 0.25
+#: The first step after an impact, as a fraction of H: ends that have just met often part or meet again within H.
+_AFTER_IMPACT = 0.125
 #: Sizes are the run's length times 2^(−k/4): few enough for the coupling to remember its response to each.
 _PER_OCTAVE = 4
 #: k/4 of the first step, of the longest and of the shortest.
@@ -28,6 +33,35 @@ _SHRINK, _GROW, _SAFETY = 0.125, 2.0, 0.9
 _ROUNDING = 64.0 * 2.0**-52
 #: Order of the cubic.
 _CUBIC = 4
+
+
+class MacroGrid(Stateful):
+    """The grid t₀ + k H up to t_end [s]."""
+
+    def __init__(self, start: float, end: float, macro_step: float) -> None:
+        self._start, self._end = start, end
+        self.size = macro_step  #: H [s]
+
+    def next(self, time: float, kink: float = inf, *, struck: bool = False) -> tuple[float, float]:
+        """Return when the step from ``time`` should end, and its size [s] (exactly H where it is a whole one).
+
+        It ends at ``kink`` [s], where a load jumps or bends, if that comes first or soon after. It is short if ends
+        have ``struck`` each other at ``time``.
+        """
+        H = self.size
+        if struck:
+            size = _AFTER_IMPACT * H
+            if time + size < self._end:
+                return (time + size, size) if kink >= time + size + _SHORT_REMAINDER * H else (kink, kink - time)
+        k = int((time - self._start) / H + 1.0)
+        while (target := self._start + k * H) - time < _SHORT_REMAINDER * H:
+            k += 1
+        size = target - time
+        if target >= self._end - SHORTEST_STEP * H:
+            target, size = self._end, self._end - time
+        if kink < target + _SHORT_REMAINDER * H:
+            target, size = kink, kink - time
+        return target, H if abs(size - H) <= SAME * H else size
 
 
 class Adapted(Memory):
@@ -75,9 +109,9 @@ class AdaptiveSteps(Stateful):
         Error estimates tell how long steps may be, also where ends have ``struck`` each other.
         """
         size, left = self.size, self._end - time
-        if kink < time + (1.0 + SHORT_REMAINDER) * size:
+        if kink < time + (1.0 + _SHORT_REMAINDER) * size:
             return kink, kink - time
-        return (self._end, left) if left <= (1.0 + SHORT_REMAINDER) * size else (time + size, size)
+        return (self._end, left) if left <= (1.0 + _SHORT_REMAINDER) * size else (time + size, size)
 
     def note(self, energy: float) -> None:
         """Note that all energies together have been as large as this [J]."""
@@ -98,7 +132,7 @@ class AdaptiveSteps(Stateful):
         if error <= 1.0:
             # A step that ended on a kink tells of whole ones by the order, unless it was much shorter.
             wanted = min(size * factor, self.size * (1.0 if own.just_rejected else _GROW))
-            if not (to_kink and (wanted < self.size or size < SHORT_REMAINDER * self.size)):
+            if not (to_kink and (wanted < self.size or size < _SHORT_REMAINDER * self.size)):
                 own.number = self._rung_below(wanted)
             own.just_rejected = False
             return True
