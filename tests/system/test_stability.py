@@ -87,6 +87,12 @@ def test_a_cell_is_stopped_by_what_its_last_steps_show_when_it_is_cut(monkeypatc
     assert "jacobi of degree 0 has changed the energy" in outcome["reason"]
 
 
+def test_a_dip_at_an_end_of_the_step_to_rounding_is_looked_at_once():
+    """A soft beam without inertia in steps of 0.1 s: between the dip and the end of the step there was no time."""
+    soft = {"macro_step": 0.1, "stiffness": 1.0, "fidelity": "quasi_static", "external_force": 1.0}
+    assert run_cell(AT_REST | soft)["kind"] != "garbage"
+
+
 def test_a_spring_that_escapes_is_stopped_and_has_kept_its_energy():
     """Its potential and its kinetic energy are 1e31 J and cancel to 1e23: beside that IDA's tolerance was 6e-5."""
     outcome = run_cell(sampled_cells(100, 1)[53])

@@ -146,7 +146,8 @@ class Detector:
             bottom = Place(dip.size, function(dip.end), function.means(dip.end, dip.size))
             if bottom.sample[0] < floor:
                 return dip
-            stretches += [(bottom, after), (before, bottom)]
+            # A dip at an end of a stretch to rounding leaves nothing between the two.
+            stretches += [(a, b) for a, b in ((bottom, after), (before, bottom)) if b.time > a.time]
         return whole_step
 
     def _located(self, state: State, function: EventFunction, bracket: Step, guess: float) -> Step:
