@@ -131,8 +131,9 @@ build() {
   exec 9<.
   command -v flock >/dev/null && { flock -n 9 || { say "waiting for another build"; flock 9; }; }
   make_environment
-  # What the build takes comes first, FMPy for its headers; all else is installed while the compiler works.
-  install build --no-deps cmake ninja fmpy
+  # What the build takes comes first, FMPy for its headers; all else is installed while the compiler works, by a pip that
+  # is not as slow as those that come with older versions of Python.
+  install build --no-deps "pip>=25" cmake ninja fmpy
   install dev -e ".[dev]" &
   local configured packages=$!
   configured="$PWD ${SPRINGBEAM_PREFIX:-} ${CMAKE_PREFIX_PATH:-} ${CXX:-} $sundials"
