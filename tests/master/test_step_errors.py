@@ -53,6 +53,33 @@ def test_the_errors_of_a_step_fall_with_its_size_by_the_orders_that_they_tell(sc
     assert (observed > told - 0.2).all()
 
 
+def told(coupling, gap, contact=NO_FORCE):
+    """Errors of a step of 20 ms whose gap at its end is told; beside 0.5 m, 4 m/s, 8 J and 0.25 kg."""
+    rest = Motion(0.0, 0.0, 0.0, 0.0)
+    before = Motion(-0.01, 0.0, 0.0, 0.0) if isinstance(coupling, SoftSolver) else rest
+    step = Step(0.0, 0.02, contact, NO_FORCE, (before, rest), (gap, rest))
+    return coupling.local_errors(step, Scales(0.5, 4.0, 8.0, 0.25))
+
+
+def test_errors_are_shares_of_the_length_the_energy_and_the_speed_of_a_motion():
+    """A mismatch of 0.3 m/s: √(½ μ w²/E) and H w/6 of 0.5 m. By a force of 2 N a gap of 10 µm·s² inside does work.
+
+    Of λ p with λ = 1 kN/m, p from 1 to 3 cm, of the mean 3 cm, degree 0 leaves P₁ with 10 N, degree 1 P₂ with −10 N.
+    """
+    mismatch = Motion(0.0, 0.3, 0.0, 0.0)
+    for degree in (0, 1, 2):
+        of_energy, of_length = 0.3 * np.sqrt(0.5 * 0.25 / 8.0), 0.02 * 0.3 / (6.0 * 0.5)
+        expected = [of_energy, of_length]
+        assert [error for error, _ in told(Tie("energy", degree, 1e-13), mismatch)] == pytest.approx(expected, rel=1e-14)
+    inside = Motion(0.0, 0.0, 1e-5, 0.0)  # C = 100 N/s τ does −100 N/s ∫ g on it
+    errors = told(Tie("hermite", 1, 1e-13), inside, (0.0, 100.0, 0.0))
+    assert [error for error, _ in errors] == pytest.approx([1e-5 / 0.02 / 0.5, 1e-3 / 8.0], rel=1e-14)
+    deep = Motion(-0.03, 0.0, -0.03 * 0.02, 0.0)
+    for degree in (0, 1):
+        ((error, _),) = told(SoftSolver(Compliance(1e3, 1.0), degree, 1e-13), deep)
+        assert error == pytest.approx(0.02 * 10.0 / (6.0 * 0.25 * 4.0), rel=1e-12)
+
+
 @pytest.mark.parametrize("apart", [0.0, 0.99, 1.01])
 def test_events_that_crowd_stop_the_run(apart):
     """20,000 in a row, each within a macro step of the one before, are none too many."""

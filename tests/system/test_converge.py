@@ -32,10 +32,11 @@ def test_errors_are_from_the_limit_and_as_given_is_the_mesh_of_the_scene():
     ends = {"elements": lambda row: 1.0 + (20.0 / row["beam.n_elements"]) ** 2, "modes": lambda row: 7.0}
     cases = study.cases().items()
     records = {name: {"u_tip_end": ends[case["refined"]](case), "cost_wall_time": 1.0} for name, case in cases}
-    errors = [row["error_u_tip_end"] for row in study.rows(records)]
+    found = study.findings(records)
+    errors = [row["error_u_tip_end"] for row in found.tables["converge"]]
     assert errors[:3] == pytest.approx([1.0, 0.25, 0.0625], rel=1e-9)
     with (console := Console(width=80)).capture() as shown:
-        console.print(*study.findings(records).shown, sep="\n")
+        console.print(*found.shown, sep="\n")
     told = [line.split() for line in shown.get().splitlines() if "u_tip_end" in line]
     assert told[0] == ["u_tip_end", "[m]", "2", "1", "1.0e+00", "2.0"]  # given, extrapolated, its error, order
 
