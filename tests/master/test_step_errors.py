@@ -70,7 +70,9 @@ def test_errors_are_shares_of_the_length_the_energy_and_the_speed_of_a_motion():
     for degree in (0, 1, 2):
         of_energy, of_length = 0.3 * np.sqrt(0.5 * 0.25 / 8.0), 0.02 * 0.3 / (6.0 * 0.5)
         expected = [of_energy, of_length]
-        assert [error for error, _ in told(Tie("energy", degree, 1e-13), mismatch)] == pytest.approx(expected, rel=1e-14)
+        assert [error for error, _ in told(Tie("energy", degree, 1e-13), mismatch)] == pytest.approx(
+            expected, rel=1e-14
+        )
     inside = Motion(0.0, 0.0, 1e-5, 0.0)  # C = 100 N/s τ does −100 N/s ∫ g on it
     errors = told(Tie("hermite", 1, 1e-13), inside, (0.0, 100.0, 0.0))
     assert [error for error, _ in errors] == pytest.approx([1e-5 / 0.02 / 0.5, 1e-3 / 8.0], rel=1e-14)
