@@ -175,7 +175,7 @@ def installed(monkeypatch, *faults):
     """The script of all FMUs loaded from now on; it follows where the master is.
 
     That is "start", the phase of the step attempted, "location" while an event is being located, "rollback" while
-    the bodies go back to the mark, "row" while a row is written, "event" while one acts; in Algorithm 1 "paper".
+    the bodies go back to the mark, "row" while a row is written; in Algorithm 1 "paper".
     """
     script = Script(faults)
     release()  # what is kept would not be loaded
@@ -199,7 +199,6 @@ def installed(monkeypatch, *faults):
         (Pair, "rewind", "rollback"),
         (Master, "_record", "row"),
         (detection, "locate", "location"),
-        (Master, "_act", "event"),
         (Algorithm1, "solve", "paper"),
     ):
         watch(owner, name, lambda *_, where=where: where)
