@@ -42,6 +42,13 @@ def fmu_folder():
 
 
 @pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty folder, in which the test runs."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
 def none_kept():
     """No body of an FMU is kept from an earlier test, nor for a later one."""
     release()

@@ -202,6 +202,7 @@ def test_the_law_inside_follows_the_rate_of_the_tip(spring):
     assert k.partials(["reaction"], "tip_velocity") == [0.0]
 
 
+@pytest.mark.parametrize("version", ["2.0"])
 def test_directional_derivatives_at_the_start_are_those_of_the_outputs(case):
     """In initialization mode every pair that InitialUnknowns declares, by parameters and inputs, if both are real."""
     pairs = declared(case, "initialUnknowns")

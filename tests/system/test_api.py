@@ -21,8 +21,7 @@ def run():
     return simulate(SOFT)
 
 
-def test_rows_at_an_interval_are_those_of_at(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_rows_at_an_interval_are_those_of_at(here):
     assert 0.072 / 3e-3 < 24.0
     printed("run", "soft", "--set=time.t_end=0.072", "--out=rows", "--no-plots", "--output-interval=3e-3")
     printed("run", "soft", "--set=time.t_end=0.072", "--out=all", "--no-plots")

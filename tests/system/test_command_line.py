@@ -161,8 +161,7 @@ def test_the_command_alone_shows_how_to_start():
         COMMAND.commands[name].make_context(name, arguments.split())
 
 
-def test_json_of_a_run_that_stops_early_is_its_summary_and_the_error_is_on_stderr(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_json_of_a_run_that_stops_early_is_its_summary_and_the_error_is_on_stderr(here):
     unstable = ["contact.law=compliance", "coupling.scheme=jacobi", "contact.stiffness=1e9", "coupling.macro_step=1e-2"]
     result = command("run", "soft", "--no-plots", "--json", *[word for text in unstable for word in ("--set", text)])
     assert result.exit_code == 3
@@ -185,9 +184,8 @@ def test_keys_has_the_schema_and_the_metrics_too():
     ("name", "place_of_results"),
     [("run", "results/soft"), ("sweep", "varied"), ("report", "page.html")],
 )
-def test_quiet_prints_only_where_the_results_are(place, arguments, tmp_path, monkeypatch, name, place_of_results):
-    (tmp_path / "done").symlink_to(place / "done")
-    monkeypatch.chdir(tmp_path)
+def test_quiet_prints_only_where_the_results_are(place, arguments, here, name, place_of_results):
+    (here / "done").symlink_to(place / "done")
     quiet = () if name == "report" else ("--quiet",)
     assert printed(name, *arguments(TABLES[name]), *quiet) == f"{place_of_results}\n"
     assert Path(place_of_results).exists()

@@ -143,17 +143,16 @@ def test_the_paper_law_agrees_with_algorithm_1_up_to_t_end(t_end, steps, impact)
     assert report["verdict"] == "agrees"
 
 
-def test_quick_compares_the_first_quarter_and_leaves_the_last_halving_out(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_quick_compares_the_first_quarter_and_leaves_the_last_halving_out(here):
     settings = ["--set", "time.t_end=0.2", "--set", "beam.n_elements=6", "--quick", "--json"]
     found = json.loads(printed("crosscheck", "soft", *settings))
     assert (found["verdict"], found["scene"]["time"]["t_end"]) == ("agrees", 0.05)
-    rows = list(csv.DictReader((tmp_path / found["files"][0]).open()))
+    rows = list(csv.DictReader((here / found["files"][0]).open()))
     assert [float(row["error"]) for row in rows] == [row["error"] for row in found["quantities"]]
     found = json.loads(printed("crosscheck", "soft", *settings, "--orders"))
     assert "error_H/4" in found["orders"][0]
     assert "error_H/8" not in found["orders"][0]
-    rows = list(csv.DictReader((tmp_path / found["files"][0]).open()))
+    rows = list(csv.DictReader((here / found["files"][0]).open()))
     assert [float(row["order_H"]) for row in rows] == [row["order_H"] for row in found["orders"]]
 
 

@@ -94,10 +94,9 @@ def test_a_bad_file_is_refused_with_its_line_and_column(tmp_path, text):
     assert BAD[text] in str(error.value)
 
 
-def test_the_command_compare_takes_a_measurement(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_the_command_compare_takes_a_measurement(here):
     simulate(OSCILLATOR).save("run")
-    written(tmp_path / "m.csv", "time [s],position [mm]", TIMES + 0.2, 1e3 * exact())
+    written(here / "m.csv", "time [s],position [mm]", TIMES + 0.2, 1e3 * exact())
     shown = printed("compare", "run", "m.csv", "--map", "position=y")
     assert "shift" in shown
     told = json.loads(printed("compare", "run", "m.csv", "--map", "position=y", "--json", "--no-plots"))
@@ -105,7 +104,7 @@ def test_the_command_compare_takes_a_measurement(tmp_path, monkeypatch):
     assert told["residuals"][0]["relative"] < 1e-4
     assert json.loads(printed("compare", "run", "m.csv", "--map", "position=y", "--shift", "-0.2", "--json",
                               "--no-plots"))["residuals"][0]["relative"] < 1e-8  # fmt: skip
-    assert (tmp_path / "results" / "comparison.png").stat().st_size > 10_000
+    assert (here / "results" / "comparison.png").stat().st_size > 10_000
     assert "m.csv: --map CH1: there are the columns position" in refused("compare", "run", "m.csv", "--map", "CH1=y")
 
 
@@ -124,7 +123,7 @@ def test_a_contact_is_found_by_the_acceleration_of_the_tip_through_impacts(tmp_p
     assert key["value"] == pytest.approx(scene.contact.stiffness, rel=1e-6)
 
 
-@pytest.mark.parametrize("late", [0.0, 3.7e-3, 13.0])
+@pytest.mark.parametrize("late", [3.7e-3, 13.0])
 def test_keys_and_a_clock_that_is_off_are_found_to_1e_6_without_noise(tmp_path, late):
     path = written(tmp_path / "m.csv", "time,y", TIMES + late, exact())
     found = fitted(path)
@@ -200,9 +199,8 @@ def test_keys_that_the_data_does_not_determine_are_named(tmp_path, vary, why):
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")  # of means of nothing, where the clock has left the run
-def test_the_command_ends_with_1_where_the_data_does_not_tell(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    written(tmp_path / "m.csv", "time,y", TIMES, exact())
+def test_the_command_ends_with_1_where_the_data_does_not_tell(here):
+    written(here / "m.csv", "time,y", TIMES, exact())
     line = ["fit", "duffing", "m.csv", "--set", "time.t_end=0.6", "--vary"]
     told = command(*line, "spring.cubic_stiffness=-1e-12", "--out", "f")
     assert told.exit_code == 1
@@ -217,7 +215,7 @@ def test_the_command_ends_with_1_where_the_data_does_not_tell(tmp_path, monkeypa
     }.items():
         assert why in refused(*line, vary)
     assert "must be a finite number greater than 0" in refused(*line, "spring.mass=-1")
-    written(tmp_path / "few.csv", "time,y", TIMES[:2], exact()[:2])
+    written(here / "few.csv", "time,y", TIMES[:2], exact()[:2])
     few = command("fit", "duffing", "few.csv", "--vary", "spring.mass=1", "--out", "few")
     assert few.exit_code == 2
     assert "fewer of its points lie in the run" in few.stderr
@@ -226,11 +224,10 @@ def test_the_command_ends_with_1_where_the_data_does_not_tell(tmp_path, monkeypa
     assert "fewer of its points lie in the run than are needed to find spring.mass; make" in away.stderr
 
 
-def test_a_fit_that_is_done_is_shown_at_once(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    written(tmp_path / "m.csv", "time,y", TIMES, simulate(load_scene("duffing")).at(TIMES)["y"])
+def test_a_fit_that_is_done_is_shown_at_once(here):
+    written(here / "m.csv", "time,y", TIMES, simulate(load_scene("duffing")).at(TIMES)["y"])
     line = ["fit", "duffing", "m.csv", "--vary", "spring.linear_stiffness=3.2", "--set", "time.t_end=0.6"]
     first = json.loads(printed(*line, "--out", "f", "--json"))
     assert first["keys"][0]["value"] == pytest.approx(3.0, rel=1e-6)
     assert json.loads(printed(*line, "--out", "f", "--json")) == first
-    assert (tmp_path / "f" / "fit.csv").read_text().count("\n") > 5
+    assert (here / "f" / "fit.csv").read_text().count("\n") > 5

@@ -87,8 +87,7 @@ def test_a_killed_worker_loses_its_own_case_alone_and_only_if_it_dies_again(tmp_
     assert not list(temporary.iterdir())
 
 
-def test_an_interrupted_study_says_how_it_goes_on_and_does(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_an_interrupted_study_says_how_it_goes_on_and_does(here, monkeypatch):
     monkeypatch.setattr(sweep.Sweep, "parallel", False)
     shown = printed(*SWEEP, "--out", "whole")
     assert re.search(r"^spring\.mass +y_min\n1 .*\n1\.25 .*\n1\.5 .*\n1\.75 .*\n2 .*\nresults ", shown, re.M)

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 from commands import HANGS, printed
-from scenes import kinds
+from scenes import kinds, soft
 
 from springbeam.monolithic import event_driven
 from springbeam.scene import load_scene, with_changes
@@ -17,14 +17,10 @@ from springbeam.studies.study import record_all, troubles
 from springbeam.studies.tradeoff import Tradeoff, cheapest, pareto
 
 
-def small(**changes):
-    return with_changes(load_scene("soft"), beam={"n_elements": 6}, coupling={"macro_step": 1e-3}, **changes)
-
-
 def test_a_curve_between_few_points_is_judged_too(monkeypatch):
     """Between them one step of the cubic start of a scheme is worse than at them: 16 ms, 4 steps."""
     monkeypatch.setattr(tradeoff, "_LIMIT", HANGS)  # on a busy machine, too, nothing is given up
-    study = Tradeoff.of(small(), until=0.06, repeats=1)
+    study = Tradeoff.of(soft(), until=0.06, repeats=1)
     coarse = next(case for case in study.cases().values() if case["family"] == "energy 2")
     scene = study.at(coarse)
     run = tradeoff.simulate(scene)
@@ -37,7 +33,7 @@ def test_a_curve_between_few_points_is_judged_too(monkeypatch):
 
 def test_what_a_configuration_costs_and_where_it_errs_is_that_of_its_run():
     """The spring strikes its stop once."""
-    scene = small(time={"t_end": 0.12})
+    scene = soft(time={"t_end": 0.12})
     run, exact = tradeoff.simulate(scene), event_driven.simulate(scene)
     row, summary = {**costs(run), **errors(run, exact, 1e-4)}, run.summary
     counts = {f"cost_{name}": sum(summary[f"{body}_{of}"] for body in ("beam", "spring"))
@@ -59,7 +55,7 @@ def test_what_a_configuration_costs_and_where_it_errs_is_that_of_its_run():
 def test_the_median_of_the_timings_counts_and_long_runs_are_timed_once(monkeypatch, seconds, settings, median, runs):
     left = iter(seconds)
     monkeypatch.setattr(Tradeoff, "_by_us", lambda study, case: {"cost_wall_time": next(left)})
-    record = Tradeoff(scene=small(), **settings).record({"family": "energy 0"})
+    record = Tradeoff(scene=soft(), **settings).record({"family": "energy 0"})
     assert (record["cost_wall_time"], len(record["times"])) == (median, runs)
 
 
@@ -68,7 +64,7 @@ def test_the_median_of_the_timings_counts_and_long_runs_are_timed_once(monkeypat
 ])  # fmt: skip
 def test_what_is_finer_than_one_that_took_too_long_is_left_out(quick, seconds, left_out):
     records = {"energy 0, H = 0.1": {"cost_wall_time": seconds}, "energy 1, H = 0.1": {"cost_wall_time": 99.0}}
-    skipped = Tradeoff(scene=small(), quick=quick).skipped({"family": "energy 0"}, records)
+    skipped = Tradeoff(scene=soft(), quick=quick).skipped({"family": "energy 0"}, records)
     assert (skipped is not None) is left_out
     assert not left_out or skipped["error"] == f"energy 0, H = 0.1 took more than {1 if quick else 10} s"
 
@@ -106,7 +102,7 @@ OTHERS = {"DOP853", "LSODA", "Radau"}
     ],
 )
 def test_every_axis_is_swept_that_the_law_has(law, there, absent):
-    study = Tradeoff(scene=small(contact={"law": law}, time={"t_end": 0.05}))
+    study = Tradeoff(scene=soft(contact={"law": law}, time={"t_end": 0.05}))
     families = {case["family"] for case in study.cases().values()}
     assert ENERGY | OTHERS | {"energy 2 adaptive"} | there <= families
     assert absent not in families
