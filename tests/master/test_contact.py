@@ -15,8 +15,10 @@ from springbeam.contact.phases import (
 from springbeam.results.trajectory import EventKind
 
 
-def after(impact, v, z, tip_mass, mass):
-    return v + impact.on_beam / tip_mass, z + impact.on_spring / mass
+def transitions_of(scene="soft", tip_mass=0.01, mass=1.0, equilibrium=0.0, **tables):
+    """The transitions of a scene whose largest speed so far is 1 m/s."""
+    scene = with_changes(load_scene(scene), **tables)
+    return Transitions(scene, None, tip_mass, mass, fastest=lambda: 1.0, equilibrium=equilibrium)
 
 
 @pytest.mark.parametrize("kind", [EventKind.RELEASE, EventKind.SEPARATION])
@@ -24,11 +26,10 @@ def after(impact, v, z, tip_mass, mass):
 def test_ends_that_are_let_go_have_one_velocity_but_where_they_vibrate(kind, v, one_velocity):
     """Parting by 20 % of the largest speed, here 1 m/s, and more is no error of the scheme."""
     z, tip_mass, mass = 0.5, 0.01, 1.0
-    transitions = Transitions(load_scene("soft"), None, tip_mass, mass, fastest=lambda: 1.0, equilibrium=0.0)
     ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, z, 0.0, 0.0)
-    _, phase, impact = transitions.after(kind, Phase(Joint.TIED), ends, 0.0, ends, 0.0, 1e-17)
+    _, phase, impact = transitions_of().after(kind, Phase(Joint.TIED), ends, 0.0, ends, 0.0, 1e-17)
     assert phase.joint is Joint.FREE
-    v_after, z_after = after(impact, v, z, tip_mass, mass)
+    v_after, z_after = v + impact.on_beam / tip_mass, z + impact.on_spring / mass
     if one_velocity:
         assert v_after == pytest.approx(z_after, rel=1e-14)
         assert tip_mass * v_after + mass * z_after == pytest.approx(tip_mass * v + mass * z, rel=1e-14)
@@ -39,17 +40,17 @@ def test_ends_that_are_let_go_have_one_velocity_but_where_they_vibrate(kind, v, 
 @pytest.mark.parametrize("seated", [False, True])
 def test_ends_that_are_let_go_with_one_velocity_to_rounding_get_no_impulse(seated):
     """Such as those that have just met: 1e-15 of the largest speed is no error of a scheme."""
-    transitions = Transitions(load_scene("soft"), None, 0.01, 1.0, fastest=lambda: 1.0, equilibrium=0.0)
     ends = tuple(Motion(0.0, velocity, 0.0, 0.0) for velocity in (1e-15, 0.0))
-    _, _, impact = transitions.after(EventKind.SEPARATION, Phase(Joint.TOUCH, seated), ends, 0.0, ends, 0.0, 1e-17)
+    _, _, impact = transitions_of().after(EventKind.SEPARATION, Phase(Joint.TOUCH, seated), ends, 0.0, ends, 0.0, 1e-17)
     assert impact == Impact()
 
 
 @pytest.mark.parametrize(("z", "kind"), [(-0.5, "retie"), (0.5, "separation")])
 def test_a_massless_tip_whose_force_vanishes_at_equilibrium_is_tied_again_if_it_falls(z, kind):
-    transitions = Transitions(load_scene("soft"), None, 0.0, 1.0, fastest=lambda: 1.0, equilibrium=0.0)
     ends = (Motion(0.0, z, 0.0, 0.0),) * 2
-    found, phase, _ = transitions.after(EventKind.SEPARATION, Phase(Joint.TOUCH), ends, 0.0, ends, 0.0, 1e-17)
+    found, phase, _ = transitions_of(tip_mass=0.0).after(
+        EventKind.SEPARATION, Phase(Joint.TOUCH), ends, 0.0, ends, 0.0, 1e-17
+    )
     assert (found, phase.joint) == (kind, Joint.TIED if kind == "retie" else Joint.FREE)
 
 
@@ -57,9 +58,8 @@ def test_a_massless_tip_whose_force_vanishes_at_equilibrium_is_tied_again_if_it_
     (-1e-9, 1.0, "tied"), (1e-9, -1.0, "touch"), (-1e-14, 1.0, "touch"), (1e-14, -1.0, "tied"),
 ])  # fmt: skip
 def test_where_they_go_tells_what_ends_are_that_meet_at_equilibrium_to_rounding(height, z, joint):
-    transitions = Transitions(load_scene("soft"), None, 0.01, 1.0, fastest=lambda: 1.0, equilibrium=0.1)
     ends = (Motion(0.1 + height, z, 0.0, 0.0),) * 2
-    _, phase, _ = transitions.after(EventKind.IMPACT, Phase(), ends, 0.0, ends, 0.0, 1e-18)
+    _, phase, _ = transitions_of(equilibrium=0.1).after(EventKind.IMPACT, Phase(), ends, 0.0, ends, 0.0, 1e-18)
     assert phase.joint.value == joint
 
 
@@ -68,9 +68,8 @@ def test_where_they_go_tells_what_ends_are_that_meet_at_equilibrium_to_rounding(
 )
 def test_what_a_heavier_tip_takes_up_at_once_has_struck_for_the_last_time_unless_nothing_is_lost(v, e, kind):
     """A top that falls on the foundation by 0.5 m/s, tied to a tip of ten times its mass."""
-    scene = with_changes(load_scene("soft"), stop={"restitution": e})
-    transitions = Transitions(scene, None, 10.0, 1.0, fastest=lambda: 1.0, equilibrium=0.0)
-    ends = tuple(Motion(scene.stop.position, w, 0.0, 0.0) for w in (v, -0.5))
+    transitions = transitions_of(tip_mass=10.0, stop={"restitution": e, "position": -0.015})
+    ends = tuple(Motion(-0.015, w, 0.0, 0.0) for w in (v, -0.5))
     found, *_ = transitions.after(EventKind.STOP_IMPACT, Phase(Joint.TIED), ends, 0.0, ends, 0.0, 1e-17)
     assert (found, transitions.state) == (kind, max(abs(v), 0.5))
 
@@ -83,8 +82,7 @@ def test_a_tip_that_the_foundation_lets_go_leaves_at_rest_but_where_it_vibrates(
     A tip that leaves tied to the top with another velocity would strike the foundation at once, or fly higher.
     """
     tip_mass, held = 0.01, Phase(Joint.TIED if mass == inf else Joint.TOUCH, seated=True)
-    scene = load_scene("beam-on-stop" if mass == inf else "soft")
-    transitions = Transitions(scene, None, tip_mass, mass, fastest=lambda: 1.0, equilibrium=0.0)
+    transitions = transitions_of("beam-on-stop" if mass == inf else "soft", mass=mass)
     ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, 0.0, 0.0, 0.0)
     found, phase, impact = transitions.after(EventKind(kind), held, ends, 0.0, ends, -1.0, 1e-17)
     opened = Phase(Joint.TOUCH) if kind == "unseated" else Phase(Joint.FREE, seated=mass < inf)
@@ -100,10 +98,9 @@ def test_a_tip_that_the_foundation_lets_go_leaves_at_rest_but_where_it_vibrates(
 ])  # fmt: skip
 def test_a_rebound_that_is_lower_than_heights_can_be_told_apart_is_none_if_it_is_slow(speed, tolerance, kind):
     """It rises by (e z)²/2a with a = 1 km/s², 4.9e-12 m, and counts as none below 1e-4 of the fastest impact."""
-    scene = with_changes(load_scene("soft"), stop={"restitution": 0.9})
-    transitions = Transitions(scene, None, 0.01, 1.0, fastest=lambda: 1.0, equilibrium=0.0)
+    transitions = transitions_of(stop={"restitution": 0.9, "position": -0.015})
     for z in (-1.0, -speed / 0.9):
-        before, end = ((Motion(0.0, 0.0, 0.0, 0.0), Motion(scene.stop.position, w, 0.0, 0.0)) for w in (z + 1e-3, z))
+        before, end = ((Motion(0.0, 0.0, 0.0, 0.0), Motion(-0.015, w, 0.0, 0.0)) for w in (z + 1e-3, z))
         found, *_ = transitions.after(EventKind.STOP_IMPACT, Phase(), before, 1e-6, end, 0.0, tolerance)
     assert found == kind
 

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from springbeam.monolithic import algorithm1, event_driven
 from springbeam.monolithic.event_driven import first_event
 from springbeam.monolithic.exponential import Segment
-from springbeam.monolithic.laws import Phase, Watch, law_of
+from springbeam.monolithic.laws import Phase, Watch
 from springbeam.monolithic.oscillators import GAUSS
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.scene import Beam, load_scene, with_changes
@@ -150,16 +150,6 @@ def test_a_beam_on_a_link_is_the_matrix_exponential(stiffness, damping, alpha):
     expected = laws.linked(scene, mesh.M.toarray(), mesh.K.toarray(), 0.02 * x, -x, times)
     found = np.column_stack([result.u_tip, result.y])
     np.testing.assert_allclose(found, expected, atol=2e-13)
-
-
-@pytest.mark.parametrize(("name", "contact"), [("compliance", "touch"), ("compliance", "slack"), ("link", "tied")])
-def test_what_a_law_stores_and_takes_is_the_power_of_its_force(name, contact):
-    """C ṗ = dΦ/dt + dissipation, with dΦ/dt from Φ itself."""
-    law = law_of(linear(contact={"law": name, "stiffness": 30.0, "exponent": 2.5, "damping": 0.7}))
-    p, rate, h = np.array([0.1, 0.3]), np.array([-2.0, 0.5]), 1e-6
-    force = law.force(p, rate) if law.acts(contact) else np.zeros_like(p)
-    stored = (law.potential(p + h * rate) - law.potential(p - h * rate)) / (2.0 * h)
-    np.testing.assert_allclose(force * rate, stored + law.dissipation(contact, p, rate), rtol=1e-9, atol=1e-9)
 
 
 def test_a_damped_contact_lets_go_where_its_ends_part_fast_and_never_pulls():

@@ -93,30 +93,37 @@ def test_events_that_crowd_stop_the_run(apart):
         state.count_event(apart * most * H, H)
 
 
+REST = Motion(0.0, 0.0, 0.0, 0.0)
+
+
+def adaptive(upper, lower, absolute=1e-30, t_end=9.0):
+    """Steps of two masses from a relative tolerance of 1e-3 and an absolute one, and the state at their start."""
+    scene = with_changes(load_scene("soft"), coupling={"relative_tolerance": 1e-3, "absolute_tolerance": absolute})
+    pair = Pair(scene, upper, lower)
+    return AdaptiveSteps(scene, pair, 0.0, t_end), pair.initial_state(0.0)
+
+
 @pytest.mark.parametrize(("share", "holds"), [(0.99, True), (1.01, False)])
 @pytest.mark.parametrize("absolute", [1e-30, 5e-13])
 def test_no_more_than_the_tolerances_and_rounding_is_forgiven(absolute, share, holds):
     """The tip at 1 m moves by 1 nm, and may be 1e-3 of that, the absolute tolerance and 64 ulp of 1 m, 1.4e-14 m,
     beside the cubic."""
-    scene = with_changes(load_scene("soft"), coupling={"relative_tolerance": 1e-3, "absolute_tolerance": absolute})
-    way, rest, start = 1e-9, Motion(0.0, 0.0, 0.0, 0.0), Motion(1.0, 0.0, 0.0, 0.0)
+    steps, state = adaptive(Upper(1.0, y=1.0), DuffingBody(1.0), absolute)
+    way = 1e-9
     beside = share * (1e-3 * way + absolute + 64.0 * 2.0**-52)
-    pair = Pair(scene, Upper(1.0, y=1.0), DuffingBody(1.0))
     # In a step of 1 s from rest to rest: ∫ of the cubic is the mean of its ends, ∫∫ (7 f0 + 3 f1)/20.
     end = Motion(1.0 + way, 0.0, 1.0 + way / 2.0 + beside, 0.5 + 0.15 * way + beside / 2.0)
-    step = Step(0.0, 1.0, NO_FORCE, NO_FORCE, (start, rest), (end, rest))
-    assert AdaptiveSteps(scene, pair, 0.0, 9.0).holds(pair.initial_state(0.0), step, "") is holds
+    step = Step(0.0, 1.0, NO_FORCE, NO_FORCE, (Motion(1.0, 0.0, 0.0, 0.0), REST), (end, REST))
+    assert steps.holds(state, step, "") is holds
 
 
 def test_what_moves_little_is_judged_beside_how_far_it_has_come():
     """After a way of 1 m 1e-3 of that is allowed beside the cubic, for a step of 1 nm as well."""
-    scene = with_changes(load_scene("soft"), coupling={"relative_tolerance": 1e-3, "absolute_tolerance": 1e-30})
-    pair, rest = Pair(scene, Upper(1.0, y=1.0), DuffingBody(1.0)), Motion(0.0, 0.0, 0.0, 0.0)
-    steps, state = AdaptiveSteps(scene, pair, 0.0, 9.0), pair.initial_state(0.0)
+    steps, state = adaptive(Upper(1.0, y=1.0), DuffingBody(1.0))
 
     def to(start, way, beside):
         end = Motion(way, 0.0, 0.5 * (start + way) + beside, 0.05 * (7.0 * start + 3.0 * way) + 0.5 * beside)
-        return Step(0.0, 1.0, NO_FORCE, NO_FORCE, (Motion(start, 0.0, 0.0, 0.0), rest), (end, rest))
+        return Step(0.0, 1.0, NO_FORCE, NO_FORCE, (Motion(start, 0.0, 0.0, 0.0), REST), (end, REST))
 
     assert not steps.holds(state, to(1.0, 1.0 + 1e-9, 0.9e-3), "")
     steps.accept(to(1.0, 0.0, 0.0))
@@ -127,27 +134,25 @@ def test_what_moves_little_is_judged_beside_how_far_it_has_come():
 @pytest.mark.parametrize(("share", "holds"), [(0.99, True), (1.01, False)])
 def test_a_mismatch_that_a_step_creates_may_move_the_ends_by_the_tolerances(share, holds):
     """H w/6 may be 1e-3 of the way of 0.5 m, and 2 mm."""
-    scene = with_changes(load_scene("soft"), coupling={"relative_tolerance": 1e-3, "absolute_tolerance": 2e-3})
-    pair, w = Pair(scene, Upper(1.0, y=1.0), DuffingBody(1.0, y=1.0)), share * 6.0 * (1e-3 * 0.5 + 2e-3)
+    steps, state = adaptive(Upper(1.0, y=1.0), DuffingBody(1.0, y=1.0), 2e-3)
+    w = share * 6.0 * (1e-3 * 0.5 + 2e-3)
 
     def end(v):
         """From rest at 1 m to 0.5 m in 1 s, with the moments of the cubic."""
         return Motion(0.5, v, 0.75 - v / 12.0, 8.5 / 20.0 - v / 30.0)
 
     start = (Motion(1.0, 0.0, 0.0, 0.0),) * 2
-    state = pair.initial_state(0.0)
     state.phase = Phase(Joint.TIED)
     step = Step(0.0, 1.0, NO_FORCE, NO_FORCE, start, (end(w), end(0.0)))
-    assert AdaptiveSteps(scene, pair, 0.0, 9.0).holds(state, step, "") is holds
+    assert steps.holds(state, step, "") is holds
 
 
 def test_steps_grow_twofold_to_a_quarter_of_the_run_shrink_to_an_eighth_and_wait_after_that():
-    scene = with_changes(load_scene("soft"), coupling={"relative_tolerance": 1e-3, "absolute_tolerance": 1e-30})
-    pair, rest = Pair(scene, Upper(1.0), DuffingBody(1.0)), Motion(0.0, 0.0, 0.0, 0.0)
-    steps, state, sizes = AdaptiveSteps(scene, pair, 0.0, 16.0), pair.initial_state(0.0), []
+    steps, state = adaptive(Upper(1.0), DuffingBody(1.0), t_end=16.0)
+    sizes = []
     for far_off in (*[False] * 13, True, False, False):
-        end = Motion(1.0, 0.0, 9.0, 9.0) if far_off else rest
-        step = Step(0.0, steps.size, NO_FORCE, NO_FORCE, (rest, rest), (end, rest))
+        end = Motion(1.0, 0.0, 9.0, 9.0) if far_off else REST
+        step = Step(0.0, steps.size, NO_FORCE, NO_FORCE, (REST, REST), (end, REST))
         assert steps.holds(state, step, "") is not far_off
         sizes.append(steps.size)
     assert sizes == [*(16.0 * 2.0**-k for k in range(13, 2, -1)), 4.0, 4.0, 0.5, 0.5, 1.0]

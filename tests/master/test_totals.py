@@ -36,6 +36,11 @@ def found(steps, *events, window=0.1, scene=SCENE, apart=True):
     return totals(scene, steps, events, window)
 
 
+def parabola(t):
+    """12 t (1 − t), whose integral over the run is 2 N·s."""
+    return 12.0 * t * (1.0 - t), 12.0 - 24.0 * t, -24.0
+
+
 def test_what_events_take_is_of_the_stop_or_of_the_ends_that_meet():
     """1, 2, 4 … 64 J by the events of each kind: strokes on the stop and seating take 2 + 32 J, the others 93."""
     events = [Event(0.1 * k, kind, energy_loss=2.0**k) for k, kind in enumerate(EventKind)]
@@ -51,9 +56,9 @@ def test_what_events_take_is_of_the_stop_or_of_the_ends_that_meet():
 @pytest.mark.parametrize("window", [1e-3, 0.2, 0.5, 0.97])
 @pytest.mark.parametrize("ends", [[0.0, 1.0], [0.0, 0.4, 1.0], [0.0, 0.31, 0.33, 0.6, 1.0]])
 def test_a_window_need_not_begin_or_end_at_a_row(ends, window):
-    """C = 12 t (1 − t) again: the best window has ½ as its middle, wherever the steps end."""
-    steps = steps_with(lambda t: (12.0 * t * (1.0 - t), 12.0 - 24.0 * t, -24.0), ends)
-    assert found(steps, window=window)["contact_force_max"] == pytest.approx(3.0 - window**2, rel=1e-12)
+    """C = 12 t (1 − t): the best window has ½ as its middle, wherever the steps end."""
+    numbers = found(steps_with(parabola, ends), window=window)
+    assert numbers["contact_force_max"] == pytest.approx(3.0 - window**2, rel=1e-12)
 
 
 def test_durations_and_rebound():
@@ -145,15 +150,6 @@ def moving(ends, path):
     return steps_with(lambda t: (0.0, 0.0, 0.0), ends, path, path.deriv(), integrals)
 
 
-def test_a_window_over_steps_of_different_curvature_begins_where_both_its_ends_have_one_force():
-    """C = 1 − 4 s² before the peak, 1 − 16 s² after it, s from the peak: a window w begins 2w/3 before it and has the
-    mean 1 − 16 w²/27."""
-    steps = steps_with(lambda t: (0.0, 4.0, -8.0) if t < 0.5 else (1.0, 0.0, -32.0), [0.0, 0.5, 1.0])
-    numbers = found(steps, window=0.3)
-    assert numbers["contact_force_max"] == pytest.approx(1.0 - 16.0 * 0.3**2 / 27.0, rel=1e-13)
-    assert numbers["contact_force_max_time"] == pytest.approx(0.5 - 0.2, rel=1e-13)
-
-
 @pytest.mark.parametrize("force", [0.1, 0.7, 1e6 / 3.0])
 def test_of_windows_with_one_mean_the_first_is_told(force):
     """Whatever rounding makes of a force that is constant from 0.3 on, in steps that are no binary fractions."""
@@ -183,38 +179,37 @@ def test_the_window_is_a_fiftieth_of_the_slowest_period():
     assert force_window(massless) == pytest.approx(2.0 * np.pi / np.sqrt(stiffness) / 50.0, rel=1e-12)
 
 
-def test_a_peak_may_be_where_the_run_begins():
-    """C = 1 − t and no row at 0.2 s: over a window of 0.2 s the mean from the start on is 0.9 N."""
-    steps = steps_with(lambda t: (1.0 - t, -1.0, 0.0), np.linspace(0.0, 1.0, 8))
-    assert found(steps, window=0.2)["contact_force_max"] == pytest.approx(0.9, rel=1e-13)
-    struck = found(steps, Event(0.0, "impact", impulse_contact=0.05), window=0.2)
-    assert struck["contact_force_max"] == pytest.approx(0.9 + 0.05 / 0.2, rel=1e-13)
+WINDOWS = {
+    # C = 1 − 4 s² before the peak, 1 − 16 s² after it, s from the peak: a window w begins 2w/3 before it.
+    "of different curvature": (
+        lambda t: (0.0, 4.0, -8.0) if t < 0.5 else (1.0, 0.0, -32.0),
+        [0.0, 0.5, 1.0], None, 0.3, 1.0 - 16.0 * 0.3**2 / 27.0, 0.5 - 0.2,
+    ),
+    "where the run begins": (lambda t: (1.0 - t, -1.0, 0.0), np.linspace(0.0, 1.0, 8), None, 0.2, 0.9, 0.0),
+    "struck where it begins": (
+        lambda t: (1.0 - t, -1.0, 0.0), np.linspace(0.0, 1.0, 8), (0.0, 0.05), 0.2, 0.9 + 0.05 / 0.2, 0.0
+    ),
+    # Another window is the best of those that do not touch the impulse.
+    "an impulse at its start": (
+        parabola, [0.0, 1.0], (0.0, 1.0), 0.2, (1.0 + 6.0 * 0.2**2 - 4.0 * 0.2**3) / 0.2, 0.0
+    ),
+    "an impulse at its end": (
+        parabola, [0.0, 1.0], (1.0, 1.0), 0.2, (1.0 + 6.0 * 0.2**2 - 4.0 * 0.2**3) / 0.2, 0.8
+    ),
+    # (0.9 − 0.19) + 0.19 < 0.9 in doubles.
+    "an impulse beside rounding": (lambda t: (1.0, 0.0, 0.0), [0.0, 0.9], (0.9, 1.0), 0.19, 1.19 / 0.19, 0.71),
+    # It may begin before the run, where nothing acts, if the ends pull later.
+    "a pull later": (lambda t: (1.0 if t < 0.5 else -0.5, 0.0, 0.0), [0.0, 0.5, 1.0], None, 1.0, 0.5, 0.0),
+    "no force before the run": (lambda t: (1.0 if t < 0.1 else 0.0, 0.0, 0.0), [0.0, 0.1, 1.0], None, 0.2, 0.5, 0.0),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("at", [0.0, 1.0])
-def test_an_impulse_at_an_end_of_the_run_belongs_to_the_window_that_touches_it(at):
-    """C = 12 t (1 − t) in one step, in which another window is the best of those that do not touch the impulse."""
-    steps = steps_with(lambda t: (12.0 * t * (1.0 - t), 12.0 - 24.0 * t, -24.0), [0.0, 1.0])
-    numbers = found(steps, Event(at, "impact", impulse_contact=1.0), window=0.2)
-    assert numbers["contact_force_max"] * 0.2 == pytest.approx(1.0 + 6.0 * 0.2**2 - 4.0 * 0.2**3, rel=1e-13)
-
-
-def test_an_impulse_is_not_lost_by_the_rounding_of_a_window():
-    assert (0.9 - 0.19) + 0.19 < 0.9
-    steps = steps_with(lambda t: (1.0, 0.0, 0.0), [0.0, 0.9])
-    numbers = found(steps, Event(0.9, "impact", impulse_contact=1.0), window=0.19)
-    assert numbers["contact_force_max"] * 0.19 == pytest.approx(1.0 + 0.19, rel=1e-14)
-
-
-def test_a_window_may_begin_before_the_run_where_the_ends_pull_later():
-    steps = steps_with(lambda t: (1.0 if t < 0.5 else -0.5, 0.0, 0.0), [0.0, 0.5, 1.0])
-    numbers = found(steps, window=1.0)
-    assert numbers["contact_force_max"] == pytest.approx(0.5, rel=1e-14)
-    assert numbers["contact_force_max_time"] == 0.0  # nothing acts before
-
-
-def test_there_is_no_force_before_the_run():
-    """The row of the start has the force that begins there, 1 N, which a window from 0.2 s before it must not feel."""
-    steps = steps_with(lambda t: (1.0 if t < 0.1 else 0.0, 0.0, 0.0), [0.0, 0.1, 1.0])
-    steps["contact_force"][0] = 1.0
-    assert found(steps, window=0.2)["contact_force_max"] == pytest.approx(0.5, rel=1e-14)
+@pytest.mark.parametrize(("force", "ends", "impulse", "window", "mean", "begins"), WINDOWS.values(), ids=WINDOWS)
+def test_the_window_of_the_largest_mean(force, ends, impulse, window, mean, begins):
+    """Whatever the row of the start tells of the force that begins there is no force before the run."""
+    steps = steps_with(force, ends)
+    steps["contact_force"][0] = force(0.0)[0]
+    events = [Event(impulse[0], "impact", impulse_contact=impulse[1])] if impulse else []
+    numbers = found(steps, *events, window=window)
+    assert numbers["contact_force_max"] == pytest.approx(mean, rel=1e-13)
+    assert numbers["contact_force_max_time"] == pytest.approx(begins, rel=1e-13)
