@@ -20,6 +20,7 @@ from springbeam.results.files import load_summary
 from springbeam.scene import load_scene, messages, scene_keys, shipped_scenes, with_changes
 from springbeam.scene.reading import tomllib
 from springbeam.studies.metrics import METRICS
+from springbeam.studies.stability.grid import Grid
 from springbeam.studies.stability.predict import predict
 
 pytestmark = pytest.mark.usefixtures("unpainted")
@@ -112,8 +113,9 @@ def test_every_command_is_looked_at():
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_what_a_command_prints_fits_80_columns_and_its_json_is_one_document(place, arguments, name):
-    """Studies show what they have found once more."""
+def test_what_a_command_prints_fits_80_columns_and_its_json_is_one_document(place, arguments, monkeypatch, name):
+    """Studies show what they have found once more; cells of the grid are computed in this process."""
+    monkeypatch.setattr(Grid, "parallel", False)
     line = [name, *arguments(TABLES[name])]
     shown = printed(*line)
     assert max(map(len, lines_without_paths(shown))) <= 80
