@@ -170,7 +170,7 @@ def couple_by(law, degree, size, steps, upper, lower):
 
 @pytest.mark.parametrize("degree", DEGREES)
 @pytest.mark.parametrize("q", [1.0, 1.5, 3.0])
-@pytest.mark.parametrize("stiffness", [1e2, 1e4, 1e6, 1e8, 1e10])
+@pytest.mark.parametrize("stiffness", [1e2, 1e6, 1e10])
 def test_energy_is_conserved_at_any_stiffness(stiffness, q, degree):
     """H = 2 ms, up to √(λ/m_tip) H = 10⁴: rounding of 100 steps, C (1e-13 relative) times what p changes."""
     rows, _ = couple_by(Compliance(stiffness, q), degree, 2e-3, 100, unit_beam(4), DuffingBody(k1=3.0, k2=-0.2))
@@ -180,7 +180,7 @@ def test_energy_is_conserved_at_any_stiffness(stiffness, q, degree):
 @pytest.mark.parametrize(("degree", "order"), [(0, 2.0), (1, 4.0), (2, 6.0)])
 @pytest.mark.parametrize("q", [1.5, 2.0, 3.0])
 def test_the_order_is_twice_the_number_of_coefficients(degree, order, q):
-    """y and u at t = 0.08 s, contact throughout, against degree 2 at H/8; for degree 2 as long as it is no rounding."""
+    """y and u at t = 0.08 s, contact throughout, against 128 steps of degree 2; no error is one of rounding."""
     law, t = Compliance({1.5: 3e2, 2.0: 1e4, 3.0: 1e6}[q], q), 0.08
     counts = (4, 8, 16) if degree == 2 else (16, 32, 64)
 
@@ -188,7 +188,7 @@ def test_the_order_is_twice_the_number_of_coefficients(degree, order, q):
         rows, _ = couple_by(law, d, t / n, n, unit_beam(2, slope=-0.3), DuffingBody(k1=3.0, k2=-0.2))
         return np.array([rows[-1].upper.displacement, rows[-1].lower.displacement])
 
-    exact = last(2, 8 * counts[-1])
+    exact = last(2, 128)
     errors = [np.abs(last(degree, n) - exact).max() for n in counts]
     assert errors[-1] > 1e-14
     assert orders(errors, [1.0 / n for n in counts])[-1] == pytest.approx(order, abs=0.35)
