@@ -91,8 +91,8 @@ def test_a_tied_step_costs_two_steps_of_each_body(counted, H, scheme, degree):
 
 
 def test_a_tied_step_passes_at_most_40_functions_in_12_files():
-    """The walk of docs/architecture.md. What happens now and then, as a shape that is kept, is not in a usual step, nor is a
-    search for a dip, as in the first steps after an impact."""
+    """The walk of docs/architecture.md. What happens now and then is not in a usual step: a shape that is kept, or a
+    search for a dip in the first steps after an impact."""
     passed: list[set[tuple[str, str, int]]] = []
 
     def note(frame, event, _):
