@@ -119,8 +119,9 @@ def test_errors_of_steps_within_the_tolerance_add_up(tolerance, resolved):
     """A link that swings 16 times; each step errs by a phase."""
     link = with_changes(PAIR, time={"t_end": 1.0}, beam={"n_elements": 10}, contact={"law": "link", "stiffness": 1e3})
     run = simulate(with_changes(link, coupling={"relative_tolerance": tolerance}))
-    exact = event_driven.simulate(with_changes(link, coupling={"degree": 2}), sample_times=run.time)
-    off = np.abs(run.u_tip - exact.u_tip).max() / np.ptp(exact.u_tip)
+    rows = slice(None, None, max(len(run) // 200, 1))
+    exact = event_driven.simulate(with_changes(link, coupling={"degree": 2}), sample_times=run.time[rows])
+    off = np.abs(run.u_tip[rows] - exact.u_tip).max() / np.ptp(exact.u_tip)
     assert run.summary["resolved"] is resolved
     assert (off < 0.01) == resolved
 
