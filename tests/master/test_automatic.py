@@ -79,10 +79,21 @@ def test_unresolved_motion_gets_degree_0(turn, expected):
     assert choice(auto(coupling={"macro_step": turn / slowest_frequency(PAIR.beam)}))[:2] == expected
 
 
-def test_where_hermite_is_not_defined_it_is_not_taken():
-    assert choice(with_changes(PAIR, contact={"law": "paper"}))[:2] == ("energy", 0)
-    assert choice(with_changes(PAIR, beam={"integrator": "generalized_alpha"}))[:2] == ("energy", 0)
-    assert choice(with_changes(PAIR, beam={"fidelity": "quasi_static"}))[:2] == ("energy", 2)
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"coupling": {"relative_tolerance": 1e-4}}, ("hermite", 2)),
+        # Where hermite is not defined it is not taken.
+        ({"contact": {"law": "paper"}}, ("energy", 0)),
+        ({"beam": {"integrator": "generalized_alpha"}}, ("energy", 0)),
+        ({"beam": {"fidelity": "quasi_static"}}, ("energy", 2)),
+    ],
+)
+def test_what_changes_of_soft_get(changes, expected):
+    assert choice(with_changes(PAIR, **changes))[:2] == expected
+
+
+def test_a_scheme_that_is_chosen_is_defined():
     for changes in ({"contact": {"law": "compliance"}}, {"beam": {"integrator": "generalized_alpha"}}):
         assert with_scheme_chosen(auto(**changes))[0].coupling.scheme == "energy"
 
@@ -102,7 +113,3 @@ def test_soft_laws_get_degree_2_which_is_never_worse(contact, coupling):
     }
     assert error[2] <= 0.1 * error[0]
     assert error[2] <= 1e-3 * np.ptp(exact)
-
-
-def test_steps_from_tolerances_are_hermites():
-    assert choice(with_changes(PAIR, coupling={"relative_tolerance": 1e-4}))[:2] == ("hermite", 2)
