@@ -84,6 +84,19 @@ def test_the_clamp_bears_what_loads_a_beam_at_rest(given, force, moment, simulat
         assert (run.clamp_force[row], run.clamp_moment[row]) == pytest.approx((-force, -moment), rel=1e-10)
 
 
+@pytest.mark.parametrize(("mass", "size"), [(1.0, 1e-3), (0.3, 2e-3)])
+def test_ends_part_without_an_impact_and_the_contact_passes_on_what_a_free_mass_gains(mass, size):
+    """What gives ends that part one velocity is of the forces of the steps, also where they part at a macro point."""
+    free = {"element": "point_mass", "mass": mass}
+    tables = {"stop": None, "spring": free, "time": {"t_end": 0.6}}
+    scene = with_changes(load_scene("soft"), **tables, coupling={"degree": 0, "macro_step": size})
+    run = simulate(scene)
+    parted = [event for event in run.events if event.kind.opens]
+    assert max(event.energy_loss for event in parted) > 1e-5
+    assert {event.impulse_contact for event in parted} == {0.0}
+    assert run.summary["contact_impulse"] == pytest.approx(-mass * run.z[-1], rel=1e-12)
+
+
 #: A beam that turns as its clamp does not let it: the clamp feels 50 times as much at the start as later.
 TURNS = with_changes(load_scene("steel-bumper"), time={"t_end": 2e-3})
 

@@ -173,7 +173,8 @@ class Master(Stateful):
         if event is None:
             self._record(step, step.end)
         else:
-            self._record(self._act(event, step), pair.ends())
+            self._act(event, step)
+            self._record(step, pair.ends())
 
     def _advance(self, size: float, *, to_kink: bool) -> tuple[Step, EventKind | None]:
         """The next step and the event it ends on, the bodies left at its end."""
@@ -224,7 +225,7 @@ class Master(Stateful):
             self._happened(EventKind.IMPACT, Impact(), 0.0)
         if self._in_contact(start) or (pair.law is None and state.contact[0] != 0.0):
             pair.mark()
-            step = self._act(EventKind.IMPACT if self._scene.coupled else EventKind.STOP_IMPACT, step)
+            self._act(EventKind.IMPACT if self._scene.coupled else EventKind.STOP_IMPACT, step)
         self._record(step, pair.ends())
         state.begun = True
 
@@ -243,10 +244,10 @@ class Master(Stateful):
         parting = tip.velocity - low.velocity > 0.0 and not pair.lasting
         return abs(tip.displacement - low.displacement) <= tolerance and not parting
 
-    def _act(self, kind: EventKind, step: Step) -> Step:
-        """The event at the end of ``step`` happens; return the step as it is left.
+    def _act(self, kind: EventKind, step: Step) -> None:
+        """The event at the end of ``step`` happens.
 
-        Nothing strikes where ends part: what gives them one velocity is what the forces of the step have left of it.
+        Nothing strikes where ends part: what gives them one velocity is what the forces of the steps have left over.
         """
         state, pair = self.state, self._pair
         ends = pair.ends()
@@ -265,14 +266,11 @@ class Master(Stateful):
         lost = impact.energy_loss + pair.follow_phase(phase)
         state.lost += lost
         state.enter(phase)
-        if kind.opens and step.size > 0.0:
-            contact, foundation = (
-                (force[0] + impulse / step.size, *force[1:])
-                for force, impulse in ((step.contact, impact.on_beam), (step.foundation, impact.of_foundation))
-            )
-            step, impact = step._replace(contact=contact, foundation=foundation), Impact()
+        if kind.opens:
+            on_tip, of_foundation = state.left_over
+            state.left_over = on_tip + impact.on_beam, of_foundation + impact.of_foundation
+            impact = Impact()
         self._happened(kind, impact, lost)
-        return step
 
     def _happened(self, kind: EventKind, impact: Impact, lost: float) -> None:
         tip, low = self._pair.ends()
@@ -318,6 +316,12 @@ class Master(Stateful):
         _, size, contact, foundation, _, before = step
         if size == 0.0:
             contact, foundation = state.contact, state.foundation
+        elif any(state.left_over):
+            contact, foundation = (
+                (force[0] + impulse / size, *force[1:])
+                for force, impulse in zip((contact, foundation), state.left_over, strict=True)
+            )
+            state.left_over = (0.0, 0.0)
         (u, v, _, _), (y, z, _, _) = ends
         of_upper, of_lower, booked = pair.upper.energies(), pair.lower.energies(), pair.joined.booking(ends)
         if self._adaptive is not None:

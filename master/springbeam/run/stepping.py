@@ -39,6 +39,8 @@ class State(Memory):
     pushed: tuple[float, float] | None = None
     reclosed: bool = False  #: contact or rest had opened and closed at once: its next step does not open it again
     lost: float = 0.0  #: by events so far [J]
+    #: Impulses by which ends have parted, on the tip and of the foundation [N·s]: the next step that is told has them.
+    left_over: tuple[float, float] = (0.0, 0.0)
     fastest: float = 0.0  #: the largest speed of an end at a row so far [m/s]
     begun: bool = False  #: whether the row of the start is made
     energy_at_start: float = 0.0  #: before an impact there [J]
