@@ -90,7 +90,7 @@ def test_a_killed_worker_loses_its_own_case_alone_and_only_if_it_dies_again(tmp_
 def test_an_interrupted_study_says_how_it_goes_on_and_does(here, monkeypatch):
     monkeypatch.setattr(sweep.Sweep, "parallel", False)
     shown = printed(*SWEEP, "--out", "whole")
-    assert re.search(r"^spring\.mass +y_min\n1 .*\n1\.25 .*\n1\.5 .*\n1\.75 .*\n2 .*\nresults ", shown, re.M)
+    assert re.search(r"^spring\.mass +y_min\n *1 .*\n *1\.25 .*\n *1\.5 .*\n *1\.75 .*\n *2 .*\nresults ", shown, re.M)
     interrupt, record = Interrupt(3), sweep.Sweep.record
     monkeypatch.setattr(sweep.Sweep, "record", lambda *arguments: interrupt() or record(*arguments))
     cut = command(*SWEEP)
