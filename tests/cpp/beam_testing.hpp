@@ -39,7 +39,7 @@ inline Parameters general_beam(int n_elements, int element_degree = 1) {
 }
 
 inline double bending(const Parameters& p) { return p.young_modulus * p.second_moment_of_area; }  ///< EI
-inline double shearing(const Parameters& p) {  ///< KAG
+inline double shearing(const Parameters& p) {                                                     ///< KAG
   return p.shear_modulus * p.shear_coefficient * p.area;
 }
 
