@@ -13,8 +13,8 @@ from springbeam.contact.events import locate
 from springbeam.contact.phases import Joint, Phase
 from springbeam.coupling.protocol import Step
 from springbeam.results.paths import Path
-from springbeam.run.adaptive import MacroGrid
 from springbeam.run.detection import Detector
+from springbeam.run.macro_steps import MacroGrid
 from springbeam.run.separation import first_by_force
 from springbeam.run.stepping import Pair
 from springbeam.scene import load_scene, with_changes

@@ -79,7 +79,7 @@ def test_ends_that_start_at_rest_on_each_other_are_joined():
 
 
 def test_400_shapes_are_kept_evenly_and_20_steps_after_first_contact():
-    """Of 800 steps every second one; the tip arrives from a height."""
+    """A run of 800 steps keeps the shape of every second one. The tip arrives from a height."""
     start = {"approach": "elastic", "initial_deflection_slope": 0.02}
     run = simulate(soft(stop=None, beam=start, time={"t_end": 0.08}, coupling={"macro_step": 1e-4}))
     times, met = run.shapes[0], run.events[0].time

@@ -14,7 +14,7 @@ from springbeam.contact.phases import Joint, Phase
 from springbeam.coupling.protocol import Scales, Step
 from springbeam.coupling.soft import SoftSolver
 from springbeam.coupling.tie import Tie, gap_inside
-from springbeam.run.adaptive import AdaptiveSteps
+from springbeam.run.macro_steps import AdaptiveSteps
 from springbeam.run.stepping import Pair, State
 
 

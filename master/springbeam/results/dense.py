@@ -213,7 +213,8 @@ def _between(
     found["smoothed"] = linear("smoothed", np.where(same, after["smoothed"], before["smoothed"]))
     for name in _LINEAR:
         found[name] = linear(name, after[name])
-    # What the event at the end of the step moves and takes is kinetic, or springs back with a massless tip.
+    # What the event at the end of the step moves and takes is kinetic, or springs back with a massless tip. Where ends
+    # part without an impact, all of it counts as the spring's: how much is the tip's is not in the records.
     lost = after["impact_loss"] - before["impact_loss"]
     impulses = np.array([0.0, *(event.impulse_contact for event in events)])  # of the last event up to a record
     of_tip = impulses[after["events"].astype(int)] * 0.5 * (after["v_tip"] + after["v_tip_after"])

@@ -21,7 +21,7 @@ from ..coupling.protocol import Step
 from ..results.paths import Path, Place, Sample
 from ..results.trajectory import Event, EventKind
 from ..scene import SAME, Scene
-from .adaptive import AdaptiveSteps, MacroGrid
+from .macro_steps import AdaptiveSteps, MacroGrid
 from .separation import first_by_force, no_step
 from .stepping import Pair, State
 

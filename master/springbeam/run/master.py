@@ -26,10 +26,10 @@ from ..results.totals import totals
 from ..results.trajectory import Event, EventKind
 from ..scene import SAME, Scene
 from ..scene.resolution import force_window, peak_force_doubt, with_scheme_chosen
-from .adaptive import AdaptiveSteps, MacroGrid
 from .detection import Detector
 from .ledger import Balance, Neglect
 from .log import TOGETHER, Log
+from .macro_steps import AdaptiveSteps, MacroGrid
 from .observed import mismatch, not_shown, why_not_resolved
 from .outcome import RunStopped, cause_of
 from .stepping import SIMULTANEOUS, Pair, State

@@ -30,7 +30,7 @@ _DENSE, _POINTS = 1.0, (8, 96)
 _TOGETHER = 1024
 #: Share of an end's way that is not worth computing.
 _NEGLIGIBLE = 1e-3
-#: ∫ φ of the beam's modes over length and tip value is at most this, that of the lowest.
+#: ∫ φ over length and tip value of the lowest mode of a slender beam; one that shears alone has 0.64.
 _MEAN = 0.4
 
 
