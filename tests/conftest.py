@@ -9,13 +9,10 @@ from pathlib import Path
 # more threads of OpenBLAS only wait for each other, and spin meanwhile.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-ROOT = Path(__file__).resolve().parents[1]
-
 # What Python compiles is kept for the processes that tests start, even where the environment says to write no bytecode:
 # without it, each of them spends most of its time on compiling what it imports.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix = str(ROOT / "build" / "bytecode")
-sys.dont_write_bytecode = False
+os.environ["PYTHONPYCACHEPREFIX"] = str(Path(__file__).resolve().parents[1] / "build" / "bytecode")
 
 import hypothesis
 import numpy as np
@@ -25,6 +22,8 @@ from matplotlib.figure import Figure
 import springbeam
 from springbeam.bodies.fmu import release
 from springbeam.monolithic import event_driven
+
+ROOT = Path(__file__).resolve().parents[1]
 
 # The folders of the helper modules: commands.py here, the others beside the tests that use them.
 sys.path[:0] = [str(ROOT / "tests" / folder) for folder in (".", "master", "system")]
