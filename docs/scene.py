@@ -12,9 +12,9 @@ from springbeam.scene import messages
 HEAD = """# Scene files
 
 A scene is a TOML file of tables; `springbeam new NAME` writes a commented one to start from. All values are SI, up is
-positive. A missing `[beam]`, `[spring]` or `[stop]` is a scene without it. An invalid key or value is an error that
-names the key and the allowed values; a key that plays no part in the scene is named in a warning. Symbols are those of
-[model.md](model.md). A key without a default may be left out. (Made by `python docs/scene.py`; `springbeam keys` lists
+positive. A missing `[beam]`, `[spring]` or `[stop]` is a scene without it; a key with an empty default is optional. An
+invalid key or value is an error that names the key and the allowed values; a key that plays no part in the scene is
+named in a warning. Symbols are those of [model.md](model.md). (Made by `python docs/scene.py`; `springbeam keys` lists
 the same.)
 
 **Editors** complete and check keys by the JSON Schema [scene.schema.json](scene.schema.json), which
