@@ -54,7 +54,7 @@ def installed(name):
 class System:
     """The pair, or one FMU alone: a job for an importer, and what has to come out.
 
-    ``reference``, ``of_master``: y of the pair at 1, 2, … 400 ms by the event-driven solver and by `springbeam run`.
+    ``reference``, ``of_master``: y of the pair at 1, 2, … 400 ms by `springbeam run` in short steps and in the pair's.
     """
 
     def __init__(self, name, fmu_folder, scratch, reference, of_master):
