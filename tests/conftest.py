@@ -85,7 +85,6 @@ COMPLIANCE = springbeam.with_changes(
 )
 
 
-
 def y_by_the_master(**coupling):
     """y at 1, 2, … 400 ms of that scene."""
     run = springbeam.simulate(springbeam.with_changes(COMPLIANCE, coupling=coupling))

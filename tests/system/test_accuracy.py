@@ -42,14 +42,14 @@ def errors(found, reference):
 @pytest.mark.parametrize("name", SCENES)
 def test_the_promise_is_kept_on_the_whole_curve(name):
     """Motion at 201 times and 25 rows of each run, times of contact, impulses, and of soft laws the peak force."""
-    runs = [simulate(scene_from_dict({**SCENES[name], "accuracy": accuracy})) for accuracy in (1e-3, 1e-4)]
-    rows = [run.time[:: len(run) // 25 + 1] for run in runs]
-    times = np.unique(np.r_[np.linspace(runs[0].time[0], runs[0].time[-1], 201), *rows])
-    reference = event_driven.simulate(runs[0].scene, sample_times=times)
-    for run in runs:
-        asked, wrong = run.summary["accuracy"]["asked"], errors(run, reference)
+    first, second = (simulate(scene_from_dict({**SCENES[name], "accuracy": accuracy})) for accuracy in (1e-3, 1e-4))
+    rows = [found.time[:: len(found) // 25 + 1] for found in (first, second)]
+    times = np.unique(np.concatenate([np.linspace(first.time[0], first.time[-1], 201), *rows]))
+    reference = event_driven.simulate(first.scene, sample_times=times)
+    for found in (first, second):
+        asked, wrong = found.summary["accuracy"]["asked"], errors(found, reference)
         assert max(wrong.values()) <= asked, wrong
-        assert max(run.summary["accuracy"]["estimated_errors"].values()) <= asked / 1.5
+        assert max(found.summary["accuracy"]["estimated_errors"].values()) <= asked / 1.5
 
 
 FAR, NEAR = {"motion": 8e-3, "force": 1e-5}, {"motion": 1e-5, "force": 1.9e-3}
