@@ -164,12 +164,14 @@ def statements(all_runs: dict[int, tuple[Trajectory, ...]]) -> None:
 
 
 def load_readings() -> None:
-    beam = load_scene("paper-fig3").beam
-    assert beam is not None
-    d = semi_discrete.assemble(beam)
+    bare = load_scene("paper-fig2")
+    loaded = [with_changes(bare, beam={key: -6.0}).beam for key in ("tip_load_coefficient", "distributed_load")]
+    assert bare.beam is not None
+    d = semi_discrete.assemble(bare.beam)
+    forces = [d.nodal(*semi_discrete.constant_forces(beam)) for beam in loaded if beam is not None]
     solve = splu(d.K.tocsc()).solve
     print("\nStatic tip deflection [m]: hat coefficient -6 as printed, uniform -6 N/m, point force -6 N:")
-    print("  ", [float(solve(-6.0 * f)[-1]) for f in (d.hat_load, d.uniform_load, d.tip_vector)])
+    print("  ", [float(solve(f)[-1]) for f in (*forces, -6.0 * d.tip_vector)])
     for number in (2, 3):
         beam = load_scene(f"paper-fig{number}").beam
         assert beam is not None
