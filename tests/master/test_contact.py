@@ -12,6 +12,7 @@ from springbeam.contact.phases import (
     Phase,
     Transitions,
 )
+from springbeam.results.steps import PHASE_NAMES
 from springbeam.results.trajectory import EventKind
 
 
@@ -54,11 +55,13 @@ def test_a_massless_tip_whose_force_vanishes_at_equilibrium_is_tied_again_if_it_
     assert (found, phase.joint) == (kind, Joint.TIED if kind == "retie" else Joint.FREE)
 
 
-@pytest.mark.parametrize(("height", "z", "joint"), [
-    (-1e-9, 1.0, "tied"), (1e-9, -1.0, "touch"), (-1e-14, 1.0, "touch"), (1e-14, -1.0, "tied"),
+@pytest.mark.parametrize(("height", "v", "z", "joint"), [
+    (-1e-9, 1.0, 1.0, "tied"), (1e-9, -1.0, -1.0, "touch"), (-1e-14, 1.0, 1.0, "touch"), (1e-14, -1.0, -1.0, "tied"),
+    (1e-14, -1.0, 0.009, "tied"),
 ])  # fmt: skip
-def test_where_they_go_tells_what_ends_are_that_meet_at_equilibrium_to_rounding(height, z, joint):
-    ends = (Motion(0.1 + height, z, 0.0, 0.0),) * 2
+def test_where_they_go_tells_what_ends_are_that_meet_at_equilibrium_to_rounding(height, v, z, joint):
+    """Together: a hundredth of the mass that falls by 1 m/s stops a top that rises by 1 cm/s."""
+    ends = Motion(0.1 + height, v, 0.0, 0.0), Motion(0.1 + height, z, 0.0, 0.0)
     _, phase, _ = transitions_of(equilibrium=0.1).after(EventKind.IMPACT, Phase(), ends, 0.0, ends, 0.0, 1e-18)
     assert phase.joint.value == joint
 
@@ -72,6 +75,23 @@ def test_what_a_heavier_tip_takes_up_at_once_has_struck_for_the_last_time_unless
     ends = tuple(Motion(-0.015, w, 0.0, 0.0) for w in (v, -0.5))
     found, *_ = transitions.after(EventKind.STOP_IMPACT, Phase(Joint.TIED), ends, 0.0, ends, 0.0, 1e-17)
     assert (found, transitions.state) == (kind, max(abs(v), 0.5))
+
+
+@pytest.mark.parametrize("e", [0.0, 0.9, 1.0])
+@pytest.mark.parametrize(("scene", "joint"), [("beam-on-stop", Joint.TIED), ("soft", Joint.FREE)])
+def test_what_lies_on_the_foundation_at_rest_is_held_there(scene, joint, e):
+    """A tip alone by a contact force, a spring top by the foundation; nothing takes an impulse, not even one of −0."""
+    transitions = transitions_of(scene, stop={"restitution": e, "position": -0.015})
+    ends = (Motion(-0.015, 0.0, 0.0, 0.0),) * 2
+    found = transitions.after(EventKind.STOP_IMPACT, Phase(), ends, 0.0, ends, 0.0, 1e-17)
+    assert repr(found) == repr((EventKind.SEATED, Phase(joint, seated=True), Impact()))
+
+
+@pytest.mark.parametrize("seated", [False, True])
+@pytest.mark.parametrize("joint", Joint)
+def test_a_phase_has_its_name_in_a_record(joint, seated):
+    phase = Phase(joint, seated)
+    assert PHASE_NAMES[int(phase.number)] == phase.name == ("seated" if seated else joint.value)
 
 
 @pytest.mark.parametrize(("v", "left"), [(0.19, 0.0), (-3.0, 0.0), (0.21, 0.21)])

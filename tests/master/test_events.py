@@ -9,8 +9,9 @@ from bodies import DuffingBody, Upper
 
 from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Motion, StepRefused
-from springbeam.contact.events import locate
-from springbeam.contact.phases import Joint, Phase
+from springbeam.contact.events import EventFunctions, locate, no_dip, position_tolerance
+from springbeam.contact.laws import law_of
+from springbeam.contact.phases import Joint, Phase, common_velocity
 from springbeam.coupling.protocol import Step
 from springbeam.results.paths import Path
 from springbeam.run.detection import Detector
@@ -72,6 +73,51 @@ def test_locate_does_not_take_a_zero_that_the_function_rises_from(below):
     assert Path.through(f(0.0), f(math.pi), math.pi).falls_through_zero() < 1e-12
     # ḟ(π/2) = −(π/2)²
     assert located(f, math.pi, 1e-14, 0.0) == pytest.approx(0.5 * math.pi, abs=1e-14)
+
+
+#: A tip of 10 g rises by 1 m/s above a lower end of 1 kg that rises by 0.5 m/s: together they rise by TOGETHER.
+RISING, TOGETHER = (Motion(0.3, 1.0, 0.0, 0.0), Motion(0.2, 0.5, 0.0, 0.0)), 0.51 / 1.01
+SOFTLY = {"contact": {"law": "compliance", "stiffness": 1e4, "exponent": 1.5}}
+MEETS, STRIKES = {"impact": (0.1, 0.5)}, {"stop_impact": (0.215, 0.5)}
+STRIKE_TOGETHER, RETIED = {"stop_impact": (0.215, TOGETHER)}, {"retie": (0.1, TOGETHER)}
+
+
+@pytest.mark.parametrize(("scene", "tables", "phase", "expected"), [
+    ("soft", {}, Phase(), MEETS | STRIKES),
+    ("soft", {}, Phase(Joint.TIED), {"release": (-0.1, -TOGETHER)} | STRIKE_TOGETHER),
+    ("soft", {}, Phase(Joint.TOUCH), RETIED | STRIKE_TOGETHER),
+    ("soft", {}, Phase(seated=True), MEETS),
+    ("soft", {}, Phase(Joint.TIED, seated=True), {}),
+    ("soft", {}, Phase(Joint.TOUCH, seated=True), RETIED),
+    ("soft", {"beam": {"fidelity": "quasi_static"}}, Phase(Joint.TOUCH, seated=True), RETIED),
+    ("soft", {"contact": {"law": "tie"}}, Phase(Joint.TIED), STRIKE_TOGETHER),
+    ("soft", SOFTLY, Phase(Joint.TOUCH), STRIKES),
+    ("beam-on-stop", {}, Phase(), {"stop_impact": (0.315, 1.0)}),
+    ("beam-on-stop", {}, Phase(Joint.TIED, seated=True), {}),
+    ("beam-on-stop", SOFTLY | {"stop": {"restitution": 1.0}}, Phase(), {}),
+])  # fmt: skip
+def test_what_may_happen_in_a_phase_is_as_far_away_as_it_is_and_comes_as_fast_as_the_ends(
+    scene, tables, phase, expected
+):
+    """Ψ is at 0.1 m, the stop at −15 mm; joined ends move with the velocity of their momentum."""
+    scene = with_changes(load_scene(scene), **tables)
+    functions = EventFunctions(scene, law_of(scene), common_velocity(1.0, 0.0, 0.01, 1.0), 0.1)
+    samples = functions.samples(phase, RISING)
+    found = dict(zip((kind for kind, _ in functions.of(phase)), samples, strict=True))
+    assert found == {kind: pytest.approx(sample, rel=1e-14) for kind, sample in expected.items()}
+
+
+@pytest.mark.parametrize(("rate", "fastest", "stays"), [(0.0, 0.9, True), (0.0, 1.1, False), (5.0, 0.9, False)])
+def test_a_motion_stays_above_0_at_sight_if_neither_the_fastest_so_far_nor_the_cubic_falls_there(rate, fastest, stays):
+    """From 1 m to 1 m in 1 s, down and up again at ``rate``: the cubic of 5 m/s is at 1 − 5/4 m in the middle."""
+    assert no_dip((1.0, -rate), (1.0, rate), 1.0, fastest) is stays
+
+
+@pytest.mark.parametrize(("place", "speed", "roundings"), [(-2.0, 1.0, 16.0), (0.0, -1e3, 1e-15 / np.finfo(float).eps)])
+def test_positions_are_told_apart_to_8_roundings_or_to_one_of_the_way_in_a_step(place, speed, roundings):
+    """Of steps of 1 ms."""
+    ends = Motion(0.0, 0.0, 0.0, 0.0), Motion(place, speed, 0.0, 0.0)
+    assert position_tolerance(ends, 1e-3) == pytest.approx(roundings * np.finfo(float).eps, rel=1e-3)
 
 
 @pytest.mark.parametrize(("jump", "refused"), [(5e-10, True), (5e-11, False)])

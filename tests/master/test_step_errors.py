@@ -50,25 +50,30 @@ def test_the_errors_of_a_step_fall_with_its_size_by_the_orders_that_they_tell(sc
     (errors, told), (halved, _) = (table.T for table in found)
     observed = np.log2(errors / halved)
     assert observed[0] == pytest.approx(told[0], abs=0.2)
-    assert (observed > told - 0.2).all()
+    assert (abs(observed - told - 0.5) < 0.7).all()
 
 
 def told(coupling, gap, contact=NO_FORCE):
-    """Errors of a step of 20 ms whose gap at its end is told; beside 0.5 m, 4 m/s, 8 J and 0.25 kg."""
+    """Errors of a step of 20 ms whose gap at its end is told; beside 0.5 m, 4 m/s, 8 J and 0.25 kg.
+
+    It starts with a penetration of 1 cm of a soft law, or a mismatch of 0.1 m/s of a tie.
+    """
     rest = Motion(0.0, 0.0, 0.0, 0.0)
-    before = Motion(-0.01, 0.0, 0.0, 0.0) if isinstance(coupling, SoftSolver) else rest
+    before = Motion(-0.01, 0.0, 0.0, 0.0) if isinstance(coupling, SoftSolver) else Motion(0.0, 0.1, 0.0, 0.0)
     step = Step(0.0, 0.02, contact, NO_FORCE, (before, rest), (gap, rest))
     return coupling.local_errors(step, Scales(0.5, 4.0, 8.0, 0.25))
 
 
 def test_errors_are_shares_of_the_length_the_energy_and_the_speed_of_a_motion():
-    """A mismatch of 0.3 m/s: √(½ μ w²/E) and H w/6 of 0.5 m. By a force of 2 N a gap of 10 µm·s² inside does work.
+    """Free masses keep the mismatch of 0.1 m/s at degree 1 and turn it round at the others; it is then 0.3 m/s.
+
+    The rest is w: √(½ μ w²/E) and H w/6 of 0.5 m. By a force of 2 N a gap of 10 µm·s² inside does work.
 
     Of λ p with λ = 1 kN/m, p from 1 to 3 cm, of the mean 3 cm, degree 0 leaves P₁ with 10 N, degree 1 P₂ with −10 N.
     """
     mismatch = Motion(0.0, 0.3, 0.0, 0.0)
-    for degree in (0, 1, 2):
-        of_energy, of_length = 0.3 * np.sqrt(0.5 * 0.25 / 8.0), 0.02 * 0.3 / (6.0 * 0.5)
+    for degree, w in enumerate((0.4, 0.2, 0.4)):
+        of_energy, of_length = w * np.sqrt(0.5 * 0.25 / 8.0), 0.02 * w / (6.0 * 0.5)
         expected = [of_energy, of_length]
         assert [error for error, _ in told(Tie("energy", degree, 1e-13), mismatch)] == pytest.approx(
             expected, rel=1e-14

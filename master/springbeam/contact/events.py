@@ -135,10 +135,10 @@ class EventFunctions:
         return functions
 
 
-def position_tolerance(ends: Ends, level: float, macro_step: float) -> float:
-    """What positions can be told apart to [m]: rounding of the displacements, and of the foundation's ``level``."""
+def position_tolerance(ends: Ends, macro_step: float) -> float:
+    """What positions can be told apart to [m]: rounding of the displacements, and of what moves them."""
     (u, v, _, _), (y, z, _, _) = ends
-    return 8.0 * EPS * max(u, -u, y, -y, level, -level) + 1e-15 * max(v, -v, z, -z) * macro_step
+    return 8.0 * EPS * max(u, -u, y, -y) + 1e-15 * max(v, -v, z, -z) * macro_step
 
 
 def no_dip(start: Sample, end: Sample, size: float, fastest: float) -> bool:

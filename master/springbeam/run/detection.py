@@ -38,11 +38,10 @@ class Detector:
         self._pair, self._steps = pair, steps
         tip_share = common_velocity(1.0, 0.0, pair.upper.mass, pair.lower.mass)
         self._functions = EventFunctions(scene, pair.law, tip_share, pair.equilibrium)
-        self._level = pair.stop or 0.0
 
     def tolerance(self, ends: Ends) -> float:
         """What positions can be told apart to [m]."""
-        return position_tolerance(ends, self._level, self._steps.size)
+        return position_tolerance(ends, self._steps.size)
 
     def simultaneity_tolerance(self, ends: Ends) -> float:
         """Position tolerance plus the distance covered in `SAME`·H [m]; events within it are simultaneous."""
