@@ -23,7 +23,7 @@ from judge import WAYS, Verdict, judge
 sys.path.append(str(Path(__file__).parents[2] / "docs"))
 from pages import table, write_section
 
-HEAD = ("", "judged", "wrong, warned", "wrong, no warning (twice the limit)", "right, warned", "stopped, refused", "doSteps")
+HEAD = ("", "judged", "wrong, warned", "wrong, unwarned (twice as far)", "right, warned", "stopped, refused", "doSteps")
 
 
 def read(path):
