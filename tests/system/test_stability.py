@@ -1,5 +1,6 @@
 """Stability: what the classes of the grid mean, a small part of it, and critical macro steps as predicted."""
 
+import io
 import itertools
 import pickle
 from dataclasses import replace
@@ -227,7 +228,7 @@ class Part(Grid):
 
 class Few(Part):
     def cases(self):
-        return dict(list(super().cases().items())[:6])
+        return {name: cell for name, cell in super().cases().items() if name in ("2", "6", "9", "16")}
 
 
 def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else():
@@ -246,7 +247,10 @@ def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else():
 def test_pictures_have_units():
     study = Grid(samples=0, resolution=2)
     found = study.findings({name: ended("conserved") | {"residual": 1e-9} for name in study.cases()})
-    axes = [ax for draw in found.pictures.values() for ax in draw().axes if ax.get_title()]
+    figures = [draw() for draw in found.pictures.values()]
+    for figure in figures:
+        figure.savefig(io.BytesIO())  # nothing in it that cannot be painted
+    axes = [ax for figure in figures for ax in figure.axes if ax.get_title()]
     assert len(axes) == 2 * len(SLICES)
     labels = {label for ax in axes for label in (ax.get_xlabel(), ax.get_ylabel())}
     assert {"macro_step [s]", "stiffness [N]", "contact_damping [s/m]", "restitution [–]"} <= labels
@@ -256,7 +260,7 @@ def test_pictures_have_units():
 
 
 @pytest.mark.parametrize(("kinds", "code"), [(CLASSES[:-1], 0), (CLASSES, 1)])
-def test_command(tmp_path, monkeypatch, kinds, code):
+def test_command(tmp_path, monkeypatch, unpainted, kinds, code):
     ends = itertools.cycle(kinds)
     monkeypatch.setattr(Grid, "parallel", False)
     monkeypatch.setattr(grid, "run_cell", lambda cell: ended(next(ends), "y = 1.5 m") | {"residual": 1e-9})
@@ -267,7 +271,7 @@ def test_command(tmp_path, monkeypatch, kinds, code):
     table = result.stdout[: result.stdout.index("garbage  " if code else "results  ")]
     assert max(map(len, table.splitlines())) <= 80
     assert len((out / "stability.csv").read_text().splitlines()) == 1 + 30 + 4 * len(SLICES)
-    assert all((out / f"stability-{name}.png").stat().st_size > 10_000 for name in ("classes", "residuals"))
+    assert all((out / f"stability-{name}.png").is_file() for name in ("classes", "residuals"))
     scenes = sorted(out.glob("stability-garbage-*.toml"))
     assert len(scenes) == (0 if code == 0 else (30 + 4 * len(SLICES)) // len(CLASSES))
     for path in scenes[:3]:
