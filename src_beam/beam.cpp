@@ -164,10 +164,10 @@ void Beam::observe(double tip_force, const Loads& loads) {
 }
 
 void Beam::rest() {
+  book();
   motion_.q = space_->flexibility_times(force(now_.loads, now_.tip_force));
   motion_.v.setZero();
   motion_.memory.setZero();
-  booked_ = true;
 }
 
 VectorXd Beam::force(Loads::Values loads, double tip_force) const {

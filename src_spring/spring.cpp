@@ -88,17 +88,14 @@ class Spring::Step {
   /// tolerance of y; its last velocity is then lost too.
   void land() {
     const double gap = state_.y - parameters_.stop_position;
-    if (gap > 0.0) {
-      state_.seated = 0.0;
-      return;
-    }
+    if (gap > 0.0) return;
     const auto N = spring_.motion_.holding_force(state_.y, now_, touching(), depth_);
     const bool pressed = direction<3>({N[0], N[1], N[2] / 2}) >= 0.0;
     const double before = state_.z;
     if (before < 0.0) {
       const double pull = std::max(N[0], 0.0) / parameters_.mass;  // −ÿ
       const double rebound = -parameters_.restitution * before;
-      const bool dies_out = pressed && rebound * rebound <= 2.0 * pull * tolerance();
+      const bool dies_out = rebound * rebound <= 2.0 * pull * tolerance();
       state_.z = dies_out ? 0.0 : rebound;
       state_.impacts += 1.0;
       state_.last_impact = start_ + t_;

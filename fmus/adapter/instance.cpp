@@ -63,9 +63,7 @@ void Instance::setup(double start, double stop, double tolerance) {
   }
   progress.time = start;
   progress.stop_time = stop;
-  const double usable = tolerance > 0.0 && tolerance < 1.0 ? tolerance : 0.0;
-  if (usable != progress.tolerance) built_ = false;
-  progress.tolerance = usable;
+  progress.tolerance = tolerance > 0.0 && tolerance < 1.0 ? tolerance : 0.0;
 }
 
 void Instance::ensure_built() {

@@ -189,6 +189,15 @@ def test_a_direction_is_the_sum_of_its_inputs(case):
     assert found == 2.0 * a - 3.0 * b != 0.0
 
 
+def test_derivatives_at_a_limit_of_a_parameter_are_one_sided(beam):
+    """The acceleration is linear in the damping, which cannot be below 0."""
+    slopes = []
+    for damping in (0.0, 1e-3):
+        k = beam.instance().enter(**{**COMMON["beam"], "alpha_b": damping})
+        slopes += k.partials(["tip_acceleration"], "alpha_b")
+    assert slopes[0] == pytest.approx(slopes[1], rel=1e-6) != 0.0
+
+
 FORCES = ("contact_force", "external_force")
 
 

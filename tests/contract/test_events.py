@@ -83,6 +83,7 @@ def test_event_mode_keeps_the_derivatives_of_inputs(spring):
 def test_an_impulse_on_the_beam_in_event_mode_is_seen_at_once(beam):
     k, H = started(beam, **beam.parameters, communication_step=1e-3), 1e-3
     k.step(0.0, H)
+    assert told(k) == (False, False, False)
     k.set("tip_impulse", 0.3)
     before = k.get("tip_acceleration")
     handle(k)

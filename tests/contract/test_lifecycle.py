@@ -14,6 +14,8 @@ from fmpy import fmi3
 
 
 OK, WARNING, ERROR = 0, 1, 3
+#: Parameters of the law that looks ahead.
+AHEAD = {"contact_law": 2, "communication_step": 1e-3, "tip_response": 1e-4}
 
 
 @pytest.mark.parametrize(
@@ -108,6 +110,8 @@ DIRECTION = (FIRST, 1, None, 0, None, None)
 REFUSED = {
     "instantiated": [
         (lambda k: k.try_enter(start=1.0, stop=0.5), "(SetupExperiment|EnterInitializationMode): stopTime"),
+        (lambda k: k.try_enter(start=0.0, stop=math.nan), "(SetupExperiment|EnterInitializationMode): stopTime"),
+        (lambda k: k.try_enter(start=math.inf), "(SetupExperiment|EnterInitializationMode): startTime = inf"),
         (lambda k: k.try_set("kinetic_energy", 1.0), "SetFloat64: .*cannot be set"),
         (
             lambda k: k.try_set({"beam": "rho_inf", "spring": "restitution"}[k.fmu.name], 1.5),
@@ -135,6 +139,16 @@ REFUSED = {
         (
             lambda k: k.try_set(k.fmu.named("parameter")[0], 2.0),
             "SetFloat64: '(density|mass)' can only be set before the end of initialization mode",
+        ),
+        (lambda k: k.status(k.derivative, k.fmu.velocity, 0), "GetOutputDerivatives: derivative order 0"),
+        (lambda k: k.status(k.derivative, k.fmu.velocity, 2), "GetOutputDerivatives: derivative of order 2"),
+        (
+            lambda k: k.status(k.partials, ["kinetic_energy"], k.fmu.named("parameter")[0]),
+            "GetDirectionalDerivative: '(density|mass)' is not a continuous input",
+        ),
+        (
+            lambda k: k.status(k.partials, [k.fmu.force], k.fmu.force),
+            "GetDirectionalDerivative: '(tip|contact)_force' is not an output",
         ),
         (lambda k: k.try_step(0.0, 0.0), "DoStep: communicationStepSize = 0"),
         (lambda k: k.try_step(0.0, -1e-3), "DoStep: communicationStepSize = -0.001"),
@@ -259,12 +273,31 @@ def test_reset_starts_all_over(case):
     used = case.moving()
     used.set(case.force, 0.3)
     used.step(0.0, 0.01)
+    token = used.state()
     assert used.call("Terminate") == OK
     assert used.call("Reset") == OK
+    assert used.call("GetFMUState", ct.byref(token)) == OK  # in the memory of a state that had more to keep
     used.start()
-    for k in (fresh, used):
-        k.step(0.0, 0.02)
-    assert used.outputs() == fresh.outputs()
+    fresh.step(0.0, 0.02)
+    for again in (False, True):
+        if again:
+            used.restore(token)
+            used.start()
+        used.step(0.0, 0.02)
+        assert used.outputs() == fresh.outputs()
+
+
+def test_parameters_that_are_changed_after_outputs_were_read_count(case):
+    first = {"beam": {"communication_step": 1e-3, "tip_load_coefficient": 2.0}, "spring": AHEAD}[case.name]
+    k = case.instance().enter(**first, **case.parameters)
+    k.outputs()
+    for name in first:
+        k.set(name, float(case.variables[name].start))
+    k.slave.exitInitializationMode()
+    plain = case.moving()
+    for one in (k, plain):
+        one.step(0.0, 0.02)
+    assert k.outputs() == plain.outputs()
 
 
 @pytest.mark.parametrize("version", ["3.0"])
@@ -288,6 +321,13 @@ def test_event_mode_applies_an_impulse_at_once_and_once(case):
     assert k.call("EnterEventMode") == OK
     assert k.try_step(0.01, 0.01) == ERROR
     assert "not allowed in event mode" in k.message
+
+
+def test_an_output_that_inputs_drive_out_of_range_is_an_error(beam):
+    k = beam.running(communication_step=10.0)
+    k.set("distributed_load", 1e61)
+    assert k.status(k.get, "tip_velocity_forecast") == ERROR
+    assert "'tip_velocity_forecast' = nan is not finite: the inputs are too large" in k.message
 
 
 # -- memory stays flat over many instances, also over those that failed -----------------------------------------------

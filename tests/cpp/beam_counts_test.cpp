@@ -49,6 +49,17 @@ TEST(BeamCounts, WithoutDampingNoDissipationIsComputed) {
   EXPECT_EQ(counted(1e-3, ten_steps), 14);
 }
 
+TEST(BeamCounts, TheSizeOfMostStepsIsKeptWhileOthersComeAndGo) {
+  const auto event_location = [](Beam& b) {
+    for (int i = 1; i < 9; ++i) {
+      b.step(0.01, {}, 0.0);
+      b.step(0.01 / (i + 1), {}, 0.0);
+    }
+    b.dissipated_energy();
+  };
+  EXPECT_EQ(counted(1e-3, event_location), 9 * 14);
+}
+
 TEST(BeamCounts, AStepThatIsTakenBackNeverPaysForItsDissipation) {
   const auto tried = [](Beam& b) {
     std::vector<double> state;

@@ -163,8 +163,12 @@ TEST(BeamState, ParametersThatDoNotGoTogetherAreRefused) {
       {[](Parameters& p) { p.n_modes = 101; }, {"n_modes", "= 101 ", "100"}},
       {[](Parameters& p) { p.n_elements = 501; }, {"n_modes", "= 0 ", "generalized_alpha", "fewer n_modes"}},
       {[](Parameters& p) { p.n_elements = 501, p.n_modes = 502; }, {"n_modes", "= 502 ", "501"}},
-      {[](Parameters& p) { p.element_degree = 8, p.n_elements = 125000; }, {"n_modes", "125000 elements of degree 8"}},
+      {[](Parameters& p) { p.element_degree = 8, p.n_elements = 125000; },
+       {"n_modes", "between 1 and 12 with 125000 elements of degree 8"}},
+      {[](Parameters& p) { p.length = 1e-320, p.n_elements = 5; }, {"length / n_elements"}},
       {[](Parameters& p) { p.density = 1e-200, p.area = 1e-200; }, {"density * area"}},
+      {[](Parameters& p) { p.second_moment_of_area = 1e300, p.area = 1e-300; }, {"second_moment_of_area / area"}},
+      {[](Parameters& p) { p.second_moment_of_area = 1e-290, p.shear_modulus = 1e30; }, {"bending stiffness"}},
       {[](Parameters& p) { p.young_modulus = 1e-310; }, {"young_modulus * area"}},
       {[](Parameters& p) { p.shear_modulus = 1e-310; }, {"shear_modulus * shear_coefficient * area"}},
   };
@@ -180,7 +184,18 @@ TEST(BeamState, ParametersThatDoNotGoTogetherAreRefused) {
       }
     }
   }
-  Parameters p = unit_beam(500);
+  Parameters p = unit_beam(50);
+  p.second_moment_of_area = 1e-290;  // no digit is left of a mode
+  p.shear_modulus = 1e20;
+  try {
+    const auto b = make_beam(p);
+    ADD_FAILURE() << "accepted";
+  } catch (const std::runtime_error& error) {
+    for (const char* part : {"mode 1 of 100", "did not converge", "allowed is 1e-06; keep fewer n_modes"}) {
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+    }
+  }
+  p = unit_beam(500);
   p.integrator = Integrator::generalized_alpha;
   p.n_elements = 5000;  // no eigenproblem: any number of elements
   EXPECT_NO_THROW(make_beam(p));

@@ -14,11 +14,14 @@ namespace beam {
 namespace {
 
 using testing::bending;
+using testing::every_load;
 using testing::general_beam;
 using testing::mesh_tip_compliance;
+using testing::Noise;
 using testing::shearing;
 using testing::static_tip_compliance;
 using testing::unit_beam;
+using testing::variants;
 using testing::with_integrator;
 
 /// u(L) of the discrete beam under a unit tip force. In element e the moment is M_e = L − x_mid; with
@@ -103,6 +106,37 @@ TEST(BeamStatics, MotionComesToRestInTheStaticShape) {
         }
       }
     }
+  }
+}
+
+TEST(BeamStatics, PutAtRestItStaysThere) {
+  for (const Parameters& p : variants()) {
+    const auto b = make_beam(p), moving = make_beam(p);
+    for (Beam* one : {b.get(), moving.get()}) one->step(0.01, {0.3, 2.0, -50.0}, 0.1);
+    b->observe(0.7, 0.4);
+    b->rest();
+    const double u = b->tip_displacement();
+    EXPECT_NEAR(b->tip_acceleration(), 0.0, 1e-9);
+    EXPECT_EQ(b->dissipated_energy(), moving->dissipated_energy());
+    EXPECT_EQ(b->load_work(), moving->load_work());
+    b->step(0.05, {0.7, 0.0, 0.0}, 0.4);
+    const double rounding = p.integrator == Integrator::modal ? 0.0 : 1e-14;
+    EXPECT_NEAR(b->tip_displacement(), u, rounding * u);
+    EXPECT_NEAR(b->kinetic_energy(), 0.0, rounding * rounding * b->strain_energy());
+  }
+}
+
+// Nothing is strained yet, so the clamp bears no moment: all of that of the loads goes into ∫ρA x ü.
+TEST(BeamStatics, TheClampOfAStraightBeamBearsNoMoment) {
+  for (Parameters p : variants()) {
+    if (p.mass_matrix == MassMatrix::averaged) continue;  // another inertia than ∫ρA x ü
+    p.n_modes = 0;
+    p.initial_deflection_slope = p.initial_velocity_slope = 0.0;
+    const auto b = make_beam(p);
+    Noise noise;
+    b->observe(0.7, every_load(1.0, noise));
+    EXPECT_NEAR(b->response().forces.moment[0], 0.0, 1e-12);
+    EXPECT_GT(std::abs(b->tip_acceleration()), 0.1);
   }
 }
 

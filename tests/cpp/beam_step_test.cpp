@@ -197,6 +197,36 @@ TEST(BeamStep, GeneralizedAlphaConvergesToTheModalSolutionInSecondOrder) {
   }
 }
 
+// (q₁ − q₀)ᵀ α_b K v_f and (q₁ − q₀)ᵀ F(t + (1−α_f)H), from the states before and after a step.
+TEST(BeamStep, GeneralizedAlphaBooksTheWorkOfItsOwnForces) {
+  for (const double rho_inf : {0.5, 0.0}) {
+    Parameters p = with_integrator(general_beam(3), Integrator::generalized_alpha, rho_inf);
+    p.alpha_b = 0.02;
+    p.initial_velocity_slope = 0.4;
+    const Timoshenko mesh(p);
+    const auto b = make_beam(p);
+    const double H = 0.05, alpha_f = rho_inf / (rho_inf + 1.0);
+    Noise noise;
+    for (int i = 0; i < 5; ++i) {
+      std::vector<double> before, after;
+      b->save(before);
+      const double dissipated = b->dissipated_energy(), work = b->load_work();
+      const Loads loads = every_load(H, noise);
+      b->step(H, {noise(), 0.0, 0.0}, loads);
+      b->save(after);
+      const Eigen::Map<const Eigen::VectorXd> x0(before.data(), 2 * mesh.size()), x1(after.data(), 2 * mesh.size());
+      const Eigen::VectorXd way = (x1 - x0).head(mesh.size());
+      const Eigen::VectorXd v_f = ((1.0 - alpha_f) * x1 + alpha_f * x0).tail(mesh.size());
+      double done = 0.0;
+      loads.for_each(
+          [&](std::size_t k, const Polynomial& f) { done += value(f, (1.0 - alpha_f) * H) * mesh.load(k).dot(way); });
+      const double lost = p.alpha_b * way.dot(mesh.stiffness_times(v_f));
+      EXPECT_NEAR(b->dissipated_energy() - dissipated, lost, 1e-13 * std::abs(lost)) << i;
+      EXPECT_NEAR(b->load_work() - work, done, 1e-13) << i;
+    }
+  }
+}
+
 TEST(BeamStep, GeneralizedAlphaDampsHighFrequenciesByItsSpectralRadius) {
   // ω_min H ≫ 1: from one step to the next the amplitude falls by ρ∞ (Chung & Hulbert, eq. (19)), after the transient
   // of the triple root ρ∞, whose factor k² adds 2/k to the logarithm.
@@ -311,11 +341,11 @@ TEST(BeamStep, AccelerationIsTheDerivativeOfTheVelocity) {
   p.initial_velocity_slope = 1.0;
   const double e = 1e-6;
   const auto a = make_beam(p), b = make_beam(p), c = make_beam(p);
-  const Polynomial force = {0.2, 3.0, -20.0};
+  const Polynomial force = {0.2, 3.0, -20.0}, load = {0.4, -2.0, 30.0};
   const double t = 0.1;
-  a->step(t - e, force, 0.4);
-  b->step(t, force, 0.4);
-  c->step(t + e, force, 0.4);
+  a->step(t - e, force, load);
+  b->step(t, force, load);
+  c->step(t + e, force, load);
   EXPECT_NEAR(b->tip_acceleration(), (c->tip_velocity() - a->tip_velocity()) / (2.0 * e),
               1e-5 * std::fabs(b->tip_acceleration()));
 

@@ -27,6 +27,17 @@ Parameters compliant(double lambda, double exponent) {
 
 }  // namespace
 
+// What an integrator sees beyond the opening: λ δ^p itself where p is an integer, else its odd part; and the slopes.
+TEST(SpringCompliance, TheLawGoesOnSmoothlyBeyondTheOpening) {
+  for (const double exponent : {1.0, 1.5, 2.0, 3.0, 4.0}) {
+    const spring::Compliance law(50.0, exponent, 0.8);
+    const double h = 1e-6, power = std::pow(0.1, exponent);
+    EXPECT_NEAR(law.continued(-0.1, 0.0).force, std::fmod(exponent, 2.0) == 0.0 ? 50.0 * power : -50.0 * power, 1e-14);
+    const double difference = (law.continued(h - 0.1, 0.3).force - law.continued(-h - 0.1, 0.3).force) / (2 * h);
+    EXPECT_NEAR(law.slopes(-0.1, 0.3).force_by_depth, difference, 1e-7) << exponent;
+  }
+}
+
 // p = 1 in contact: two springs in parallel, m ÿ + (k + λ) y = λ (u₀ + v t).
 TEST(SpringCompliance, LinearLawIsASecondSpring) {
   const double k = 10.0, lambda = 200.0, u0 = -0.05, v = -0.02;
@@ -66,6 +77,9 @@ TEST(SpringCompliance, TipIsExtrapolated) {
     EXPECT_NEAR(s.reaction(), 100.0 * (curved ? 0.85 : 1.1), 1e-12);
     s.step(0.1, inputs);
     const double depth = curved ? 0.1 - 0.03 - 0.01 : 0.1 + 0.02, rate = curved ? -0.5 : 0.2;
+    EXPECT_NEAR(s.tip()[0], -depth, 1e-16);
+    EXPECT_DOUBLE_EQ(s.tip()[1], -rate);
+    EXPECT_EQ(s.tip()[2], inputs.tip_displacement[2]);
     EXPECT_NEAR(s.reaction(), 1e3 * depth * (1 + 0.5 * rate), 1e3 * 1e-9);  // the mass has moved by λδt²/2m
   }
 }

@@ -99,6 +99,12 @@ TEST_P(HeldContactRebound, IsElasticAtAnyStep) {
 INSTANTIATE_TEST_SUITE_P(Laws, HeldContactRebound,
                          testing::Combine(testing::Values(1.0, 1.5, 3.0), testing::Values(0.1, 1.0, 10.0, 1000.0)));
 
+// Where the depth hardly changes over a step the force is the law's own, to the last digits.
+TEST(HeldContact, OverAVeryShortStepTheForceIsThatOfTheLaw) {
+  const double H = 1e-10, force = 1e6 * std::pow(0.01 - v * H / 2, 1.5);
+  EXPECT_NEAR(Collision(Compliance(1e6, 1.5), -0.01, H).contact.force(), force, 1e-13 * force);
+}
+
 // p = 1: δ = |v|/ω sin ωt, ω² = λ/μ. The force held at the discrete gradient is the midpoint rule: second order.
 TEST(HeldContact, IsOfSecondOrderWhereTheStepResolvesTheContact) {
   const double lambda = 1e4, omega = std::sqrt(lambda * (1 / m_tip + 1 / m_top));

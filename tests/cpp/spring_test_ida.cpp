@@ -230,23 +230,25 @@ TEST(Motion, ExpansionIsThatOfTheMotion) {
   Parameters p = nonlinear();
   Loads loads;
   loads.force = {1.0, -2.0, 3.0};
-  loads.tip = {0.05, 0.4, -1.0};
   const double z = 0.5, h = 1e-3;
   struct Kind {
     bool touching;
-    double damping, exponent, depth;
+    double damping, exponent, depth, speed = 0.4;  // of the tip
   };
-  for (const auto& [touching, damping, exponent, depth] :
+  for (const auto& [touching, damping, exponent, depth, speed] :
        {Kind{false, 0.0, 1.5, 0.1}, Kind{true, 0.0, 1.5, 0.1}, Kind{true, 0.8, 1.5, 0.1}, Kind{true, 0.8, 3.0, 0.1},
-        Kind{true, 0.0, 1.0, 0.0}, Kind{true, 0.8, 2.0, 0.0}}) {
+        Kind{true, 0.0, 1.0, 0.0}, Kind{true, 0.8, 2.0, 0.0}, Kind{true, 0.8, 1.5, 0.1, 3.0}}) {
+    loads.tip = {0.05, speed, -1.0};
     p.compliance_damping = damping;
     p.compliance_exponent = exponent;
     const Motion motion(p);
     const double y = loads.tip[0] + depth;
     const Series c = expanded(motion, y, z, loads, 1.0, touching, depth);
+    const double force = touching ? motion.compliance().force(depth, z - speed) : 0.0;
+    EXPECT_NEAR(2 * c[2], motion.acceleration(y, z, loads.force[0], force), 1e-13) << exponent;
     const Taylor R(c, max_order);
     const auto at = [&](double t) {
-      const double deep = depth + R.rise(t) - 0.4 * t + t * t / 2;
+      const double deep = depth + R.rise(t) - speed * t + t * t / 2;
       return expanded(motion, R(t), R.rate(t), loads.from_time(t), 1.0, touching, deep);
     };
     const std::array<Series, 4> later{at(h), at(2 * h), at(3 * h), at(4 * h)};

@@ -360,6 +360,19 @@ TEST(SpringStep, ResultsThatAreNotFiniteAreRefused) {
   heavy.velocity = 1e10;
   Spring planet(heavy);
   expect(failure(planet, 1e-3), {"range of floating-point numbers", "smaller inputs"});  // ½ m z²
+  Parameters stiff;
+  stiff.mass = 1e250;
+  stiff.linear_stiffness = 1e200;
+  stiff.displacement = 1e60;
+  Spring bent(stiff);
+  expect(failure(bent, 1e-3), {"range of floating-point numbers"});  // ½ k y²
+  Parameters hard = stiff;
+  hard.linear_stiffness = 0.0;
+  hard.contact_law = ContactLaw::normal_compliance;
+  hard.compliance_stiffness = 1e200;
+  hard.compliance_exponent = 1.0;
+  Spring squeezed(hard);
+  expect(failure(squeezed, 1e-3), {"range of floating-point numbers"});  // ½ λ δ²
   Spring pressed(everything());
   Inputs tip;
   tip.tip_displacement = {-1e300, 0.0, 0.0};

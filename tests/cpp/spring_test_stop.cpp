@@ -45,20 +45,24 @@ TEST(SpringStop, BouncesFollowTheGeometricSeries) {
     Spring s(p);
     double impulses = 0.0;
     for (int i = 1; i * H < zeno + 0.5; ++i) {
-      s.step(H, weight(m * g));
+      s.step(H, weight(m * g), (i - 1) * H);
       impulses += s.stop_impulse();
       const double t = i * H;
       double start = -t1, speed = g * t1, momentum = 0.0;  // of the flight that began at `start`
+      int impacts = 0;
       while (t >= start + 2 * speed / g && speed > 1e-6) {
         start += 2 * speed / g;
         momentum += m * speed * (1 + e);
         speed *= e;
+        ++impacts;
       }
       if (speed <= 1e-6) break;  // so close to the end that rounding decides which flight it is
       const double tau = t - start;
       ASSERT_NEAR(s.displacement(), speed * tau - g / 2 * tau * tau, 1e-13) << "t = " << t;
       ASSERT_NEAR(s.velocity(), speed - g * tau, 1e-12) << "t = " << t;
       ASSERT_NEAR(impulses, momentum, 1e-12) << "t = " << t;
+      ASSERT_EQ(s.impacts(), impacts) << "t = " << t;
+      ASSERT_NEAR(s.last_impact(), impacts > 0 ? start : -1.0, 1e-12) << "t = " << t;
       ASSERT_FALSE(s.seated());
     }
   }
@@ -67,24 +71,27 @@ TEST(SpringStop, BouncesFollowTheGeometricSeries) {
 // It comes to rest at the end of the series, not before and not long after: the bounces that are cut short would have
 // risen less than the tolerance of y, which takes √(8·tol/g)/(1 − e) < 1e-6 s.
 TEST(SpringStop, ImpactsThatDieOutEndSeated) {
-  const double g = 10.0, h = 1.0, e = 0.5, zeno = std::sqrt(2 * h / g) * (1 + e) / (1 - e);
-  Spring before(ball(h, 0.0, e)), after(ball(h, 0.0, e));
-  before.step(zeno - 1e-6, weight(g));
+  const double m = 100.0, g = 10.0, h = 1.0, e = 0.5, zeno = std::sqrt(2 * h / g) * (1 + e) / (1 - e);
+  Parameters p = ball(h, 0.0, e);
+  p.mass = m;
+  Spring before(p), after(p);
+  before.step(zeno - 1e-6, weight(m * g));
   EXPECT_FALSE(before.seated());
-  after.step(zeno + 1e-6, weight(g));
+  after.step(zeno + 1e-6, weight(m * g));
   EXPECT_TRUE(after.seated());
   EXPECT_EQ(after.displacement(), 0.0);
   EXPECT_EQ(after.velocity(), 0.0);
   EXPECT_EQ(after.acceleration(), 0.0);
   // All of the potential energy m g h is lost in impacts; the impulses sum to m v₁(1 + e)/(1 − e).
-  EXPECT_NEAR(after.impact_loss(), g * h, 1e-12);
+  EXPECT_NEAR(after.impact_loss(), m * g * h, m * 1e-12);
   const double cut = std::sqrt(2 * g * 1e-14);  // speed that rises to the tolerance
-  EXPECT_NEAR(after.stop_impulse(), std::sqrt(2 * g * h) * (1 + e) / (1 - e), cut * (1 + e) / (1 - e));
-  after.step(0.25, weight(g));
+  EXPECT_NEAR(after.stop_impulse(), m * std::sqrt(2 * g * h) * (1 + e) / (1 - e), m * cut * (1 + e) / (1 - e));
+  after.step(0.25, weight(m * g));
   EXPECT_TRUE(after.seated());
-  EXPECT_NEAR(after.stop_force(), g, 1e-14);
+  EXPECT_NEAR(after.stop_force(), m * g, m * 1e-14);
   EXPECT_EQ(after.stop_impulse(), 0.0);
   EXPECT_EQ(after.displacement_integral(), 0.0);
+  EXPECT_EQ(after.displacement_integral_2(), 0.0);
 }
 
 // In one step that holds all of it: ∫N + impulses balance the weight, m Δz = Σ J + ∫N − m g t.
@@ -145,9 +152,16 @@ TEST(SpringStop, LeavesWhenTheForceTurns) {
   EXPECT_NEAR(s.stop_force(), 1.0, 1e-15);  // ∫₀^0.2 (10 − 50 t) dt
   EXPECT_EQ(s.stop_impulse(), 0.0);
 
-  Spring early(ball(0.0, 0.0, 0.5));
-  EXPECT_NEAR(early.step_to_event(1.0, inputs, 0.0, true).size, 0.2, 1e-15);
-  EXPECT_NEAR(early.stop_force(), 5.0, 1e-14);  // the mean up to there
+  // The same where a spring pulls with 1000 N, so that N is what large forces leave.
+  Parameters p = ball(-1.0, 0.0, 0.5);
+  p.stop_position = -1.0;
+  p.linear_stiffness = 1000.0;
+  inputs.external_force[0] -= 1000.0;
+  Spring early(p);
+  EXPECT_NEAR(early.step_to_event(1.0, inputs, 0.0, true).size, 0.2, 1e-13);
+  EXPECT_NEAR(early.stop_force(), 5.0, 1e-11);  // the mean up to there
+  EXPECT_FALSE(early.seated());
+  EXPECT_NEAR(early.acceleration(), 0.0, 1e-11);
 }
 
 // Falls for T, then lies at 0: ∫y = ⅔hT, ∫∫y = 5/12 hT² + ⅔hT (1 − T).
@@ -209,6 +223,13 @@ TEST(SpringStop, TheEarlierOfTwoEventsInOneInternalStepCounts) {
   inputs.tip_displacement[0] = 1e-4;
   EXPECT_NEAR(s.step_to_event(1.0, inputs, 0.0, true).size, 0.0999, 1e-9);
   EXPECT_EQ(s.impacts(), 0);
+  // One that turns 0.1 mm above the stop, at 0.5625 s, and meets a tip that comes down, at 0.6 s.
+  p.displacement = 3.0 * 0.5625 * 0.5625 + 1e-4;
+  p.velocity = -6.0 * 0.5625;
+  inputs = weight(-6.0);
+  const double met = 3.0 * 0.0375 * 0.0375 + 1e-4;
+  inputs.tip_displacement = {1.0, (met - 1.0) / 0.6, 0.0};
+  EXPECT_NEAR(Spring(p).step_to_event(1.0, inputs, 0.0, true).size, 0.6, 1e-12);
 }
 
 // y = (τ − a)²(τ − b)² − δ comes down on the stop twice, near a and b: in one step the first is seen, too. From there
@@ -223,6 +244,13 @@ TEST(SpringStop, TheFirstOfTwoGrazingImpactsCounts) {
     whole.step(1.0, inputs);
     EXPECT_EQ(whole.impacts(), 1);
     EXPECT_NEAR(whole.last_impact(), a - std::sqrt(dip) / (b - a), 1e-5);
+    // The same from below, against a tip.
+    Parameters p = ball(dip - product * product, 2 * sum * product, 1.0);
+    p.stop_enabled = false;
+    p.contact_law = ContactLaw::normal_compliance;
+    p.compliance_stiffness = 1e-9;
+    for (double& force : inputs.external_force) force = -force;
+    EXPECT_NEAR(Spring(p).step_to_event(1.0, inputs, 0.0, true).size, a - std::sqrt(dip) / (b - a), 1e-5);
   }
 }
 
@@ -250,6 +278,7 @@ TEST(SpringStop, StartOnTheStop) {
   Spring pushed(ball(0.0, 0.0, 0.5));
   pushed.step(0.1, weight(2.0));
   pushed.apply_impulse(1.0);
+  EXPECT_FALSE(pushed.seated());
   pushed.step(0.1, weight(2.0));
   EXPECT_NEAR(pushed.displacement(), 0.1 - 0.01, 1e-15);
 }
@@ -272,6 +301,28 @@ TEST(SpringStop, PlasticImpactUnderALiftingForce) {
   EXPECT_NEAR(s.displacement(), a / rate * (tau + std::expm1(-rate * tau) / rate), 1e-16);  // absolute tolerance 1e-14
   EXPECT_NEAR(s.velocity(), -a / rate * std::expm1(-rate * tau), 1e-15);
   EXPECT_FALSE(s.seated());
+}
+
+// What is due at an impact is done at once: without a rebound the top stays where it is pressed down, by the tip here,
+// and goes where it is lifted.
+TEST(SpringStop, AStrikeKnowsWhatActs) {
+  for (const bool pressed : {true, false}) {
+    Parameters p = ball(0.0, -1.0, 0.0);
+    p.stop_position = -0.01;
+    p.contact_law = pressed ? ContactLaw::normal_compliance : ContactLaw::external;
+    p.compliance_exponent = 1.0;
+    Inputs inputs = weight(-1.0);
+    inputs.tip_displacement[0] = -0.015;
+    p.displacement = p.stop_position + 1e-3;
+    Spring s(p);
+    const double t = s.step_to_event(1.0, inputs, 3.0, true).size;
+    EXPECT_LT(s.velocity(), 0.0);
+    s.strike(3.0 + t);
+    EXPECT_EQ(s.velocity(), 0.0);
+    EXPECT_EQ(s.seated(), pressed);
+    EXPECT_EQ(s.impacts(), 1);
+    EXPECT_EQ(s.last_impact(), 3.0 + t);
+  }
 }
 
 // Both laws: seated under a tip that presses with λ δ^p and lifts off with v: N = λ(−u)₊^p + k φ.
@@ -302,6 +353,9 @@ TEST(SpringStop, SeatedUnderTheTip) {
   inputs.tip_displacement[0] += 0.04 * 0.1258;
   s.step(0.02, inputs);
   EXPECT_FALSE(s.seated());
+  const double from = 0.006 - 0.04 * 0.1258, to = std::pow(3e-5, 2.0 / 3.0);  // depths while N > 0
+  const double held = 1e5 * (std::pow(from, 2.5) - std::pow(to, 2.5)) / (2.5 * 0.04) - 3.0 * (from - to) / 0.04;
+  EXPECT_NEAR(s.stop_force() * 0.02, held, 1e-9 * held);
   EXPECT_GT(s.displacement(), -0.01);
 }
 
