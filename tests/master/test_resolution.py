@@ -84,7 +84,7 @@ def test_what_alternates_while_ends_are_tied_matters_where_they_part():
     exact = event_driven.simulate(run.scene, sample_times=run.time)
     assert np.abs(run.y[1:] - exact.y[-len(run) + 1 :]).max() < 1e-3 * np.ptp(exact.y)
     assert whole.summary["resolved"] is False
-    assert "moves an end by about 1.9 %" in whole.summary["warnings"][0]
+    assert "moves an end by about 2 %" in whole.summary["warnings"][0]
 
 
 def test_a_soft_contact_within_a_macro_step_is_lost_to_an_exchange_alone():
@@ -143,7 +143,7 @@ def test_ends_that_the_law_would_have_elsewhere_are_said(degree, share, resolved
     """Soft ones and tied ones, by degree; of what measured loads leave out, and between the rows, 1 % is allowed."""
     for seen in ("left_out", "between_rows"):
         assert (not_resolved(STIFF, **{seen: 0.01 * share}) is None) is resolved
-    for scene, limits in ((STIFF, (0.006, 0.002, 0.001)), (PAIR, (0.0025, 0.002, 0.001))):
+    for scene, limits in ((STIFF, (0.006, 0.002, 0.001)), (PAIR, (0.003, 0.002, 0.001))):
         told = not_resolved(with_changes(scene, coupling={"degree": degree}), share * limits[degree])
         assert (told is None) is resolved
         assert resolved or ("a higher coupling.degree" in told) is (degree < 2)

@@ -30,6 +30,7 @@ from .detection import Detector
 from .ledger import Balance, Neglect
 from .log import TOGETHER, Log
 from .macro_steps import AdaptiveSteps, MacroGrid
+from .misplaced import misplaced
 from .observed import mismatch, not_shown, why_not_resolved
 from .outcome import RunStopped, cause_of
 from .stepping import SIMULTANEOUS, Pair, State
@@ -362,7 +363,8 @@ class Master(Stateful):
         inside = steps[:0] if joined.decides else steps  # what tells of the motion inside steps
         energies, warnings, changed = self._balance.report(steps)
         of_coupling, warned = joined.report()
-        unresolved = why_not_resolved(scene, self._pair, self._steps.size, inside, events)
+        off = misplaced(scene, self._pair, inside, events)
+        unresolved = why_not_resolved(scene, self._pair, self._steps.size, inside, events, off)
         warnings += filter(None, [*warned, unresolved or peak_force_doubt(scene), not_shown(scene, self._pair, inside)])
         neglect = {}
         if scene.driver_stiffness is not None and len(steps):
@@ -379,6 +381,7 @@ class Master(Stateful):
             **of_coupling,
             **energies,
             "resolved": unresolved is None and not changed,
+            "misplaced_ends": off,
             "warnings": warnings,
             **({"max_velocity_mismatch": mismatch(self._pair, inside)} if len(inside) else {}),
             **(totals(scene, steps, events, window) if len(inside) else {}),

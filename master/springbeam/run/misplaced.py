@@ -154,7 +154,7 @@ def _defect(law: SoftLaw, before: np.ndarray, step: np.ndarray, parts: int) -> n
 def _along_tie(
     degree: int, ends: _Errors, steps: np.ndarray, stiffness: np.ndarray, after: np.ndarray
 ) -> Iterator[tuple[float, float]]:
-    """Yield the errors of both ends [m] along the run: its steps leave a gap inside and different velocities."""
+    """Yield the errors of both ends [m] along the run, inside steps, too: these leave a gap and different velocities."""
     parts = degree + 2  # one more than the step has forces
     size = np.where(steps["size"] > 0.0, steps["size"], 1.0)
     path = _penetration(np.roll(steps, 1), steps, size)
@@ -169,6 +169,7 @@ def _along_tie(
         for deep, rate in inside[i].tolist() if H > 0.0 and tied[i - 1] else ():
             ends.advance(H / parts, k, per_mass, lambda apart, gives, deep=deep: (apart + deep) / gives)  # type: ignore[misc]
             ends.meet(rate, per_mass)
+            yield ends.y, ends.y  # between rows the tip takes the path of the lower end
         ends.strike(stays, turns, most)
         if tied[i - 1 : i + 1].any() and (most > 0.0 or tied[i] != tied[i - 1]):
             per_mass = 0.0 if seated[i] or most > 0.0 else ends.per_mass  # the foundation strikes each end by itself

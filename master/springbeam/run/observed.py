@@ -16,7 +16,7 @@ from ..scene import Load, Scene
 from ..scene.linearised import spring_frequency
 from ..scene.resolution import SHORT, SHORT_IMPULSE, not_resolved, slowest_frequency
 from ..scene.statics import tip_inertia
-from .misplaced import misplaced, tip_modes
+from .misplaced import tip_modes
 from .stepping import Pair
 
 #: Warning of a run in which a force was too large for its column.
@@ -49,15 +49,17 @@ def not_shown(scene: Scene, pair: Pair, steps: np.ndarray) -> str | None:
     return _NOT_SHOWN if too_large else None
 
 
-def why_not_resolved(scene: Scene, pair: Pair, H: float, steps: np.ndarray, events: Sequence[Event]) -> str | None:
-    """Return in words why a run in steps of H [s] is not resolved; ``None`` if it is."""
+def why_not_resolved(
+    scene: Scene, pair: Pair, H: float, steps: np.ndarray, events: Sequence[Event], misplaced: float
+) -> str | None:
+    """Return in words why a run in steps of H [s] whose ends are ``misplaced`` is not resolved; ``None`` if it is."""
     least = SHORT_IMPULSE * least_momentum(scene, pair, steps)
     lasted = shortest_contact(steps, events, SHORT * H, least)
     sizes = steps["size"][steps["size"] > 0.0]
     late = float(np.sqrt(np.mean(sizes**3) / np.mean(sizes))) if scene.coupling.adaptive and len(sizes) else None
     return not_resolved(
         scene,
-        misplaced(scene, pair, steps, events),
+        misplaced,
         shortest_contact=lasted,
         left_out=left_out(scene, steps),
         between_rows=between_rows(scene, steps),

@@ -107,6 +107,8 @@ def pick(scene: Scene) -> Trajectory:
             continue
         if coarse is not None:
             before, errors = _estimated(coarse, fine, asked, before)
+            # Of a step that is the same in both runs, as one from an event to a macro point may be, they tell nothing.
+            errors["motion"] = max(errors["motion"], fine.summary["misplaced_ends"])
             if _SAFETY * max(errors.values()) <= asked:
                 return _told(fine, asked, errors, pilots)
         pilots.append(fine)
