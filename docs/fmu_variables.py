@@ -33,6 +33,8 @@ def section(name: str) -> str:
         unit = f" [{variable.unit}]" if variable.unit else ""
         kind = variable.causality if variable.type == "Real" else f"{variable.type} {variable.causality}"
         text = re.sub(r"; derivatives as for \w+", "", variable.description or "").replace("|", "\\|")  # HEAD says it
+        if label != variable.name:  # what is said of the first
+            text = text.replace("[1]", "[i]").replace("L*0/20", "L*(i - 1)/20")
         rows.append((f"`{label}`{unit}", kind, start, text))
     return "\n".join([f"\n## {name}\n", *table(("variable", "kind", "start", ""), rows), ""])
 
