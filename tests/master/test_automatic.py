@@ -6,7 +6,8 @@ import pytest
 from springbeam import load_scene, simulate, with_changes
 from springbeam.scene.linearised import contact_energy, spring_frequency, spring_stiffness
 from springbeam.scene.resolution import STABLE, choice, mesh_frequency, slowest_frequency, with_scheme_chosen
-from springbeam.scene.statics import tip_compliance
+from springbeam.scene.statics import resting_height, tip_compliance
+from springbeam.scene.tables import Spring
 
 PAIR = load_scene("soft")
 
@@ -74,6 +75,21 @@ def test_a_spring_is_as_stiff_as_where_it_goes(spring, stop, depth):
     assert spring_stiffness(lone) == pytest.approx(3.0 + 3.0 * cubic * depth**2, rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("k1", "k2", "psi", "force", "height"),
+    [
+        (3.0, 0.0, 9.0, 6.0, 2.0),
+        (3.0, -0.25, 2.2, 2.75, 1.0),  # the other places are unstable
+        (-1.0, 1.0, -0.1, 0.0, -1.0),  # two are stable
+        (-1.0, 1.0, 0.1, 0.0, 1.0),
+        (3.0, -0.25, 0.0, 4.01, None),
+    ],
+)
+def test_a_spring_rests_where_it_is_stable_and_nearest_to_where_it_starts(k1, k2, psi, force, height):
+    spring = Spring(mass=1.0, linear_stiffness=k1, cubic_stiffness=k2, equilibrium=psi)
+    assert resting_height(spring, force) == (height if height is None else pytest.approx(height, rel=1e-12))
+
+
 @pytest.mark.parametrize(("turn", "expected"), [(0.99, ("energy", 2)), (1.01, ("energy", 0))])
 def test_unresolved_motion_gets_degree_0(turn, expected):
     assert choice(auto(coupling={"macro_step": turn / slowest_frequency(PAIR.beam)}))[:2] == expected
@@ -87,6 +103,8 @@ def test_unresolved_motion_gets_degree_0(turn, expected):
         ({"contact": {"law": "paper"}}, ("energy", 0)),
         ({"beam": {"integrator": "generalized_alpha"}}, ("energy", 0)),
         ({"beam": {"fidelity": "quasi_static"}}, ("energy", 2)),
+        ({"contact": {"impact": "rest"}, "coupling": {"macro_step": 1e-6}}, ("energy", 2)),
+        ({"coupling": {"macro_step": 1e-6}}, ("hermite", 2)),
     ],
 )
 def test_what_changes_of_soft_get(changes, expected):

@@ -151,6 +151,8 @@ def test_fine_lines_of_a_table_end_no_step_but_its_first_and_its_last_do(tmp_pat
     assert signal.next_kink(0.01052, 3e-4) == signal.kinks[6]  # three of them in a step
     assert signal.next_kink(last - 1.5e-4, 1e-3) == signal.kinks[-2]
     assert signal.next_kink(last, 1e-3) == np.inf
+    spline = Load(file=str(tmp_path / "fine.csv"), **given | {"interpolation": "cubic"})
+    assert spline.kinks == [0.01, last]  # it bends at no line
 
 
 def test_the_reference_integrates_loads_as_scipy_does(monkeypatch):

@@ -19,20 +19,32 @@ from springbeam.scene.resolution import (
     fastest_frequency,
     impact_frequency,
     lateness,
+    mesh_frequency,
     not_resolved,
     peak_force_doubt,
+    slow_oscillations,
     slowest_frequency,
 )
-from springbeam.scene.statics import tip_compliance, tip_inertia
+from springbeam.scene.statics import lowest_frequency, tip_compliance, tip_inertia
 
 BEAMS = [name for name in shipped_scenes() if load_scene(name).beam is not None]
 PAIR = load_scene("soft")
 
 
 @pytest.mark.parametrize("name", BEAMS)
-def test_the_slowest_frequency_is_that_of_the_mesh(name):
+def test_the_slowest_frequency_is_that_of_the_mesh_and_without_one_exact(name):
     beam = load_scene(name).beam
     assert slowest_frequency(beam) == pytest.approx(modal_beam(beam).omega[0], rel=2e-3)
+    fine = {"n_elements": 8, "element_degree": 4, "reduced_integration": False, "n_modes": 0}
+    exact = modal_beam(beam.model_copy(update=fine)).omega[0]
+    assert lowest_frequency(beam) == pytest.approx(exact, rel=2e-9)
+
+
+def test_a_mesh_that_locks_has_higher_frequencies():
+    """Eight elements of a slender beam are 51 times too stiff; what shears fastest is held by the section's turning."""
+    beam = load_scene("steel-bumper").beam.model_copy(update={"n_elements": 8, "reduced_integration": False})
+    omega = modal_beam(beam).omega
+    assert (slowest_frequency(beam), mesh_frequency(beam)) == pytest.approx((omega[0], omega[-1]), rel=2e-3)
 
 
 def test_the_fastest_frequency_is_the_meshs_or_that_of_the_last_mode_kept():
@@ -60,6 +72,18 @@ def test_one_radian_of_the_slowest_oscillation_is_the_limit(turn, resolved):
     swept = {"on": "tip", "signal": "chirp", "frequency": 10.0, "frequency_end": 20.0, "duration": 0.6}
     driven = with_changes(PAIR, loads=[swept], coupling={"macro_step": turn / (40.0 * np.pi)})
     assert (not_resolved(driven) is None) is resolved
+
+
+@pytest.mark.parametrize("damped", [1.0, 2.0])
+@pytest.mark.parametrize(("turn", "resolved"), [(2.98, True), (3.02, False)])
+def test_three_radians_of_the_fastest_mode_are_the_limit_of_hermite(turn, resolved, damped):
+    """Of what damping lets last: waves of ω α = 0.15."""
+    omega = fastest_frequency(PAIR.beam) / damped
+    beam = {} if damped == 1.0 else {"alpha_b": 0.15 / omega}
+    told = not_resolved(
+        with_changes(PAIR, beam=beam, coupling={"scheme": "hermite", "degree": 2, "macro_step": turn / omega})
+    )
+    assert told is None if resolved else f"a macro_step of {3.0 / omega:.2g} s" in told
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])
@@ -102,6 +126,11 @@ def test_what_creeps_or_has_no_inertia_has_nothing_to_resolve():
     assert not_resolved(with_changes(coarse, beam={"fidelity": "quasi_static"}, coupling={"degree": 2})) is None
     tolerances = with_changes(PAIR, coupling={"relative_tolerance": 1e-3})
     assert not_resolved(tolerances) is None
+    critical = {"beam": ("alpha_b", 2.0 / slowest_frequency(PAIR.beam)), "spring": ("damping", 2.0 * 3.0**0.5)}
+    for name, (key, damping) in critical.items():
+        for share in (0.99, 1.01):
+            swings = [found for found, *_ in slow_oscillations(with_changes(PAIR, **{name: {key: share * damping}}))]
+            assert (name in swings) is (share < 1.0)
 
 
 def test_the_step_that_is_named_resolves_the_motion():
@@ -153,6 +182,13 @@ def test_what_resolves_ends_that_are_elsewhere_is_said():
     adaptive, off = {"coupling": {"relative_tolerance": 1e-3}}, 0.012
     for scene in (STIFF, PAIR):
         assert not_resolved(with_changes(scene, **adaptive), off).endswith("; smaller tolerances resolve it")
+    for seen, share in (({"misplaced": 4.0 * 0.006}, 0.5), ({"left_out": 0.08}, 0.5), ({"between_rows": 0.02}, 0.25)):
+        told = not_resolved(STIFF, **seen)
+        named = float(told.split("coupling.macro_step <= ")[1].split()[0])
+        assert named == pytest.approx(0.95 * share * STIFF.coupling.H, rel=0.03)
+        assert told.endswith("a higher coupling.degree allows longer ones") is ("misplaced" in seen)
+    midpoint = not_resolved(with_changes(STIFF, beam={"integrator": "generalized_alpha"}), off)
+    assert midpoint.endswith("resolves it")
     kept = not_resolved(with_changes(PAIR, contact={"impact": "rest"}), off)
     assert kept.endswith('; impact = "rest" leaves their velocities apart, "inelastic" does not')
 
@@ -169,6 +205,11 @@ def test_a_step_makes_a_contact_late_as_gauss_collocation_does(degree):
     assert lateness(with_changes(STIFF, coupling={"degree": degree}), x) == pytest.approx(exact, rel=0.02)
 
 
+MIDPOINT = {"n_elements": 10, "integrator": "generalized_alpha"}
+#: Frequency of a beam without inertia and the spring [rad/s].
+TOGETHER = ((3.0 + 1.0 / tip_compliance(PAIR.beam)) / PAIR.spring.mass) ** 0.5
+
+
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
 def test_steps_of_the_midpoint_rule_may_lag_behind_what_an_impact_sets_off(share, resolved):
     """n steps that turn it by x lag by n x³/12: 1 rad of the fastest waves is the limit, those that die out left out;
@@ -182,7 +223,7 @@ def test_steps_of_the_midpoint_rule_may_lag_behind_what_an_impact_sets_off(share
         assert not_resolved(with_changes(given, **other)) is None
 
     for alpha in (0.01, 0.0):
-        midpoint = {"n_elements": 10, "alpha_b": alpha, "integrator": "generalized_alpha"}
+        midpoint = {**MIDPOINT, "alpha_b": alpha}
         waves = impact_frequency(with_changes(PAIR, beam=midpoint).beam) if alpha == 0.0 else 0.15 / alpha
         said(waves, 1.0, {"beam": {"integrator": "modal"}}, beam=midpoint)
         soft = {"contact": {"law": "compliance"}, "loads": [{"on": "tip", "signal": "harmonic", "frequency": 20.0}]}
@@ -195,8 +236,20 @@ def test_steps_of_the_midpoint_rule_may_lag_behind_what_an_impact_sets_off(share
         said(waves, 1.0, {"beam": {"integrator": "modal"}}, beam=arrived, **met)
     # ρ∞ = ½ lags by 1 + 4.5 ((1 − ρ∞)/(1 + ρ∞))² = 1.5 times as much.
     said(waves, 1.0 / 1.5, {"beam": {"integrator": "modal"}}, beam={**midpoint, "rho_inf": 0.5})
-    together = ((3.0 + 1.0 / tip_compliance(PAIR.beam)) / PAIR.spring.mass) ** 0.5
-    said(together, 0.015, {"coupling": {"degree": 2}}, beam={"fidelity": "quasi_static"})
+    massless, soft = {"fidelity": "quasi_static"}, {"contact": {"law": "compliance"}}
+    said(TOGETHER, 0.015, {"coupling": {"degree": 2}}, beam=massless)
+    said(TOGETHER, 0.015, {**soft, "coupling": {"feedback": "beam_drives"}}, beam=massless)
+
+
+@pytest.mark.parametrize(("beam", "omega", "limit"), [
+    (MIDPOINT, impact_frequency(with_changes(PAIR, beam=MIDPOINT).beam), 1.0),
+    ({"fidelity": "quasi_static"}, TOGETHER, 0.015),
+])  # fmt: skip
+def test_the_step_that_is_named_keeps_what_lags_at_its_limit(beam, omega, limit):
+    """5 % shorter than that: three times as long, they lag by nine times as much."""
+    size = (12.0 * limit / (omega * PAIR.duration)) ** 0.5 / omega
+    told = not_resolved(with_changes(PAIR, beam=beam, coupling={"degree": 0, "macro_step": 3.0 * size}))
+    assert float(told.split("macro_step <= ")[1].split()[0]) == pytest.approx(0.95 * size, rel=0.05)
 
 
 @pytest.mark.parametrize("start", [{}, {"initial_velocity_slope": 0.0, "initial_deflection_slope": 0.03}])

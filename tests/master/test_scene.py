@@ -260,6 +260,8 @@ def test_a_scene_with_all_lengths_in_mm_is_named():
     (found,) = [line for line in said if "lengths are in m" in line]
     assert "3.92e+08 kg, beside [spring] mass = 200.0; in mm it would be 0.5 m long, of 0.393 kg" in found
     assert list(implausible(scenes[1])) == []
+    (found,) = implausible(with_changes(scenes[1], spring={"mass": 1e6}))
+    assert "the beam has 0.393 kg, beside [spring] mass = 1000000.0; lengths are in m" in found
 
 
 def test_a_spring_that_is_held_until_the_tip_arrives_is_told_the_force_on_it():
@@ -283,3 +285,7 @@ def test_what_is_wrong_or_doubtful_of_a_load_names_it(tmp_path):
     assert suspicions(scene_from_dict({**fine, "coupling": {"macro_step": 3e-4}})) == []
     with pytest.raises(SceneError, match=r"^scene: \[loads\.1\] on = \"beam\": acts on a \[beam\], and .* none$"):
         scene_from_dict(changed(beam=None, loads=[push, {"on": "beam"}, push]))
+    late = {"beam": {"initial_deflection_slope": 0.6}, "stop": None}
+    assert scene_from_dict(changed(**late, loads=[{**push, "amplitude": 0.0}])).contact_time == 0.6
+    with pytest.raises(SceneError, match=r"signal = \"constant\": acts before the tip arrives at t = 0\.6 s"):
+        scene_from_dict(changed(**late, loads=[push]))
