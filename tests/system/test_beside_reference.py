@@ -120,7 +120,7 @@ CASES = {
 def test_a_run_is_that_of_the_reference(name):
     simulated, scene, bounds = CASES[name]
     run = simulated(scene)
-    rows = np.searchsorted(run.time, np.unique(run.time)[:: len(run) // 250 + 1], side="right") - 1
+    rows = np.searchsorted(run.time, np.unique(run.time)[:: len(run) // 100 + 1], side="right") - 1
     exact = event_driven.simulate(scene, sample_times=run.time[rows])
     starts, within = bounds.get("starts", []), bounds.get("within", [])
     assert kinds(run)[: len(starts)] == kinds(exact)[: len(starts)] == starts

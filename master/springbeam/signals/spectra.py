@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter, welch
 
 from ..results.dense import rows_at
 from ..results.trajectory import Trajectory
@@ -86,6 +85,8 @@ def power_spectrum(run: Trajectory, what: str, since: float | None = None, segme
 
     Raises SceneError where there is nothing to sample.
     """
+    from scipy.signal import welch  # takes half a second to load: only for who asks for a spectrum
+
     times, values = sampled(run, what, since=since)
     length = max(2, 2 * len(values) // (segments + 1))
     shared = {"fs": 1.0 / (times[1] - times[0]), "window": "hann", "nperseg": length, "detrend": "constant"}
@@ -131,6 +132,8 @@ def shock_spectrum(velocity: np.ndarray, step: float, frequencies: np.ndarray, q
 
 def _answer(velocity: np.ndarray, step: float, frequency: float, quality: float) -> np.ndarray:
     """Return ẍ, up to one period after the base has come to its last velocity."""
+    from scipy.signal import cont2discrete, lfilter  # see `power_spectrum`
+
     omega = 2.0 * np.pi * frequency
     after = np.full(int(np.ceil(1.0 / (frequency * step))) + 1, velocity[-1])
     of_velocity = (omega / quality, omega**2, 0.0), (1.0, omega / quality, omega**2)  # s H(s)

@@ -25,7 +25,6 @@ from ..scene import Scene, SceneError, with_changes
 from ..scene.resolution import STABLE, TURN, choice, joined_frequency, lasting_frequency, slow_oscillations
 from ..scene.tables import ALL_MODES_UP_TO
 from .metrics import motion_errors, worst
-from .stability.predict import contact_frequency
 
 #: Fewest and most macro steps of a run.
 _FEWEST, _MOST = 8.0, 50_000
@@ -163,6 +162,8 @@ def _first(scene: Scene) -> float:
     rates = [omega / TURN for _, omega, _ in slow_oscillations(scene)]
     if scene.beam is not None and not scene.partners:
         if scene.coupled and not scene.contact.rigid:
+            from .stability.predict import contact_frequency  # takes a second to load: only for who has a soft contact
+
             rates.append(contact_frequency(scene) / _CONTACT_TURN)
         elif scene.massless:
             rates.append(joined_frequency(scene) / _CONTACT_TURN)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from scipy.stats import qmc
 
 from ..scene import SceneError, key_kind, parse_value
 from ..scene.scene import split_key
@@ -124,6 +123,8 @@ def design(axes: Sequence[Axis], samples: int, seed: int, sampling: Sampling) ->
             raise SceneError(f"--vary {open_ranges[0]}: a range without a count is sampled; give --samples, or a count")
         return list(itertools.product(*(axis.values for axis in axes)))
     if sampling == "latin_hypercube":
+        from scipy.stats import qmc  # takes a second to load: only for who samples
+
         unit = qmc.LatinHypercube(len(axes), seed=seed).random(samples)
     else:
         unit = np.random.default_rng(seed).random((samples, len(axes)))
