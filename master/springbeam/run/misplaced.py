@@ -154,7 +154,7 @@ def _defect(law: SoftLaw, before: np.ndarray, step: np.ndarray, parts: int) -> n
 def _along_tie(
     degree: int, ends: _Errors, steps: np.ndarray, stiffness: np.ndarray, after: np.ndarray
 ) -> Iterator[tuple[float, float]]:
-    """Yield the errors of both ends [m] along the run, inside steps, too: these leave a gap and different velocities."""
+    """Yield the errors of both ends [m] along the run, inside steps, too: they leave a gap and different velocities."""
     parts = degree + 2  # one more than the step has forces
     size = np.where(steps["size"] > 0.0, steps["size"], 1.0)
     path = _penetration(np.roll(steps, 1), steps, size)
