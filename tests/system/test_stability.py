@@ -3,6 +3,7 @@
 import io
 import itertools
 import pickle
+from collections import Counter
 from dataclasses import replace
 from functools import lru_cache
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from bodies import couple
 from commands import command
+from matplotlib.colors import to_rgba
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
 from springbeam.bodies.factory import load_bodies
@@ -19,10 +21,21 @@ from springbeam.contact.laws import law_of
 from springbeam.coupling import coupling_of
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import modal_beam
+from springbeam.pictures.drawing import BLACK, BLUE, GREEN, ORANGE, SKY, STONE
 from springbeam.run.ledger import APPROXIMATE, EXACT
 from springbeam.run.master import Master
+from springbeam.scene import scene_from_dict
+from springbeam.scene.linearised import hilltop, spring_frequency
+from springbeam.scene.statics import bending_stiffness, shear_stiffness
 from springbeam.studies.stability import grid
-from springbeam.studies.stability.cells import AT_REST, PARAMETERS, SLICES, sampled_cells, slice_cells
+from springbeam.studies.stability.cells import (
+    AT_REST,
+    PARAMETERS,
+    SLICES,
+    sampled_cells,
+    scene_dict,
+    slice_cells,
+)
 from springbeam.studies.stability.grid import CLASSES, Grid, ended, judged, run_cell
 from springbeam.studies.stability.predict import THRESHOLD, critical_step, linear_pair
 from springbeam.studies.study import record_all
@@ -70,6 +83,7 @@ DAMPED = {"integrator": "generalized_alpha", "rho_inf": 0.5}
         ("auto", {}, 10.0 * EXACT, (), "", "approximate"),
         ("auto", {"integrator": "generalized_alpha"}, 10.0 * EXACT, (), "", "garbage"),
         ("auto", DAMPED, -0.5, (), "", "dissipative"),
+        ("auto", DAMPED, 0.5, (), "", "garbage"),
     ],
 )
 def test_energy_that_changes_is_judged_by_the_scheme_and_by_what_is_said(scheme, beam, share, warnings, cause, kind):
@@ -162,28 +176,39 @@ def test_what_calls_itself_resolved_is_compared_with_the_reference(monkeypatch, 
     assert outcome["error_motion"] > 1e-3
 
 
+MOTION = np.abs(done().shapes[1]).max() + 2e-3 * max(np.abs(done().v_tip).max(), np.abs(done().z).max())
+
+
 @pytest.mark.parametrize(
-    ("column", "reason"),
+    ("column", "last", "phase", "scene", "reason"),
     [
-        ("z", "z is not finite"),
-        ("gap", "overlap or part by 2.0e-09"),
-        ("e_dissipated", "energy lost by damping comes back"),
-        ("e_impact_loss", "energy lost by impacts comes back"),
+        ("z", np.nan, "tied", {}, "z is not finite"),
+        *(("gap", gap, phase, {}, "overlap or part by 2.0e-09")
+          for gap, phase in ((2e-9, "tied"), (-2e-9, "touch"), (-2e-9, "free"))),
+        ("gap", 1.0, "free", {}, None),
+        ("e_dissipated", -1e-6, "tied", {}, "energy lost by damping comes back"),
+        ("e_dissipated", -1e-6, "tied", {"beam": DAMPED}, None),  # over a step it is exact, and may be of any sign
+        ("e_impact_loss", -1e-6, "tied", {}, "energy lost by impacts comes back"),
+        ("e_impact_loss", -1e-6, "tied", {"contact": {"impact": "tip"}}, None),  # which takes from nowhere
     ],
-)
-def test_what_must_not_be_is_garbage_whatever_the_energy(column, reason):
+)  # fmt: skip
+def test_what_must_not_be_is_garbage_whatever_the_energy(column, last, phase, scene, reason):
+    """A gap is told over the motion."""
     run = done()
-    values = run[column].copy()
-    motion = np.abs(run.shapes[1]).max() + 2e-3 * max(np.abs(run.v_tip).max(), np.abs(run.z).max())
-    values[-1] = {"z": np.nan, "gap": 2e-9 * motion}.get(column, values[-1] - 1e-6)
-    outcome = judged(changed(run, **{column: values}))
-    assert outcome["kind"] == "garbage"
-    assert reason in outcome["reason"]
+    values, phases = run[column].copy(), run.phase.copy()
+    values[-1], phases[-1] = last * MOTION if column == "gap" else values[-1] + last, phase
+    outcome = judged(changed(replace(run, scene=with_changes(run.scene, **scene)), phase=phases, **{column: values}))
+    assert (outcome["kind"] == "garbage") is (reason is not None)
+    assert (reason or "") in outcome["reason"]
 
 
 def test_a_run_that_ends_early_is_stopped_for_its_cause():
-    outcome = judged(done(), "the contact chatters")
-    assert (outcome["kind"], outcome["reason"]) == ("stopped", "the contact chatters")
+    none = {name: values[:0] for name, values in done().columns.items()}
+    for run in (done(), changed(done(), **none)):
+        outcome = judged(run, "the contact chatters")
+        assert (outcome["kind"], outcome["reason"]) == ("stopped", "the contact chatters")
+    paper = replace(done(), scene=with_changes(done().scene, contact={"law": "paper"}))  # which is no exact scheme
+    assert judged(changed(paper, SAID, energy_residual=0.01 * paper.e_total))["kind"] == "approximate"
 
 
 def test_what_cannot_be_run_is_refused_and_a_crash_is_garbage(monkeypatch):
@@ -197,6 +222,22 @@ def test_what_cannot_be_run_is_refused_and_a_crash_is_garbage(monkeypatch):
     monkeypatch.setattr(Master, "_advance", crash)
     outcome = run_cell(slice_cells(2)[0])
     assert (outcome["kind"], outcome["reason"]) == ("garbage", "crashed: ZeroDivisionError: nothing there")
+
+
+def test_a_cell_is_the_scene_that_its_parameters_tell():
+    """A tip of 2 m/s 2 cm above; what takes its energy bends the spring by 2/3 m, a tenth of the run is 2 cm high."""
+    cell = AT_REST | {"stiffness": 50.0, "shear_ratio": 4.0, "clearance": 0.02, "speed": 2.0, "restitution": 0.3}
+    scene = scene_from_dict(scene_dict(cell))
+    of_bending, of_shear = bending_stiffness(scene.beam), shear_stiffness(scene.beam)
+    assert (of_bending * of_shear, of_shear / of_bending) == pytest.approx((50.0**2, 4.0), rel=1e-14)
+    assert (scene.contact_time, scene.duration) == pytest.approx((0.01, 200 * 1e-3), rel=1e-12)
+    assert hilltop(scene.spring) == pytest.approx(6.7 * 2.0 / 3.0, rel=1e-14)
+    for elasticity, e in (("given", 0.3), ("plastic", 0.0), ("elastic", 1.0)):
+        assert scene_dict(cell | {"elasticity": elasticity})["stop"] == {"position": -0.015, "restitution": e}
+    elastic = scene_from_dict(scene_dict(cell | {"approach": "elastic", "clearance": 0.1, "steps": 100}))
+    assert (elastic.initial_clearance, elastic.time.t_end) == pytest.approx((0.02, 0.1), rel=1e-12)
+    light = scene_from_dict(scene_dict(cell | {"mass": 1e-6, "k2_kind": "hardening", "k2": 1e8, "macro_step": 0.1}))
+    assert spring_frequency(light) * 0.1 <= 30.0  # radians in a macro step
 
 
 def test_the_grid_covers_the_ranges():
@@ -246,12 +287,16 @@ def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else():
 
 def test_pictures_have_units():
     study = Grid(samples=0, resolution=2)
-    found = study.findings({name: ended("conserved") | {"residual": 1e-9} for name in study.cases()})
+    kinds = itertools.cycle(CLASSES)
+    found = study.findings({name: ended(next(kinds)) | {"residual": 1e-9} for name in study.cases()})
     figures = [draw() for draw in found.pictures.values()]
     for figure in figures:
         figure.savefig(io.BytesIO())  # nothing in it that cannot be painted
     axes = [ax for figure in figures for ax in figure.axes if ax.get_title()]
     assert len(axes) == 2 * len(SLICES)
+    seen = [tuple(colour) for ax in axes[: len(SLICES)] for colour in ax.collections[0].get_facecolors().tolist()]
+    looks = dict(zip(CLASSES, (BLUE, SKY, GREEN, STONE, ORANGE, BLACK), strict=True))
+    assert Counter(seen) == Counter(to_rgba(looks[row["kind"]]) for row in found.tables["stability"])
     labels = {label for ax in axes for label in (ax.get_xlabel(), ax.get_ylabel())}
     assert {"macro_step [s]", "stiffness [N]", "contact_damping [s/m]", "restitution [–]"} <= labels
 
@@ -263,13 +308,19 @@ def test_pictures_have_units():
 def test_command(tmp_path, monkeypatch, unpainted, kinds, code):
     ends = itertools.cycle(kinds)
     monkeypatch.setattr(Grid, "parallel", False)
-    monkeypatch.setattr(grid, "run_cell", lambda cell: ended(next(ends), "y = 1.5 m") | {"residual": 1e-9})
+
+    def end_of(cell):
+        kind = next(ends)
+        return ended(kind, "y = 1.5 m") | {"residual": 1.0 if kind in ("refused", "stopped") else 1e-9}
+
+    monkeypatch.setattr(grid, "run_cell", end_of)
     out = tmp_path / "grid"
     result = command("stability", "--samples", "30", "--resolution", "2", "--out", out)
     assert result.exit_code == code, result.output
     assert "garb." in result.stdout
     table = result.stdout[: result.stdout.index("garbage  " if code else "results  ")]
     assert max(map(len, table.splitlines())) <= 80
+    assert ("1e-09" in table, "1e+00" in table) == (True, False)
     assert len((out / "stability.csv").read_text().splitlines()) == 1 + 30 + 4 * len(SLICES)
     assert all((out / f"stability-{name}.png").is_file() for name in ("classes", "residuals"))
     scenes = sorted(out.glob("stability-garbage-*.toml"))
