@@ -15,7 +15,7 @@ import pytest
 from springbeam.results.files import load_events
 from springbeam.scene import load_scene, with_changes
 
-STEPS = int(os.environ.get("SPRINGBEAM_STEPS", "20000"))
+STEPS = int(os.environ.get("SPRINGBEAM_STEPS", "10000"))
 H = 2e-3
 
 SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": H}, time={"t_end": STEPS * H})
@@ -61,8 +61,8 @@ def test_a_long_run(name, tmp_path):
     print(f"{name}: {len(events)} events, energy residual {summary['max_energy_residual']:.1e}, memory {resident}")
     assert (summary["status"], summary["max_energy_residual"] <= 1e-8) == ("done", True)
     assert len(events) > STEPS // 1000
-    # A tenth of the steps in, everything is allocated. Rows kept in memory would be 168 bytes each as doubles.
-    assert resident[-1] - resident[0] < 1e6
+    # Two tenths of the steps in, everything is allocated. Rows kept in memory would be 168 bytes each as doubles.
+    assert resident[-1] - resident[1] < 1e6
     # Macro steps end on t₀ + k H, not on a sum of H; only events and the rest of their step are in between.
     grid = H * np.arange(STEPS + 1)
     assert time[-1] == scene.time.t_end == grid[-1]

@@ -121,12 +121,13 @@ def drawn(count):
 
 def test_any_number_of_axes_is_drawn():
     """Three were drawn as nothing. Of more than two there is a map over the first two for each pick of the others."""
-    assert [len(drawn(count)) for count in (1, 2, 3, 4)] == [1, 1, 2, 4]
-    first, second = (ax.collections[0] for ax in drawn(3))
+    panels = [drawn(count) for count in (1, 2, 3, 4)]
+    assert [*map(len, panels)] == [1, 1, 2, 4]
+    first, second = (ax.collections[0] for ax in panels[2])
     assert first.get_array().tolist() == [[0.0, 4.0], [2.0, 6.0]]  # b upward, a to the right, where c = 1
     assert second.get_array().tolist() == [[1.0, 5.0], [3.0, 7.0]]
     assert first.get_clim() == second.get_clim() == (0.0, 7.0)
-    assert drawn(3)[1].get_title().strip() == "y, c = 2"
+    assert panels[2][1].get_title().strip() == "y, c = 2"
 
 
 @pytest.mark.filterwarnings("error:constrained_layout not applied")  # it was not: of a mark for failures without any

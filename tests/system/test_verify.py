@@ -20,22 +20,11 @@ from springbeam.studies.verify.alone import Check, section
 from springbeam.studies.verify.coupled import _airy_overshoot
 
 
-@pytest.fixture(scope="module")
-def told():
-    """The checks by section, and what is printed of them."""
+def test_exact_solutions_are_met_and_told_in_a_table_of_80_columns():
     console = Console(record=True, width=80)
-    return report(verify.SECTIONS, console), console.export_text()
-
-
-@pytest.mark.parametrize("section", verify.SECTIONS, ids=lambda section: section.solution.__name__)
-def test_exact_solutions_are_met(section, told):
-    checks = told[0][section.title]
-    assert checks
-    assert [check for check in checks if not check.passed] == []
-
-
-def test_they_are_told_in_a_table_of_80_columns(told):
-    found, shown = told
+    found, shown = report(verify.SECTIONS, console), console.export_text()
+    assert all(found.values())
+    assert [(title, check) for title, checks in found.items() for check in checks if not check.passed] == []
     assert f"{sum(map(len, found.values()))} passed, 0 failed" in shown
     assert all(words in shown for words in (*found, "quantity", "exact", "computed", "error", "bound"))
     assert max(len(line) for line in shown.splitlines()) <= 80
