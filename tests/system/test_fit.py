@@ -1,13 +1,13 @@
 """Measured data beside a run, and keys found by them: on data made with known keys, shifts and noise."""
 
 import json
-from collections import Counter
 from itertools import count
 
 import numpy as np
 import pytest
 from commands import command, printed, refused
 from scenes import scene_from_dict
+from scipy.stats import t as student
 
 from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
 from springbeam.signals.measured import read_measured, residuals
@@ -169,20 +169,20 @@ def test_curves_weigh_by_what_is_left_of_them(tmp_path):
     assert stiffness["value"] == pytest.approx(800.0, rel=1e-3)
 
 
-def test_intervals_hold_what_is_right_in_most_cases(tmp_path):
-    """The data has noise of 2 % of its largest value; the clock is held.
-
-    Four of four have a chance of 81 %, three or more of 98.6 %; these seeds are fixed.
-    """
-    hits = Counter()
-    for seed in range(4):
-        noise = 0.02 * np.abs(exact()).max() * np.random.default_rng(seed).normal(size=len(TIMES))
-        path = written(tmp_path / f"{seed}.csv", "time,y", TIMES, exact() + noise)
-        for row in fitted(path, ["spring.linear_stiffness=780", "spring.damping=1.4"], shift=0.0)["keys"]:
-            hits[row["key"]] += row["low"] <= TRUE[row["key"]] <= row["high"]
-            assert row["high"] - row["low"] < 0.2 * TRUE[row["key"]]
-    assert hits.keys() == TRUE.keys()
-    assert min(hits.values()) >= 3
+def test_intervals_are_those_of_linear_least_squares(tmp_path):
+    """y is linear in where the oscillator begins and how fast; an interval of a logarithm is as wide over the key."""
+    rate, scene = np.sqrt(4000.0 - 9.0), with_changes(OSCILLATOR, spring={"equilibrium": 5e-3})
+    sines, cosines = (np.exp(-3.0 * TIMES) * wave(rate * TIMES) for wave in (np.sin, np.cos))
+    of_keys = np.transpose([cosines + 3.0 / rate * sines, sines / rate])
+    data = of_keys @ [5e-3, 0.4] + 2e-4 * np.random.default_rng(0).normal(size=len(TIMES))
+    values, (left,), *_ = np.linalg.lstsq(of_keys, data)
+    freedom = len(TIMES) - 2
+    deviations = np.sqrt(left / freedom * np.diag(np.linalg.inv(of_keys.T @ of_keys)))
+    half = student.ppf(0.975, freedom) * deviations / values
+    path = written(tmp_path / "m.csv", "time,y", TIMES, data)
+    keys = fitted(path, ["spring.equilibrium=4e-3", "spring.initial_velocity=0.3"], scene, shift=0.0)["keys"]
+    found = [[row[name] for row in keys] for name in ("low", "value", "high")]
+    assert found == pytest.approx(values * np.exp(np.outer([-1.0, 0.0, 1.0], half)), rel=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -231,3 +231,5 @@ def test_a_fit_that_is_done_is_shown_at_once(here):
     assert first["keys"][0]["value"] == pytest.approx(3.0, rel=1e-6)
     assert json.loads(printed(*line, "--out", "f", "--json")) == first
     assert (here / "f" / "fit.csv").read_text().count("\n") > 5
+    written(here / "m.csv", "time,y", TIMES, exact())
+    assert "holds another study" in refused(*line, "--out", "f")
