@@ -56,17 +56,21 @@ def test_units_and_names_of_a_file(tmp_path):
     assert list(read_measured(path, OSCILLATOR).values) == ["y"]
     of_sum = read_measured(path, OSCILLATOR, {"CH1": "y + y"})
     assert of_sum.values["y + y"] == pytest.approx(exact(), rel=1e-12)
+    assert read_measured(path, OSCILLATOR, {"y": "y + z"}).values["y + z"] == pytest.approx(TIMES, rel=1e-15)
     for formula, why in (("y + z", "is no sum of columns of one unit"), ("y + w", "w is unknown; there are time, y")):
         with pytest.raises(SceneError, match=why):
             read_measured(path, OSCILLATOR, {"CH1": formula})
 
 
 def test_residuals_are_those_of_each_curve(tmp_path):
+    """Of a curve that is measured half as large again, by a clock that is 0.2 s late; and of one that is 0."""
     run = simulate(OSCILLATOR)
-    path = written(tmp_path / "m.csv", "time,y,z", TIMES, exact() + 0.25e-3, np.zeros(len(TIMES)))
-    of_y, of_z = residuals(run, read_measured(path, OSCILLATOR))
-    assert of_y.rms == pytest.approx(0.25e-3, rel=1e-6)
-    assert of_y.largest == pytest.approx(0.25e-3, rel=1e-6)
+    path = written(tmp_path / "m.csv", "time,y,z", TIMES + 0.2, 1.5 * exact(), np.zeros(len(TIMES)))
+    of_y, of_z = residuals(run, read_measured(path, OSCILLATOR), -0.2)
+    rms, at = 0.5 * np.sqrt(np.mean(exact() ** 2)), int(np.argmax(np.abs(exact())))
+    expected = (len(TIMES), rms, rms / np.std(1.5 * exact()), 0.5 * abs(exact()[at]), TIMES[at])
+    assert of_y[1:] == pytest.approx(expected, rel=1e-6)
+    assert of_z.relative == of_z.rms
     assert of_z.largest == pytest.approx(np.abs(run.at(TIMES)["z"]).max(), rel=1e-12)
     with pytest.raises(SceneError, match="they have no times in common"):
         residuals(run, read_measured(path, OSCILLATOR), 9.0)
