@@ -128,7 +128,7 @@ def pulsed(**more):
 
 
 @pytest.mark.parametrize(("signal", "more"), [("half_sine", {}), ("sawtooth", {}), ("trapezoid", {"rise": 1e-3})])
-def test_the_damage_boundary_of_an_oscillator_is_that_of_its_shock_spectrum(signal, more, tmp_path):
+def test_the_damage_boundary_of_an_oscillator_is_that_of_its_shock_spectrum(signal, more, unpainted, tmp_path):
     """The critical peak is limit over the spectrum of a pulse of peak 1; a short one counts by its velocity change."""
     limit, durations = 80.0, (0.004, 0.03, 0.1)
     vary = ("loads.0.amplitude=50,200,2000", f"loads.0.duration={','.join(map(str, durations))}")
