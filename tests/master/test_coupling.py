@@ -418,7 +418,7 @@ def test_the_force_and_what_it_leaves_out_are_projections_of_the_law(degree, end
     p, rates = path(nodes), path.deriv()(nodes) * 2.0 / SIZE
     at = legendre.legvander(nodes, degree + 1).T * weights * (np.arange(degree + 2.0)[:, None] + 0.5)
     force, elastic = at @ np.vectorize(law.force)(p, rates), at @ np.vectorize(law.force)(p)
-    off = (1e-13 if end > 0.9 else 4e-8) * law.force(start)
+    off = (1e-13 if end > 1.0 else 4e-8) * law.force(start)
     assert projection.force(start, SIZE, x) == pytest.approx(force[:-1], abs=off)
     assert projection.next_coefficient(start, x) == pytest.approx(elastic[-1], abs=off)
 
