@@ -276,7 +276,8 @@ def test_reset_starts_all_over(case):
     token = used.state()
     assert used.call("Terminate") == OK
     assert used.call("Reset") == OK
-    assert used.call("GetFMUState", ct.byref(token)) == OK  # in the memory of a state that had more to keep
+    for _ in range(2):  # in the memory of states that had more to keep
+        assert used.call("GetFMUState", ct.byref(token)) == OK
     used.start()
     fresh.step(0.0, 0.02)
     for again in (False, True):
@@ -297,7 +298,8 @@ def test_parameters_that_are_changed_after_outputs_were_read_count(case):
     plain = case.moving()
     for one in (k, plain):
         one.step(0.0, 0.02)
-    assert k.outputs() == plain.outputs()
+    names = case.outputs + case.named("local")
+    assert k.get(*names) == plain.get(*names)
 
 
 @pytest.mark.parametrize("version", ["3.0"])
