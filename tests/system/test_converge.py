@@ -24,6 +24,7 @@ def test_a_sequence_of_one_order_gives_it_and_its_limit(order, sizes):
 
 def test_what_hardly_converges_has_no_limit():
     assert [settled([n**-order for n in (1, 2, 4)], (1, 2, 4)).limit is None for order in (0.4, 0.6)] == [True, False]
+    assert settled([1.0, 2.0, 1.5], (1, 2, 4)) == settled([2.0, 1.5], (1, 2)) == (-0.5, None, None, None)
 
 
 def test_errors_are_from_the_limit_and_as_given_is_the_mesh_of_the_scene():

@@ -155,6 +155,9 @@ def test_quick_compares_the_first_quarter_and_leaves_the_last_halving_out(here, 
     assert "error_H/8" not in found["orders"][0]
     rows = list(csv.DictReader((here / found["files"][0]).open()))
     assert [float(row["order_H"]) for row in rows] == [row["order_H"] for row in found["orders"]]
+    late = with_changes(SOFT, beam={"initial_deflection_slope": 0.1})  # the tip arrives at 0.1 s
+    (case,) = Crosscheck(scene=late, quick=True).cases().values()
+    assert case["time.t_end"] == pytest.approx(0.1 + 0.25 * (SOFT.time.t_end - 0.1), rel=1e-14)
 
 
 def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
