@@ -245,6 +245,8 @@ def test_the_grid_covers_the_ranges():
     cells = sampled_cells(300, 1)
     assert len(cells) + len(slice_cells(6)) >= 600
     for axis in PARAMETERS:
+        if axis.zero:
+            assert axis.grid(6)[0] == 0.0 < axis.low < axis.grid(6)[1] < axis.grid(6)[-1] == axis.high
         if axis.values:
             assert {cell[axis.name] for cell in cells} == set(axis.values)
             continue

@@ -86,6 +86,10 @@ def test_front_and_choices_are_of_what_is_a_result():
     assert [choice["co_simulation"] for choice in cheapest(found)] == [rough, better, None, None]
     assert [choice["scipy"] for choice in cheapest(found)] == [scipy, scipy, scipy, None]
     assert [choice["ratio"] for choice in cheapest(found)] == [1.5, 0.75, None, None]
+    over_time, over_steps = Tradeoff(scene=load_scene("soft"))._picture(found, pareto(found)).args[0]
+    drawn = {"ours": [(1.0, 1e-3), (2.0, 1e-5)], "luck": [(0.7, 1e-6), (0.1, 0.2)], "Radau": [(1.5, 1e-7)]}
+    assert over_time.curves == drawn | {"Pareto front": [(0.7, 1e-6), (1.5, 1e-7)]}
+    assert over_steps.curves == dict.fromkeys(drawn, [])  # which none of them has counted
 
 
 ENERGY = {"energy 0", "energy 1", "energy 2", "energy 2, IDA 1e-04"}
