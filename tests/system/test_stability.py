@@ -12,6 +12,7 @@ import pytest
 from bodies import couple
 from commands import command
 from matplotlib.colors import to_rgba
+from worked import Few, Part
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
 from springbeam.bodies.factory import load_bodies
@@ -259,19 +260,6 @@ def test_the_grid_covers_the_ranges():
 
 
 # -- a part of it ---------------------------------------------------------------------------------------------------
-
-
-class Part(Grid):
-    """Cells of the hypercube, but two of them that take half a minute together, and corners of the slices."""
-
-    def cases(self):
-        cells = enumerate([*sampled_cells(20, 3)[:16], *slice_cells(2)[::5]])
-        return {str(k): cell for k, cell in cells if k not in (3, 11)}
-
-
-class Few(Part):
-    def cases(self):
-        return {name: cell for name, cell in super().cases().items() if name in ("2", "6", "9", "16")}
 
 
 def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else():

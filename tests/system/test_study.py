@@ -1,13 +1,11 @@
 """Studies, whichever: records as they come, what goes on and what does not, workers that die, Ctrl-C, a full disk."""
 
 import json
-import os
 import re
-import signal
-from pathlib import Path
 
 import pytest
 from commands import Interrupt, command, printed, refused, swept
+from worked import Deadly
 
 from springbeam.results.directory import ResultsExist, ResultsInUse
 from springbeam.scene import load_scene
@@ -15,20 +13,6 @@ from springbeam.studies import sweep
 from springbeam.studies.study import FILE, Records, record_all, study_in
 
 SWEEP = ["sweep", "duffing", "--vary", "spring.mass=1:2:5", "--metric", "y_min", "--set", "time.t_end=0.1"]
-
-
-class Deadly(sweep.Sweep):
-    """A sweep that kills its worker where the mass is 3 kg, and the first time, of which it leaves a note, at 2 kg."""
-
-    note: str = ""
-
-    def record(self, case):
-        first = case["spring.mass"] == 2.0 and not Path(self.note).exists()
-        if first:
-            Path(self.note).touch()
-        if first or case["spring.mass"] == 3.0:
-            os.kill(os.getpid(), signal.SIGKILL)
-        return super().record(case)
 
 
 def plan(kind=sweep.Sweep, masses="1,2", **options):

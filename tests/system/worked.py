@@ -1,0 +1,36 @@
+"""Studies for workers: what these processes load is this module, and not what tests need beside it."""
+
+import os
+import signal
+from pathlib import Path
+
+from springbeam.studies.stability.cells import sampled_cells, slice_cells
+from springbeam.studies.stability.grid import Grid
+from springbeam.studies.sweep import Sweep
+
+
+class Deadly(Sweep):
+    """A sweep that kills its worker where the mass is 3 kg, and the first time, of which it leaves a note, at 2 kg."""
+
+    note: str = ""
+
+    def record(self, case):
+        first = case["spring.mass"] == 2.0 and not Path(self.note).exists()
+        if first:
+            Path(self.note).touch()
+        if first or case["spring.mass"] == 3.0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().record(case)
+
+
+class Part(Grid):
+    """Cells of the hypercube, but two of them that take half a minute together, and corners of the slices."""
+
+    def cases(self):
+        cells = enumerate([*sampled_cells(20, 3)[:16], *slice_cells(2)[::5]])
+        return {str(k): cell for k, cell in cells if k not in (3, 11)}
+
+
+class Few(Part):
+    def cases(self):
+        return {name: cell for name, cell in super().cases().items() if name in ("2", "6", "9", "16")}
