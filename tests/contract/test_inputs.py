@@ -127,6 +127,7 @@ def test_the_rate_of_the_acceleration_counts_all_rates_of_forces(spring):
     assert k.derivative("acceleration") == pytest.approx((3.0 + 5.0 - 11.0) / 2.0 - 7.0)
     seated = spring.running(stop_enabled=True, stop_position=0.0, gravity=1.0)
     seated.step(0.0, 0.1)
+    assert seated.get("stop_force", "stop_impulse") == [pytest.approx(1.0), 0.0]
     seated.derive("external_force", 1, 3.0)
     assert seated.derivative("acceleration") == 0.0
 

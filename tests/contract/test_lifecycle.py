@@ -219,6 +219,7 @@ def test_a_wrong_argument_is_an_error_with_a_message(case, phase, call, said):
     """Which call is allowed when, and that each error has a message, is for tests/fuzz, a part of the C++ tests."""
     k = case.instance() if phase == "instantiated" else case.running()
     assert call(k) == ERROR
+    assert k.messages[-1][:2] == (ERROR, "logStatusError")
     function, why = k.message.split(": ", 1)
     names, pattern = said.split(": ", 1)
     assert function in {case.spelt(name) for name in names.strip("()").split("|")}

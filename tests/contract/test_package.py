@@ -52,6 +52,7 @@ def test_sources_that_are_named_are_packed(case):
 def test_capabilities_are_declared(case):
     declared = case.description.coSimulation
     assert declared.hasEventMode == (case.version == "3.0")
+    assert declared.mightReturnEarlyFromDoStep == (case.version == "3.0" and case.name == "spring")
     named = ("HandleVariableCommunicationStepSize", "GetAndSetFMUstate", "SerializeFMUstate")
     only2 = ("InterpolateInputs", "NotUseMemoryManagementFunctions")
     can = {name for name in (*named, *only2) if getattr(declared, f"can{name}")}

@@ -70,6 +70,7 @@ def test_after_any_refusal_a_master_goes_on(loaded, name, parameters, inputs, si
     for i, value in inputs.items():
         k.set(i, value)
     assert k.try_step(1e-3, size) == DISCARD
+    assert k.messages[-1][:2] == (DISCARD, "logStatusDiscard")
     assert why in k.message
     assert k.integer("warnings") == told + 1  # in the results, where messages are hidden
     # Nothing was done: the last time that holds is the start of the step.
