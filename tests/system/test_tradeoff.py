@@ -89,7 +89,7 @@ def test_front_and_choices_are_of_what_is_a_result():
     over_time, over_steps = Tradeoff(scene=load_scene("soft"))._picture(found, pareto(found)).args[0]
     drawn = {"ours": [(1.0, 1e-3), (2.0, 1e-5)], "luck": [(0.7, 1e-6), (0.1, 0.2)], "Radau": [(1.5, 1e-7)]}
     assert over_time.curves == drawn | {"Pareto front": [(0.7, 1e-6), (1.5, 1e-7)]}
-    assert over_steps.curves == dict.fromkeys(drawn, [])  # which none of them has counted
+    assert over_steps.curves == {name: [] for name in drawn}  # which none of them has counted
 
 
 ENERGY = {"energy 0", "energy 1", "energy 2", "energy 2, IDA 1e-04"}
