@@ -187,6 +187,9 @@ def test_a_direction_is_the_sum_of_its_inputs(case):
     (found,) = k.partials([output], *names, seed=(2.0, -3.0))
     a, b = (k.partials([output], name)[0] for name in names)
     assert found == 2.0 * a - 3.0 * b != 0.0
+    told, seed = (ct.c_double * 1)(7.0), (ct.c_double * 2)(2.0, -3.0)  # over what was there before
+    direction = (case.references(output), 1, case.references(*names), 2, seed, *k.counted(2), told, *k.counted(1))
+    assert (k.call("GetDirectionalDerivative", *direction), told[0]) == (0, found)
 
 
 def test_derivatives_at_a_limit_of_a_parameter_are_one_sided(beam):
