@@ -108,7 +108,7 @@ def test_what_alternates_while_ends_are_tied_matters_where_they_part():
     exact = event_driven.simulate(run.scene, sample_times=run.time)
     assert np.abs(run.y[1:] - exact.y[-len(run) + 1 :]).max() < 1e-3 * np.ptp(exact.y)
     assert whole.summary["resolved"] is False
-    assert "moves an end by about 2 %" in whole.summary["warnings"][0]
+    assert "moves an end by about 2.9 %" in whole.summary["warnings"][0]
 
 
 def test_a_soft_contact_within_a_macro_step_is_lost_to_an_exchange_alone():
@@ -172,17 +172,24 @@ def test_ends_that_the_law_would_have_elsewhere_are_said(degree, share, resolved
     """Soft ones and tied ones, by degree; of what measured loads leave out, and between the rows, 1 % is allowed."""
     for seen in ("left_out", "between_rows"):
         assert (not_resolved(STIFF, **{seen: 0.01 * share}) is None) is resolved
-    for scene, limits in ((STIFF, (0.006, 0.002, 0.001)), (PAIR, (0.003, 0.002, 0.001))):
+    for scene, limits in ((STIFF, (0.006, 0.002, 0.001)), (PAIR, (0.004, 0.002, 0.001))):
         told = not_resolved(with_changes(scene, coupling={"degree": degree}), share * limits[degree])
         assert (told is None) is resolved
         assert resolved or ("a higher coupling.degree" in told) is (degree < 2)
+
+
+def test_a_contact_shorter_than_a_macro_step_is_said():
+    """Where the force has a degree above 0; of degree 0 it is what `misplaced` sees."""
+    scene = with_changes(PAIR, coupling={"degree": 2})
+    assert "a contact lasts 0.96 macro steps only" in not_resolved(scene, shortest_contact=0.96 * scene.coupling.H)
+    assert not_resolved(scene, shortest_contact=1.01 * scene.coupling.H) is None
 
 
 def test_what_resolves_ends_that_are_elsewhere_is_said():
     adaptive, off = {"coupling": {"relative_tolerance": 1e-3}}, 0.012
     for scene in (STIFF, PAIR):
         assert not_resolved(with_changes(scene, **adaptive), off).endswith("; smaller tolerances resolve it")
-    for seen, share in (({"misplaced": 4.0 * 0.006}, 0.5), ({"left_out": 0.08}, 0.5), ({"between_rows": 0.02}, 0.25)):
+    for seen, share in (({"misplaced": 4.0 * 0.006}, 0.25), ({"left_out": 0.08}, 0.5), ({"between_rows": 0.02}, 0.25)):
         told = not_resolved(STIFF, **seen)
         named = float(told.split("coupling.macro_step <= ")[1].split()[0])
         assert named == pytest.approx(0.95 * share * STIFF.coupling.H, rel=0.03)

@@ -136,7 +136,7 @@ MISSED = "differ from the contact law, which moves an end by about"
         (51, 15, "energy 2", MISSED),
         (71, 3, "energy 1", MISSED),
         (72, 10, "energy 2", MISSED),
-        (74, 10, "energy 2, H/4", "a contact lasts 0.96 macro steps only"),
+        (74, 10, "energy 2, H/4", MISSED),
         (86, 10, "energy 0", MISSED),
         (112, 7, "energy 0", MISSED),
     ],

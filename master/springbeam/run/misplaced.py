@@ -2,8 +2,8 @@
 
 A soft law asks for a force along the path of the ends, the step applies a polynomial of degree d. A tie asks for no gap
 along the path, the step leaves none at its end. Both bodies and the law, linearised about the run, tell how far the
-difference moves the ends (``docs/coupling.md``, "How far ends are misplaced"). The beam is the sum of the lowest modes
-of its mesh.
+difference moves the ends (``docs/coupling.md``, "How far ends are misplaced"). The beam is the sum of the modes of its
+mesh.
 """
 
 from __future__ import annotations
@@ -22,14 +22,16 @@ from ..results.steps import force as applied
 from ..results.steps import joined
 from ..results.trajectory import Event, EventKind
 from ..scene import Beam, Scene
-from ..scene.statics import bending_stiffness, shear_stiffness
+from ..scene.statics import bending_stiffness, shear_stiffness, tip_reach
 from .stepping import Pair
 
 #: Places where a soft law is asked, and their shares: Gauss points.
 _POINTS, _SHARES = np.polynomial.legendre.leggauss(4)
 _INSIDE = 0.5 * (_POINTS + 1.0), 0.5 * _SHARES
-#: Modes of the beam, and elements of a mesh that has the lowest ones of any finer one.
-_MODES, _ELEMENTS = 20, 50
+#: Elements of a mesh that has the lowest modes of any finer one.
+_ELEMENTS = 50
+#: A tip that moves less, relative to the beam, is held.
+HELD = 1e-9
 #: Ways that an end is off from which on nothing more is to be learnt.
 _LOST = 1e3
 
@@ -44,7 +46,9 @@ def misplaced(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Even
     """
     if not steps["size"].any() or (pair.law is None and not 0.0 < pair.upper.mass < inf):
         return 0.0
-    ways = [float(np.abs(steps[name] - steps[name][0]).max()) or inf for name in ("u_tip_after", "y_after")]
+    held = 0.0 if scene.beam is None else HELD * tip_reach(scene.beam)
+    moved = (float(np.abs(steps[name] - steps[name][0]).max()) for name in ("u_tip_after", "y_after"))
+    ways = [way if way > held else inf for way in moved]
     ends, stiffness = _Errors(scene, pair), np.zeros(len(steps))
     if scene.spring is not None:
         y = 0.5 * (steps["y"] + np.append(0.0, steps["y_after"][:-1]))
@@ -59,18 +63,18 @@ def misplaced(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Even
 
 
 class _Errors:
-    """Errors of the modes' displacements and velocities ``x``, (2n,), of the lower end's ``y`` [m] and ``z`` [m/s]."""
+    """Errors of the modes' displacements and velocities ``x``, (2, n), of the lower end's ``y`` [m] and ``z`` [m/s]."""
 
     def __init__(self, scene: Scene, pair: Pair) -> None:
         modes = _modes(scene, pair)
-        self.tip, self.n, self._moves = modes[2], len(modes[2]), cache(partial(_moves, modes))
-        self.x, self.y, self.z = np.zeros(2 * self.n), 0.0, 0.0
+        self.tip, self._moves = modes[2], cache(partial(_moves, modes))
+        self.x, self.y, self.z = np.zeros((2, len(self.tip))), 0.0, 0.0
         self.per_mass = 1.0 / pair.lower.mass if pair.lower.mass > 0.0 else 0.0
         self._resists = self.per_mass * scene.spring.damping if scene.spring is not None else 0.0
 
     @property
     def u(self) -> float:
-        return float(self.tip @ self.x[: self.n])
+        return float(self.tip @ self.x[0])
 
     def advance(
         self, H: float, stiffness: float, per_mass: float, force: Callable[[float, float], float], shift: float = 0.0
@@ -84,7 +88,9 @@ class _Errors:
         free, pushed, flexible, shifted = self._moves(H)
         half = 0.5 * H
         slow = 1.0 / (1.0 + half * (self._resists + half * stiffness))
-        self.x = free @ self.x + shift * shifted
+        self.x = free[:, 0] * self.x[0] + free[:, 1] * self.x[1]
+        if shift != 0.0:
+            self.x += shift * shifted
         self.y -= shift * per_mass
         mean = slow * (self.z - half * stiffness * self.y)
         C = force(self.y + H * mean - self.u, flexible + H * half * slow * per_mass)
@@ -98,9 +104,12 @@ class _Errors:
 
     def meet(self, apart: float, per_mass: float) -> None:
         """Let v − z be ``apart`` [m/s] by an impulse; ``per_mass`` as of `advance`."""
-        v = float(self.tip @ self.x[self.n :])
-        impulse = (apart - v + self.z) / (float(self.tip @ self.tip) + per_mass)
-        self.x[self.n :] += impulse * self.tip
+        v = float(self.tip @ self.x[1])
+        self.push((apart - v + self.z) / (float(self.tip @ self.tip) + per_mass), per_mass)
+
+    def push(self, impulse: float, per_mass: float) -> None:
+        """Let an ``impulse`` [N·s] lift the tip and press the lower end; ``per_mass`` as of `advance`."""
+        self.x[1] += impulse * self.tip
         self.z -= impulse * per_mass
 
 
@@ -160,7 +169,8 @@ def _along_tie(
     path = _penetration(np.roll(steps, 1), steps, size)
     shares = (np.arange(parts) + 1.0) / parts
     inside = np.array([[path.at(s), path.slope(s) / size] for s in shares]).transpose(2, 0, 1)
-    tied, seated = joined(steps), steps["phase"] >= 3.0
+    tied, phase = joined(steps), steps["phase"]
+    seated, pulls = phase >= 3.0, applied(steps, size) / np.where(steps["z"], steps["z"], inf)
     for i in range(1, len(steps)):
         H, k, stays, turns, most = map(float, (steps["size"][i], stiffness[i], *after[:, i]))
         per_mass = 0.0 if seated[i - 1] else ends.per_mass
@@ -177,6 +187,8 @@ def _along_tie(
             # them: taken for an error, they tell five times too much (`soft` in steps of 4 ms).
             kept = not tied[i] and degree < 2
             ends.meet(0.0 if kept else float(steps["z_after"][i] - steps["v_tip_after"][i]), per_mass)
+        if phase[i - 1] == 1.0 and phase[i] == 0.0:  # y passes Ψ, sooner or later, where the force pulls
+            ends.push(-pulls[i] * ends.y, per_mass)
         yield ends.u, ends.y
 
 
@@ -219,10 +231,10 @@ def _modes(scene: Scene, pair: Pair) -> Modes:
 
 
 def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
-    """Return what a step of ``H`` [s] makes of displacements and velocities of modes, (2n, 2n).
+    """Return what a step of ``H`` [s] makes of displacement and velocity of each mode, (2, 2, n).
 
-    Further what a constant force of 1 N adds to them, (2n,), and how far that moves the tip [m/N]; and what the step
-    makes of where 1 N·s², which moves a free mass, puts the modes that it follows, (2n,).
+    Further what a constant force of 1 N adds to them, (2, n), and how far that moves the tip [m/N]; and what the step
+    makes of where 1 N·s², which moves a free mass, puts the modes that it follows, (2, n).
     """
     # A free mass is a mode so soft that it does not turn; 1 − cos would leave nothing of a softer one.
     stiffness, decay, tip = np.maximum(modes[0], 1e-8 / H**2), 0.5 * modes[1], modes[2]
@@ -230,15 +242,16 @@ def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, float, np.nd
     slower, faster = np.exp((root - decay) * H), np.exp(-(root + decay) * H)
     cosine, sine = (0.5 * (slower + faster)).real, (0.5 * (slower - faster) / root).real
     kept = cosine + decay * sine
-    free = np.block([[np.diag(kept), np.diag(sine)], [np.diag(-stiffness * sine), np.diag(cosine - decay * sine)]])
-    pushed = np.concatenate([(1.0 - kept) / stiffness * tip, sine * tip])
+    free = np.array([[kept, sine], [-stiffness * sine, cosine - decay * sine]])
+    pushed = np.array([(1.0 - kept) / stiffness * tip, sine * tip])
     moved = tip / (1.0 + H * (decay + 0.25 * H * stiffness))
-    return free, pushed, float(tip @ pushed[: len(tip)]), free[:, : len(tip)] @ moved
+    return free, pushed, float(tip @ pushed[0]), free[:, 0] * moved
 
 
 @lru_cache(maxsize=16)
 def tip_modes(beam: Beam) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest frequencies of the mesh [rad/s] and the tip's displacement in modes of unit mass [1/√kg].
+    """Return the frequencies of the mesh [rad/s], the lowest first, and the tip's displacement in modes of unit mass
+    [1/√kg].
 
     Elements of a higher degree and those with the averaged mass are more accurate: fine linear ones stand for them.
     Both energies are sums of squares, so that low frequencies are not lost beside the high ones of a slender beam.
@@ -261,4 +274,4 @@ def tip_modes(beam: Beam) -> tuple[np.ndarray, np.ndarray]:
         space = np.linalg.qr(np.vstack([np.linalg.svd(speeds)[2][: beam.n_modes], shapes]).T)[0]
         speeds, of_strain = speeds @ space, of_strain @ space
     periods, modes = np.linalg.svd(speeds)[1:]
-    return 1.0 / periods[:_MODES], (modes @ of_strain[n - 1])[:_MODES] / periods[:_MODES]
+    return 1.0 / periods, modes @ of_strain[n - 1] / periods

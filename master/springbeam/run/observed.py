@@ -30,6 +30,8 @@ _DENSE, _POINTS = 1.0, (8, 96)
 _TOGETHER = 1024
 #: Share of an end's way that is not worth computing.
 _NEGLIGIBLE = 1e-3
+#: Modes of the beam that a table may move.
+_MODES = 20
 #: ∫ φ over length and tip value of the lowest mode of a slender beam; one that shears alone has 0.64.
 _MEAN = 0.4
 
@@ -97,7 +99,7 @@ def left_out(scene: Scene, steps: np.ndarray) -> float:
     made, shares = steps[steps["size"] > 0.0], [0.0]
     tables = [load for load in scene.loads if load.signal == "table"]
     if tables and len(made) and scene.beam is not None and not scene.massless:
-        omega, tip = tip_modes(scene.beam)
+        omega, tip = (of_modes[:_MODES] for of_modes in tip_modes(scene.beam))
         forces = [_on_beam(scene, load) for load in tables]
         shares.append(_share(tables, forces, made, omega, tip**2, steps["u_tip_after"]))
     if tables and len(made) and scene.spring is not None:

@@ -25,9 +25,9 @@ COLLOCATION = (12.0, 720.0, 100800.0)
 #: By which angle all of them together may lag [rad]. Positions are off by up to 0.75 of it, so by about 1 %.
 LAG = 0.015
 #: Share of its way that an end may be from where the law of the contact would have it, by degree of the force: a soft
-#: law, a tie. At degree 0 of a soft law that is known to some tenths of itself. Else it leaves out what the force feels
-#: of fast waves; and of ends that part, what these decide from one step to the next.
-MISPLACED, MISPLACED_TIED = (0.006, 0.002, 0.001), (0.003, 0.002, 0.001)
+#: law, a tie. At degree 0 it is mostly known to some tenths of itself; it leaves out what the force of a higher degree
+#: feels of the fastest waves, and what ends that part decide from one step to the next.
+MISPLACED, MISPLACED_TIED = (0.006, 0.002, 0.001), (0.004, 0.002, 0.001)
 #: Share of its way by which what the steps leave out of measured loads may move an end; that is known to a factor of 3.
 LEFT_OUT = 0.01
 #: Share of its way by which an end may be off between the rows, as `springbeam.results.dense.between_rows` tells it.
@@ -121,7 +121,7 @@ def _too_fast(scene: Scene, seen: _Seen) -> dict[str, Any]:
 def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
     """Return how far the forces of the steps miss the law of the contact, nothing if they keep close to it.
 
-    Waves that the steps do not follow let ``misplaced`` fall with the square of H only.
+    Waves that the steps do not follow let ``misplaced`` fall with the square of H only, and unevenly.
     """
     limits, coupling = MISPLACED_TIED if scene.contact.rigid else MISPLACED, scene.coupling
     excess = seen.misplaced / limits[_force_degree(scene)]
@@ -132,7 +132,7 @@ def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
     if scene.contact.rigid and scene.contact.impact != "inelastic":
         remedy = f'impact = "{scene.contact.impact}" leaves their velocities apart, "inelastic" does not'
     else:
-        remedy = _shorter(scene, sqrt(excess)) + (_HIGHER if raises and not coupling.adaptive else "")
+        remedy = _shorter(scene, 2.0 * sqrt(excess)) + (_HIGHER if raises and not coupling.adaptive else "")
     far = f"about {100.0 * seen.misplaced:.2g} %" if seen.misplaced <= 1.0 else "more than all"
     return {"far": far, "remedy": remedy}
 

@@ -20,6 +20,7 @@ from ..results.contact_times import contact_time_difference, impulse_difference
 from ..results.trajectory import Trajectory
 from ..run import runner
 from ..run.ledger import CHANGED
+from ..run.misplaced import HELD
 from ..run.outcome import Progress, RunStopped
 from ..scene import Scene, SceneError, with_changes
 from ..scene.resolution import STABLE, TURN, choice, joined_frequency, lasting_frequency, slow_oscillations
@@ -32,8 +33,8 @@ _FEWEST, _MOST = 8.0, 50_000
 _CONTACT_TURN = 2.0
 #: An estimate of the error is to be so many times smaller than the accuracy.
 _SAFETY = 1.5
-#: The coupling's and IDA's relative tolerance over the accuracy; a tip that moves less, relative to the beam, is held.
-_TOLERANCE, _HELD = 1e-3, 1e-9
+#: The coupling's and IDA's relative tolerance over the accuracy.
+_TOLERANCE = 1e-3
 #: Shares of the time from one row to the next, of either run, at which two runs are compared.
 _BETWEEN = np.arange(4.0) / 4.0
 #: Shares of the accuracy that the mesh may use, and the coupling and the time integration.
@@ -129,7 +130,7 @@ def differences(coarse: Trajectory, fine: Trajectory, short: float) -> dict[str,
     span = float(fine.time[-1] - fine.time[0])
     rows = np.union1d(coarse.time, fine.time)
     times = np.append((rows[:-1, None] + _BETWEEN * np.diff(rows)[:, None]).ravel(), rows[-1])
-    held = 0.0 if fine.shapes is None else _HELD * float(np.abs(fine.shapes[1]).max(initial=0.0))
+    held = 0.0 if fine.shapes is None else HELD * float(np.abs(fine.shapes[1]).max(initial=0.0))
     impulses = [impulse_difference(coarse, fine), impulse_difference(fine, coarse)]
     found = {
         "motion": worst(motion_errors(coarse.at(times).columns, fine.at(times), held)),
