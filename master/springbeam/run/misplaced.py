@@ -268,7 +268,8 @@ def tip_modes(beam: Beam) -> tuple[np.ndarray, np.ndarray]:
     to_strain = np.linalg.qr(strain)[1]
     of_strain = np.linalg.inv(to_strain)
     speeds = np.kron(np.diag([beam.area**0.5, beam.second_moment_of_area**0.5]), speed) @ of_strain
-    if beam.n_modes and beam.integrator == "modal":  # the lowest, and the static shapes of a tip force, of a uniform load and of the start
+    if beam.n_modes and beam.integrator == "modal":
+        # The lowest, and the static shapes of a tip force, of a uniform load and of the start.
         start = to_strain[:, :n] @ np.arange(1.0, n + 1.0)
         shapes = np.array([of_strain[n - 1], mean.sum(axis=0) @ of_strain[:n], start])
         space = np.linalg.qr(np.vstack([np.linalg.svd(speeds)[2][: beam.n_modes], shapes]).T)[0]
