@@ -124,7 +124,10 @@ def test_orders_of_displacement_velocity_and_force(scheme, degree, counts, expec
 def test_the_force_has_one_order_more_where_it_is_the_sharpest_and_none_of_a_mismatch_that_is_turned_round(
     scheme, degree
 ):
-    """Of one step, beside that of both masses as one; a mismatch of 0.15 m/s alone would take a force of 1/H."""
+    """The error of one step is taken beside the motion of both masses as one.
+
+    A mismatch of 0.15 m/s would alone take a force that grows with 1/H.
+    """
 
     def error(size, beside, mismatch):
         upper, lower = Upper(1.0, 100.0, 0.0, y=0.1, z=mismatch - 0.5), DuffingBody(2.0, 3.0, 40.0, y=0.1, z=-0.5)

@@ -115,7 +115,7 @@ def test_a_motion_stays_above_0_at_sight_if_neither_the_fastest_so_far_nor_the_c
 
 @pytest.mark.parametrize(("place", "speed", "roundings"), [(-2.0, 1.0, 16.0), (0.0, -1e3, 1e-15 / np.finfo(float).eps)])
 def test_positions_are_told_apart_to_8_roundings_or_to_one_of_the_way_in_a_step(place, speed, roundings):
-    """Of steps of 1 ms."""
+    """The macro step is 1 ms."""
     ends = Motion(0.0, 0.0, 0.0, 0.0), Motion(place, speed, 0.0, 0.0)
     assert position_tolerance(ends, 1e-3) == pytest.approx(roundings * np.finfo(float).eps, rel=1e-3)
 

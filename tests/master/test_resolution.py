@@ -77,7 +77,7 @@ def test_one_radian_of_the_slowest_oscillation_is_the_limit(turn, resolved):
 @pytest.mark.parametrize("damped", [1.0, 2.0])
 @pytest.mark.parametrize(("turn", "resolved"), [(2.98, True), (3.02, False)])
 def test_three_radians_of_the_fastest_mode_are_the_limit_of_hermite(turn, resolved, damped):
-    """Of what damping lets last: waves of ω α = 0.15."""
+    """Damping lets waves last up to ω α = 0.15; only these count."""
     omega = fastest_frequency(PAIR.beam) / damped
     beam = {} if damped == 1.0 else {"alpha_b": 0.15 / omega}
     told = not_resolved(
@@ -176,13 +176,6 @@ def test_ends_that_the_law_would_have_elsewhere_are_said(degree, share, resolved
         told = not_resolved(with_changes(scene, coupling={"degree": degree}), share * limits[degree])
         assert (told is None) is resolved
         assert resolved or ("a higher coupling.degree" in told) is (degree < 2)
-
-
-def test_a_contact_shorter_than_a_macro_step_is_said():
-    """Where the force has a degree above 0; of degree 0 it is what `misplaced` sees."""
-    scene = with_changes(PAIR, coupling={"degree": 2})
-    assert "a contact lasts 0.96 macro steps only" in not_resolved(scene, shortest_contact=0.96 * scene.coupling.H)
-    assert not_resolved(scene, shortest_contact=1.01 * scene.coupling.H) is None
 
 
 def test_what_resolves_ends_that_are_elsewhere_is_said():

@@ -63,7 +63,7 @@ def test_units_and_names_of_a_file(tmp_path):
 
 
 def test_residuals_are_those_of_each_curve(tmp_path):
-    """Of a curve that is measured half as large again, by a clock that is 0.2 s late; and of one that is 0."""
+    """One curve is measured half as large again, by a clock that is 0.2 s late; the other one is 0."""
     run = simulate(OSCILLATOR)
     path = written(tmp_path / "m.csv", "time,y,z", TIMES + 0.2, 1.5 * exact(), np.zeros(len(TIMES)))
     of_y, of_z = residuals(run, read_measured(path, OSCILLATOR), -0.2)

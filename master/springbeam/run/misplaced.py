@@ -42,7 +42,8 @@ Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
 def misplaced(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float:
     """Return how far an end is from where the law of ``pair`` would have it, over its largest distance from its start.
 
-    It is that of the worse end at its worst; 0 where a tie holds an end that nothing moves, or one without mass.
+    It is that of the worse end at its worst, of a tie between the rows, too; 0 where a tie holds an end that nothing
+    moves, or one without mass.
     """
     if not steps["size"].any() or (pair.law is None and not 0.0 < pair.upper.mass < inf):
         return 0.0

@@ -121,7 +121,8 @@ def _too_fast(scene: Scene, seen: _Seen) -> dict[str, Any]:
 def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
     """Return how far the forces of the steps miss the law of the contact, nothing if they keep close to it.
 
-    Waves that the steps do not follow let ``misplaced`` fall with the square of H only, and unevenly.
+    Waves that the steps do not follow let ``misplaced`` fall with the square of H only, and unevenly: the step that is
+    named is half of what the square asks for.
     """
     limits, coupling = MISPLACED_TIED if scene.contact.rigid else MISPLACED, scene.coupling
     excess = seen.misplaced / limits[_force_degree(scene)]

@@ -76,7 +76,8 @@ def simulate(
 def pick(scene: Scene) -> Trajectory:
     """Return a run of ``scene`` that keeps its ``accuracy``; its scene has the settings that were picked.
 
-    ``accuracy`` of its summary says what was asked and picked, with an estimate of each error of `differences`.
+    ``accuracy`` of its summary says what was asked and picked, with an estimate of each error of `differences`; that of
+    the motion is at least how far the run misplaces its ends (`springbeam.run.misplaced`).
 
     Raises
     ------
@@ -107,7 +108,7 @@ def pick(scene: Scene) -> Trajectory:
             continue
         if coarse is not None:
             before, errors = _estimated(coarse, fine, asked, before)
-            # Of a step that is the same in both runs, as one from an event to a macro point may be, they tell nothing.
+            # Runs that share a step, as from an event to a macro point, agree on its curve whether it is right or not.
             errors["motion"] = max(errors["motion"], fine.summary["misplaced_ends"])
             if _SAFETY * max(errors.values()) <= asked:
                 return _told(fine, asked, errors, pilots)
