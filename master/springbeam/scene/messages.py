@@ -135,6 +135,8 @@ def beginning(title: str) -> str:
 
 # -- errors ------------------------------------------------------------------------------------------------------------
 
+#: Keys and values that scenes had once, as ``[table] key`` or ``[table] key = value``, and what to do instead.
+GONE: dict[str, str] = {}
 #: Types of values by those of the JSON Schema; others are given as texts.
 _KINDS: dict[str, type] = {"integer": int, "boolean": bool, "number": float}
 
@@ -180,11 +182,13 @@ def explain(error: Any) -> str:
         otherwise = f" ({said['otherwise']})" if "otherwise" in said else ""
         what = f"the {said['description']} [{said['unit']}]{otherwise}: " if keys else ""
         return f"{place}: missing; give {what}{allowed(said)}"
-    return f"{place} = {toml_of(value)}: must be {allowed(said)}"
+    given = f"{place} = {toml_of(value)}"
+    return f"{given}: {GONE.get(given) or 'must be ' + allowed(said)}"
 
 
 def _unknown(place: str, name: str, there: Iterable[str]) -> str:
-    return f"{place}: unknown key; {nearest(name, there)}allowed: {', '.join(there)}"
+    said = GONE.get(place) or f"unknown key; {nearest(name, there)}allowed: {', '.join(there)}"
+    return f"{place}: {said}"
 
 
 def nearest(name: str, candidates: Iterable[str]) -> str:
