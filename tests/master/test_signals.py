@@ -68,6 +68,20 @@ def test_a_motion_repeats_itself_after_three_periods_if_it_does_so_eight_times(c
     assert repeating(points) == found
 
 
+@pytest.mark.parametrize("power", [0.3, 1.0, 2.0])
+def test_a_motion_that_grows_has_not_settled_although_its_last_points_are_alike(power):
+    """The last 1 % of a long growth are points within 1 % of each other."""
+    growing = (np.arange(2000.0)[:, None] / 2000.0) ** power * [1.0, 0.5]
+    assert repeating(growing) is None
+
+
+@pytest.mark.parametrize("constants", [4, 5, 6, 8])
+def test_what_is_left_of_a_transient_decides_whether_it_has_settled(constants):
+    """A run of as many time constants has e^{-constants} of the range left: 1.8, 0.7, 0.25 and 0.03 %."""
+    decaying = np.exp(-np.arange(400.0) * constants / 400.0)[:, None] * [1.0, 0.5]
+    assert (repeating(decaying) is not None) == (np.exp(-constants) < 0.01)
+
+
 def test_the_response_to_a_chirp_is_that_of_whole_pairs_of_its_turns():
     """Two of 2.5 turns count, those of (9 + 4 t) t up to 0.2037 s; what comes before and after does not."""
     chirp = Load(on="tip", signal="chirp", start=1.0, frequency=9.0, frequency_end=11.0, duration=0.25)

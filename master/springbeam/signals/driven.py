@@ -63,8 +63,9 @@ def _point(run: Trajectory) -> tuple[str, str]:
 def settled(run: Trajectory) -> Settled | None:
     """Return the settled part of a driven run, ``None`` if it is not driven, or has not settled.
 
-    It has settled where its points once a period of the drive lie within 1 % of the range of position and velocity
-    of its last ones, in turn, for 8 periods of the motion at least. Those of a chaotic motion never do.
+    It has settled where its points once a period of the drive repeat themselves and do not drift (`repeating`), in
+    shares of the range of position and velocity. Those of a chaotic motion never do. A beat that is longer than the
+    run cannot be told from a settled motion.
     """
     drive = drive_of(run)
     if drive is None or drive.frequency is None or run.steps is None:
@@ -79,15 +80,34 @@ def settled(run: Trajectory) -> Settled | None:
 def repeating(points: np.ndarray) -> tuple[int, int] | None:
     """Return from which of the ``points`` (n, 2) on they repeat themselves, and after how many; ``None`` if not.
 
-    They are points once a period of the drive, over the range of the motion.
+    They are points once a period of the drive, over the range of the motion. They repeat themselves if, for at least
+    8 periods of the motion, each lies within 1 % of its last image, and the drift that is left is below 1 % as well.
     """
     for multiple in range(1, _LONGEST + 1):
         alike = np.tile(points[-multiple:], (len(points) // multiple + 1, 1))[-len(points) :]
         off = np.flatnonzero((np.abs(points - alike) > _ALIKE).any(axis=1))
         since = int(off[-1]) + 1 if len(off) else 0
+        periods = (len(points) - since) // multiple
         if len(points) - 1 - since >= _PERIODS * multiple:
-            return since, multiple
+            images = points[-periods * multiple :].reshape(periods, -1)
+            return (since, multiple) if _drift(images, len(points) / multiple) <= _ALIKE else None
     return None
+
+
+def _drift(images: np.ndarray, periods: float) -> float:
+    """Return how far the ``images`` (n, m) of a motion, one a period, will still drift.
+
+    A band alone does not show it: a motion that grows linearly stays within any band for long enough. The means over
+    thirds of the images tell how fast they drift. They go on as a transient that decays by the same ratio from third
+    to third, or at the same rate for as many ``periods`` as the run has had; the smaller of both counts.
+    """
+    third = len(images) // 3
+    means = images[len(images) - 3 * third :].reshape(3, third, -1).mean(axis=1)
+    before, last = np.abs(np.diff(means, axis=0))
+    decays = last < before
+    ratio = np.where(decays, last, 0.0) / np.where(decays, before, 1.0)
+    transient = np.where(decays, last * ratio / (1.0 - ratio), np.inf)
+    return float(np.minimum(transient, last * periods / third).max())
 
 
 class Response(NamedTuple):
