@@ -7,7 +7,7 @@
 #include <string>
 
 #include "gauss.hpp"
-#include "generalized_alpha.hpp"
+#include "midpoint.hpp"
 #include "modal_beam.hpp"
 #include "text.hpp"
 #include "timoshenko.hpp"
@@ -45,7 +45,7 @@ void validate(const Parameters& p) {
     reject("n_modes", p.n_modes,
            "between 1 and " + std::to_string(most) + " with " + mesh + " (all modes only up to " +
                std::to_string(max_dense_unknowns) +
-               " unknowns); keep fewer n_modes, or use the integrator generalized_alpha");
+               " unknowns); keep fewer n_modes, or use the integrator midpoint");
   }
 }
 
@@ -101,14 +101,13 @@ std::unique_ptr<Beam> make_beam(const Parameters& parameters) {
   validate(parameters);
   const auto mesh = std::make_shared<const Timoshenko>(parameters);
   return parameters.integrator == Integrator::modal ? make_modal_beam(mesh, parameters)
-                                                    : make_generalized_alpha_beam(mesh, parameters);
+                                                    : make_midpoint_beam(mesh, parameters);
 }
 
-Beam::Beam(std::shared_ptr<const Discretisation> space, const Parameters& p, Eigen::Index memory)
+Beam::Beam(std::shared_ptr<const Discretisation> space, const Parameters& p)
     : alpha_b_(p.alpha_b),
       struck_(space->mass_solve(space->load(Loads::tip))),
-      motion_{p.initial_deflection_slope * space->linear_shape(), p.initial_velocity_slope * space->linear_shape(),
-              VectorXd::Zero(memory)},
+      motion_{p.initial_deflection_slope * space->linear_shape(), p.initial_velocity_slope * space->linear_shape()},
       start_(motion_),
       space_(std::move(space)) {
   for (std::size_t i = 0; i < Loads::count; ++i) {
@@ -135,10 +134,9 @@ void Beam::step(double size, const Polynomial& c, const Loads& loads) {
   std::swap(motion_, start_);
   advance(size, c, loads);
   booked_ = false;
-  now_.impulse = 0.0;
   now_.tip_force = value(c, size);
   now_.loads = loads.at(size);
-  const double squares = motion_.q.squaredNorm() + motion_.v.squaredNorm() + motion_.memory.squaredNorm();
+  const double squares = motion_.q.squaredNorm() + motion_.v.squaredNorm();
   if (squares < largest && inputs < largest && size < largest_size) return;
   motion_ = start_;
   now_ = before;
@@ -155,7 +153,6 @@ void Beam::apply_tip_impulse(double impulse) {
   if (!(std::abs(impulse) < largest)) throw_too_large(0.0, {impulse, 0.0, 0.0}, {});
   book();
   motion_.v += impulse * struck_;
-  now_.impulse += impulse;
 }
 
 void Beam::observe(double tip_force, const Loads& loads) {
@@ -167,7 +164,6 @@ void Beam::rest() {
   book();
   motion_.q = space_->flexibility_times(force(now_.loads, now_.tip_force));
   motion_.v.setZero();
-  motion_.memory.setZero();
 }
 
 VectorXd Beam::force(Loads::Values loads, double tip_force) const {
@@ -257,7 +253,7 @@ void Beam::save(std::vector<double>& state) const {
   book();
   state.resize(state_size());
   double* end = state.data();
-  for (const VectorXd* x : {&motion_.q, &motion_.v, &motion_.memory}) end = std::copy_n(x->data(), x->size(), end);
+  for (const VectorXd* x : {&motion_.q, &motion_.v}) end = std::copy_n(x->data(), x->size(), end);
   std::memcpy(end, &now_, sizeof now_);
 }
 
@@ -266,7 +262,7 @@ void Beam::restore(const std::vector<double>& state) {
     throw std::invalid_argument("beam: a saved state of " + std::to_string(state.size()) +
                                 " numbers does not belong to this beam");
   const double* begin = state.data();
-  for (VectorXd* x : {&motion_.q, &motion_.v, &motion_.memory}) {
+  for (VectorXd* x : {&motion_.q, &motion_.v}) {
     *x = Eigen::Map<const VectorXd>(begin, x->size());
     begin += x->size();
   }
@@ -275,7 +271,7 @@ void Beam::restore(const std::vector<double>& state) {
 }
 
 std::size_t Beam::state_size() const {
-  return static_cast<std::size_t>(2 * motion_.q.size() + motion_.memory.size()) + sizeof now_ / sizeof(double);
+  return static_cast<std::size_t>(2 * motion_.q.size()) + sizeof now_ / sizeof(double);
 }
 
 }  // namespace beam

@@ -19,7 +19,7 @@ inline double value(const Polynomial& p, double t) { return p[0] + t * (p[1] + t
 /// Over 0 … t.
 inline double mean(const Polynomial& p, double t) { return p[0] + t * (p[1] / 2 + t * p[2] / 6); }
 
-enum class Integrator { modal = 1, generalized_alpha = 2 };
+enum class Integrator { modal = 1, midpoint = 2 };
 enum class MassMatrix { consistent = 1, averaged = 2 };
 
 /// Highest polynomial degree of an element.
@@ -48,7 +48,6 @@ struct Parameters {
   bool reduced_integration = false;                 ///< p-point Gauss rule for the shear; false = exact (59)
   MassMatrix mass_matrix = MassMatrix::consistent;  ///< see timoshenko.hpp
   Integrator integrator = Integrator::modal;
-  double rho_inf = 1.0;                   ///< spectral radius at infinity of generalized-α; 1 = midpoint rule (62)
   double initial_deflection_slope = 0.0;  ///< s in u⁰ = s·x [–]
   double initial_velocity_slope = 0.0;    ///< s in u_t⁰ = s·x [1/s]
   std::array<double, 4> point_force_position{0.5, 0.5, 0.5, 0.5};  ///< x/L of the point forces
@@ -235,18 +234,16 @@ class Beam {
   void restore(const std::vector<double>& state);
 
  protected:
-  Beam(std::shared_ptr<const Discretisation> space, const Parameters& parameters, Eigen::Index memory);
+  Beam(std::shared_ptr<const Discretisation> space, const Parameters& parameters);
   /// @throws std::invalid_argument if one of these is so large that outputs could overflow
   static void require_coefficients(std::initializer_list<double> values);
 
   struct Motion {
     Eigen::VectorXd q, v;
-    Eigen::VectorXd memory;  ///< what else the integrator knows; 0 if nothing
   };
   /// Beside the motion, what a state has.
   struct Scalars {
     double integral, integral_2, dissipated, load_work;
-    double impulse;    // at the tip since the last step [N·s]
     double tip_force;  // C [N] and the loads at the end of the last step, or as observed since
     Loads::Values loads;
   };

@@ -34,7 +34,7 @@ double dot(const Polynomial& a, const Polynomial& b) { return a[0] * b[0] + a[1]
 class ModalBeam final : public Beam {
  public:
   ModalBeam(const std::shared_ptr<const Modes>& modes, const Parameters& p)
-      : Beam(modes, p, 0),
+      : Beam(modes, p),
         modes_(*modes),
         tip_(modes_.load(Loads::tip)),
         omega2_(modes_.omega.array().square()),

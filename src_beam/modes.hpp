@@ -52,7 +52,7 @@ struct Modes final : Discretisation {
 /// Lowest modes by implicitly restarted Lanczos on K⁻¹M, M-orthonormal columns.
 /// @throws std::runtime_error if it does not converge
 Eigen::MatrixXd lanczos_modes(const Timoshenko& mesh, Eigen::Index count);
-inline constexpr const char* remedy = "; keep fewer n_modes, or use the integrator generalized_alpha";
+inline constexpr const char* remedy = "; keep fewer n_modes, or use the integrator midpoint";
 
 /// The lowest `n_modes`, 0 = all, and what completes them.
 /// @throws std::runtime_error if the eigensolver does not converge

@@ -189,7 +189,7 @@ fmi::Table fmi::make_table() {
   t.choices.push_back({"Integrator",
                        "time integration of the beam",
                        {"modal, the exact step of each mode under polynomial loads",
-                        "generalized_alpha, with rho_inf = 1 the midpoint rule"}});
+                        "midpoint rule, which sees the mean of each force over the step"}});
 
   fmi::TableBuilder<BeamModel> add(t);
   const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {
@@ -216,10 +216,8 @@ fmi::Table fmi::make_table() {
       "beams of degree 1");
   parameter("mass_matrix", "", &Parameters::mass_matrix, "1 = consistent, 2 = averaged").range(1, 2).choice =
       "MassMatrix";
-  fmi::Variable& integrator = parameter("integrator", "", &Parameters::integrator, "1 = modal, 2 = generalized_alpha");
+  fmi::Variable& integrator = parameter("integrator", "", &Parameters::integrator, "1 = modal, 2 = midpoint");
   integrator.range(1, 2).choice = "Integrator";
-  parameter("rho_inf", "", &Parameters::rho_inf, "spectral radius at infinity of generalized_alpha; 1 = midpoint rule")
-      .range(0, 1);
   parameter("initial_deflection_slope", "", &Parameters::initial_deflection_slope,
             "s in the initial deflection u = s*x");
   parameter("initial_velocity_slope", "1/s", &Parameters::initial_velocity_slope,
@@ -254,7 +252,7 @@ fmi::Table fmi::make_table() {
   add.input(
       "tip_force", "N",
       "contact force C on the tip, positive upward; its derivatives of order 1 and 2 hold for the next step only: "
-      "C(tau) = C + C' tau + C'' tau^2/2. generalized_alpha sees their mean over the step",
+      "C(tau) = C + C' tau + C'' tau^2/2. The midpoint rule sees their mean over the step",
       &BeamModel::tip_force);
   add.impulse("tip_impulse", "N.s", "upward impulse on the tip, applied at the start of the next step, then 0 again",
               &BeamModel::tip_impulse);
@@ -301,7 +299,7 @@ fmi::Table fmi::make_table() {
   };
   // What the steps ahead depend on besides.
   std::vector<std::string> motion = basis;
-  motion.insert(motion.end(), {"alpha_b", "rho_inf", "communication_step"});
+  motion.insert(motion.end(), {"alpha_b", "communication_step"});
   std::vector<std::string> free_motion = motion;
   for (std::size_t i = 0; i < Loads::tip - Loads::point; ++i) free_motion.push_back(position(i));
   free_motion.insert(free_motion.end(), {"initial_deflection_slope", "initial_velocity_slope", "tip_load_coefficient",
@@ -338,8 +336,7 @@ fmi::Table fmi::make_table() {
       "work of all loads on the beam since the start, where it is 0: distributed_load, point_force, tip_load, "
       "base_acceleration and tip_load_coefficient, not tip_force or tip_impulse. A load that is there at the start "
       "acts suddenly from then on, unless initial_state = 2. kinetic_energy + strain_energy + "
-      "dissipated_energy - load_work changes by the work of tip_force and tip_impulse alone, for "
-      "generalized_alpha if rho_inf = 1",
+      "dissipated_energy - load_work changes by the work of tip_force and tip_impulse alone",
       of(&Beam::load_work), of(&Beam::load_power));
   add.output("warnings", "", "steps so far that were discarded; restored states do not take it back",
              [](const BeamModel& m) { return m.refused; })

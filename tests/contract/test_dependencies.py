@@ -74,7 +74,6 @@ CHANGES = {
     "initial_state": [1, 2],
     "contact_law": [1, 2],
     "stop_enabled": [True, False],
-    "rho_inf": [0.5],
     "restitution": [0.5],
     "stop_position": [-0.5],
     "relative_tolerance": [1e-8],
@@ -229,7 +228,7 @@ def test_directional_derivatives_at_the_start_are_those_of_the_outputs(case):
                 continue
             outputs = [o for o in case.outputs if name in pairs.get(o, ()) and o not in skipped]
             value = k.get(name)
-            edge = name in {"alpha_b", "rho_inf", "communication_step", "restitution", "compliance_damping"}
+            edge = name in {"alpha_b", "communication_step", "restitution", "compliance_damping"}
             if outputs and (not edge or value not in (0.0, 1.0)):
                 change = 1e-4 * max(abs(value), 1e-2)
                 own_change = 1e-6 * (abs(value) or float(case.variables[name].nominal or 1.0))

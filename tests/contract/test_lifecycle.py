@@ -114,8 +114,8 @@ REFUSED = {
         (lambda k: k.try_enter(start=math.inf), "(SetupExperiment|EnterInitializationMode): startTime = inf"),
         (lambda k: k.try_set("kinetic_energy", 1.0), "SetFloat64: .*cannot be set"),
         (
-            lambda k: k.try_set({"beam": "rho_inf", "spring": "restitution"}[k.fmu.name], 1.5),
-            r"SetFloat64: '(rho_inf|restitution)' = 1\.5 is not in \[0, 1\]",
+            lambda k: k.try_set({"beam": "point_force_position[1]", "spring": "restitution"}[k.fmu.name], 1.5),
+            r"SetFloat64: '(point_force_position\[1\]|restitution)' = 1\.5 is not in \[0, 1\]",
         ),
     ],
     "step complete": [

@@ -283,7 +283,7 @@ TEST(BeamDegree, TheTipMassOfOneElement) {
   // min ∫v² over polynomials of degree p with v(0) = 0, v(L) = 1 is L/(p(p + 2)): the reproducing kernel of P_p,
   // k(±1,1) = (p + 1)²/2 and (−1)^p (p + 1)/2, reduced by the clamp to k(1,1) − k(−1,1)²/k(−1,−1) = p(p + 2)/2.
   for (int degree = 1; degree <= max_element_degree; ++degree) {
-    for (const Integrator integrator : {Integrator::modal, Integrator::generalized_alpha}) {
+    for (const Integrator integrator : {Integrator::modal, Integrator::midpoint}) {
       const Parameters p = with_integrator(general_beam(1, degree), integrator);
       const double exact = p.density * p.area * p.length / (degree * (degree + 2));
       EXPECT_NEAR(make_beam(p)->tip_mass(), exact, 1e-12 * exact) << degree;
@@ -294,7 +294,7 @@ TEST(BeamDegree, TheTipMassOfOneElement) {
 TEST(BeamDegree, TheStartIsExactAtAnyDegree) {
   for (const int degree : {1, 2, 5, 12}) {
     for (const int n_modes : {0, 2}) {
-      for (const Integrator integrator : {Integrator::modal, Integrator::generalized_alpha}) {
+      for (const Integrator integrator : {Integrator::modal, Integrator::midpoint}) {
         Parameters p = with_integrator(general_beam(3, degree), integrator);
         p.n_modes = n_modes;
         p.initial_deflection_slope = 0.2;

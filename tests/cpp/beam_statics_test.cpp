@@ -74,7 +74,8 @@ TEST(BeamStatics, FullIntegrationLocksAndReducedDoesNot) {
   EXPECT_NEAR(static_tip_compliance(p) / truth, 0.9975, 1e-8);  // 1 − h²/4
 }
 
-// A large Kelvin–Voigt damping and a long step end in equilibrium.
+// A large Kelvin–Voigt damping and a long step end in equilibrium. The midpoint rule hardly damps fast modes: it stays
+// where it is put at rest.
 TEST(BeamStatics, MotionComesToRestInTheStaticShape) {
   for (const bool reduced : {false, true}) {
     for (const int n_modes : {1, 5, 0}) {
@@ -84,11 +85,11 @@ TEST(BeamStatics, MotionComesToRestInTheStaticShape) {
       p.alpha_b = 0.3;
       const double C = 0.7, L = p.length, h = L / p.n_elements;
       const double EI = bending(p) + (reduced ? 0.0 : shearing(p) * h * h / 12.0);
-      for (const Integrator integrator : {Integrator::modal, Integrator::generalized_alpha}) {
-        const auto b = make_beam(with_integrator(p, integrator, 0.5));
-        const int steps = integrator == Integrator::modal ? 1 : 300;
-        for (int i = 0; i < steps; ++i) b->step(300.0 / steps, {C, 0.0, 0.0}, 0.0);
-        // What is left of the motion is e^{−t ω₁²α/2} ~ 1e-200 (modal), 0.5^300 (generalised-α).
+      for (const Integrator integrator : {Integrator::modal, Integrator::midpoint}) {
+        const auto b = make_beam(with_integrator(p, integrator));
+        b->observe(C, {});
+        if (integrator == Integrator::midpoint) b->rest();
+        b->step(300.0, {C, 0.0, 0.0}, 0.0);  // what is left of the modal motion is e^{−t ω₁²α/2} ~ 1e-200
         EXPECT_NEAR(b->tip_displacement(), C * tip_compliance(p), 1e-12 * C * tip_compliance(p));
         EXPECT_NEAR(b->strain_energy(), 0.5 * C * C * tip_compliance(p), 1e-12 * C * C * tip_compliance(p));
         EXPECT_NEAR(b->tip_velocity(), 0.0, 1e-12);
@@ -160,15 +161,17 @@ TEST(BeamStatics, UniformLoadConvergesToTheExactDeflectionInSecondOrder) {
 
 TEST(BeamStatics, LoadsAreConsistent) {
   // Reciprocity: the tip deflection under a load equals the work of that load on the shape of the unit tip force.
-  for (const Integrator integrator : {Integrator::modal, Integrator::generalized_alpha}) {
-    Parameters p = with_integrator(general_beam(9), integrator, 0.5);
+  for (const Integrator integrator : {Integrator::modal, Integrator::midpoint}) {
+    Parameters p = with_integrator(general_beam(9), integrator);
     p.alpha_b = 1.0;
     p.n_modes = 3;
     Timoshenko mesh(p);
     const Eigen::VectorXd shape = mesh.flexibility_times(mesh.load(Loads::tip));
     const auto at_rest = [&](const Loads& loads) {
       auto b = make_beam(p);
-      for (int i = 0; i < 200; ++i) b->step(5.0, {0.0, 0.0, 0.0}, loads);
+      b->observe(0.0, loads);
+      if (integrator == Integrator::midpoint) b->rest();
+      b->step(1000.0, {0.0, 0.0, 0.0}, loads);
       return b;
     };
     for (std::size_t i = 0; i < Loads::count; ++i) {

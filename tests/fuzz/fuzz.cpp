@@ -557,7 +557,7 @@ class Episode {
       return static_cast<double>(1 + random_.below(2));
     }
     if (is("relative_tolerance") || is("absolute_tolerance")) return std::pow(10.0, random_.between(-14.0, -3.0));
-    if (is("rho_inf") || is("restitution")) return random_.chance(0.3) ? 1.0 : random_.unit();
+    if (is("restitution")) return random_.chance(0.3) ? 1.0 : random_.unit();
     if (is("compliance_exponent"))
       return random_.chance(0.5) ? 1.0 + 0.5 * static_cast<double>(random_.below(6)) : random_.between(1.0, 4.0);
     if (is("alpha_b") || is("damping")) return random_.chance(0.4) ? 0.0 : std::pow(10.0, random_.between(-6.0, 1.0));

@@ -101,7 +101,7 @@ def test_unresolved_motion_gets_degree_0(turn, expected):
         ({"coupling": {"relative_tolerance": 1e-4}}, ("hermite", 2)),
         # Where hermite is not defined it is not taken.
         ({"contact": {"law": "paper"}}, ("energy", 0)),
-        ({"beam": {"integrator": "generalized_alpha"}}, ("energy", 0)),
+        ({"beam": {"integrator": "midpoint"}}, ("energy", 0)),
         ({"beam": {"fidelity": "quasi_static"}}, ("energy", 2)),
         ({"contact": {"impact": "rest"}, "coupling": {"macro_step": 1e-6}}, ("energy", 2)),
         ({"coupling": {"macro_step": 1e-6}}, ("hermite", 2)),
@@ -112,7 +112,7 @@ def test_what_changes_of_soft_get(changes, expected):
 
 
 def test_a_scheme_that_is_chosen_is_defined():
-    for changes in ({"contact": {"law": "compliance"}}, {"beam": {"integrator": "generalized_alpha"}}):
+    for changes in ({"contact": {"law": "compliance"}}, {"beam": {"integrator": "midpoint"}}):
         assert with_scheme_chosen(auto(**changes))[0].coupling.scheme == "energy"
 
 

@@ -279,7 +279,7 @@ SCENES = {
     "energy 2, damped": with_changes(SOFT, beam={"alpha_b": 1e-3}, spring={"damping": 0.5}, coupling={"degree": 2}),
     "hermite 2": with_changes(SOFT, coupling={"scheme": "hermite", "degree": 2, "macro_step": 1e-3}),
     "adaptive": with_changes(SOFT, coupling={"relative_tolerance": 1e-4}),
-    "generalized_alpha": with_changes(SOFT, beam={"integrator": "generalized_alpha", "rho_inf": 0.8}),
+    "midpoint": with_changes(SOFT, beam={"integrator": "midpoint"}),
     "quasi-static": with_changes(
         SOFT, beam={"fidelity": "quasi_static", "alpha_b": 0.1, "distributed_load": -20.0}, coupling={"degree": 1}
     ),

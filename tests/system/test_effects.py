@@ -23,7 +23,7 @@ SCENES = {
     "link": with_changes(SOFT, contact={"law": "link", "stiffness": 1e3, "exponent": 3.0}),
     "tie": with_changes(SOFT, contact={"law": "tie", "stiffness": 1e4, "exponent": 3.0}),
     "exchange": with_changes(SOFT, contact={"law": "compliance", **LAW}, coupling={"scheme": "jacobi"}),
-    "generalized-α": with_changes(SOFT, beam={"integrator": "generalized_alpha"}),
+    "midpoint": with_changes(SOFT, beam={"integrator": "midpoint"}),
     "without inertia": with_changes(SOFT, beam={"fidelity": "quasi_static", "n_elements": 50}),
     "a hat load without inertia": with_changes(
         SOFT, beam={"fidelity": "quasi_static", "n_elements": 50, "tip_load_coefficient": -1.0}
@@ -43,9 +43,8 @@ VALUES = {
     "beam.element_degree": 2,
     "beam.reduced_integration": True,
     "beam.mass_matrix": "averaged",
-    "beam.integrator": "generalized_alpha",
+    "beam.integrator": "midpoint",
     "beam.n_modes": 3,
-    "beam.rho_inf": 0.5,
     "stop.restitution": 0.25,
     "contact.impact": "tip",
     "contact.stiffness": 2e3,

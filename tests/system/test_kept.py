@@ -18,7 +18,7 @@ PULSE = {"on": "tip", "signal": "half_sine", "start": 0.01, "duration": 0.05, "a
 SCENES = {
     "transmission": SOFT,
     "degree 2": with_changes(SOFT, coupling={"degree": 2}),
-    "generalized-alpha": with_changes(SOFT, beam={"integrator": "generalized_alpha"}),
+    "midpoint": with_changes(SOFT, beam={"integrator": "midpoint"}),
     "compliance": with_changes(SOFT, contact={"law": "compliance"}),
     "loads": with_changes(SOFT, loads=[PULSE, {"on": "beam", "at": 0.5}, {"on": "spring", "amplitude": -2.0}]),
     "spring alone": with_changes(load_scene("duffing"), time={"t_end": 1.0}),

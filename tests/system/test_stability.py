@@ -60,7 +60,6 @@ def changed(run, warnings=None, **columns):
 
 
 SAID, CAUSE = ("something has changed the energy",), "energy of degree 1 has changed the energy by 1 %"
-DAMPED = {"integrator": "generalized_alpha", "rho_inf": 0.5}
 
 
 @pytest.mark.parametrize(
@@ -80,11 +79,9 @@ DAMPED = {"integrator": "generalized_alpha", "rho_inf": 0.5}
         ("energy", {}, 1e-2, SAID, CAUSE, "garbage"),
         ("hermite", {}, 1e-2, SAID, "", "approximate"),
         ("hermite", {}, 1e-2, SAID, CAUSE, "stopped"),
-        # `auto` is judged as what it takes: `hermite`, and `energy` for a beam by generalized-α.
+        # `auto` is judged as what it takes: `hermite`, and `energy` for a beam by the midpoint rule.
         ("auto", {}, 10.0 * EXACT, (), "", "approximate"),
-        ("auto", {"integrator": "generalized_alpha"}, 10.0 * EXACT, (), "", "garbage"),
-        ("auto", DAMPED, -0.5, (), "", "dissipative"),
-        ("auto", DAMPED, 0.5, (), "", "garbage"),
+        ("auto", {"integrator": "midpoint"}, 10.0 * EXACT, (), "", "garbage"),
     ],
 )
 def test_energy_that_changes_is_judged_by_the_scheme_and_by_what_is_said(scheme, beam, share, warnings, cause, kind):
@@ -188,7 +185,6 @@ MOTION = np.abs(done().shapes[1]).max() + 2e-3 * max(np.abs(done().v_tip).max(),
           for gap, phase in ((2e-9, "tied"), (-2e-9, "touch"), (-2e-9, "free"))),
         ("gap", 1.0, "free", {}, None),
         ("e_dissipated", -1e-6, "tied", {}, "energy lost by damping comes back"),
-        ("e_dissipated", -1e-6, "tied", {"beam": DAMPED}, None),  # over a step it is exact, and may be of any sign
         ("e_impact_loss", -1e-6, "tied", {}, "energy lost by impacts comes back"),
         ("e_impact_loss", -1e-6, "tied", {"contact": {"impact": "tip"}}, None),  # which takes from nowhere
     ],

@@ -60,7 +60,7 @@ CASES = {
     "rigid stop": ({"stop": {"position": 0.0}}, np.inf, 0.0, "seated"),
     "elastic stop": ({"stop": {"position": 0.0}, **link("compliance", exponent=1.0)}, np.inf, LINK, "touch"),
     "wall": ({"spring": {"element": "rigid_wall"}}, np.inf, 0.0, "tied"),
-    "generalised α": ({"beam": {**BEAM, "integrator": "generalized_alpha"}, "spring": SPRING}, K1, 0.0, "tied"),
+    "midpoint": ({"beam": {**BEAM, "integrator": "midpoint"}, "spring": SPRING}, K1, 0.0, "tied"),
     "adaptive": ({"spring": SPRING, "coupling": {"relative_tolerance": 1e-5}}, K1, 0.0, "tied"),
 }
 

@@ -35,7 +35,7 @@ from .protocol import (
 )
 
 #: The numbers by which the beam FMU knows its alternatives.
-_INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
+_INTEGRATORS = {"modal": 1, "midpoint": 2}
 _MASS_MATRICES = {"consistent": 1, "averaged": 2}
 _AT_REST = 2
 #: What tells `Felt`, and `BeamBody.shape`: variables, and how many numbers each has.

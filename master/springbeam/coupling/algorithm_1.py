@@ -1,6 +1,6 @@
 """Ahn & Tate's Algorithm 1 as a coupling: lines (7)–(31) with the two bodies in place of (62) and (53).
 
-The beam FMU steps by ``generalized_alpha`` with ρ∞ = 1, which is (62); the spring's midpoint rule (53) is replaced by
+The beam FMU steps by ``midpoint``, which is (62); the spring's midpoint rule (53) is replaced by
 IDA over the step, restarted by its exact start values wherever the algorithm overwrites y or z. The tip is moved to y
 (lines 18, 21) by the constant tip force that does so; nothing opposes that force, so its work is energy from nowhere,
 and ``energy_residual`` shows it. Readings where the print leaves something open: ``docs/paper.md``.

@@ -19,7 +19,7 @@ from .stepping import Pair
 EXACT = 1e-8
 #: What a warning says where more of the energy has changed.
 CHANGED = "has changed the energy"
-#: Largest such residual where a scheme or an integrator changes the energy itself.
+#: Largest such residual where a scheme changes the energy itself.
 APPROXIMATE = 1e-3
 #: Energy-error allowance per unit of solver tolerance: 1e-12 gives `EXACT`.
 _TOLERANCES = EXACT / 1e-12
@@ -27,9 +27,8 @@ _TOLERANCES = EXACT / 1e-12
 
 def bounds(scene: Scene) -> tuple[float, float]:
     """Relative energy residuals above which a run warns, and above which it stops."""
-    coupling, beam = scene.coupling, scene.beam
-    changes = coupling.scheme == "hermite" or coupling.scheme in ORDINARY_SCHEMES
-    if changes or (beam is not None and beam.damped_numerically):
+    coupling = scene.coupling
+    if coupling.scheme == "hermite" or coupling.scheme in ORDINARY_SCHEMES:
         return APPROXIMATE, 0.1
     tolerance = max(coupling.tolerance, 0.0 if scene.spring is None else scene.spring.relative_tolerance)
     return min(max(EXACT, _TOLERANCES * tolerance), APPROXIMATE), APPROXIMATE
@@ -60,7 +59,6 @@ class Balance:
 
     def __init__(self, scene: Scene, pair: Pair) -> None:
         self._scene, self._pair = scene, pair
-        self._numerically_damped = scene.beam is not None and scene.beam.damped_numerically
         self._warns, self._stops = bounds(scene)
         #: Bodies of the caller's may tell no energies; there is then no balance to judge by.
         self._untold = any(type(body).energies is Body.energies and body.mass < inf for body in pair.bodies)
@@ -72,11 +70,7 @@ class Balance:
         """Tell at which of the next records too much of the energy has changed, and why; see `Log`."""
         share, largest = errors(self._scene, steps, first, self._scale, of_interface=True)
         self._scale = float(largest[-1])
-        return self._wrong(share) > self._stops, lambda row: self._cause(float(abs(share[row])), steps)
-
-    def _wrong(self, share: np.ndarray) -> np.ndarray:
-        """Return the share of the energy that has changed; what numerical damping takes is not an error."""
-        return share if self._numerically_damped else np.abs(share)
+        return np.abs(share) > self._stops, lambda row: self._cause(float(abs(share[row])), steps)
 
     def report(self, steps: np.ndarray) -> tuple[dict[str, Any], list[str], bool]:
         """Return what all records of the run, shape (n,), say of its energy.
@@ -106,21 +100,17 @@ class Balance:
                 f"the energies that the FMUs tell are off by {100.0 * of_own:.2g} %, by their own "
                 f"solvers: the coupling has kept those of the interface to {of_judged:.1e}"
             )
-        return summary, warnings, bool(self._wrong(judged).max() > self._warns)
+        return summary, warnings, bool(np.abs(judged).max() > self._warns)
 
     def _cause(self, share: float, steps: np.ndarray) -> str:
         """Return in words why a ``share`` of the energy has changed, and what would help."""
-        coupling, beam = self._scene.coupling, self._scene.beam
+        coupling = self._scene.coupling
         causes, remedies = [], []
         if not self._pair.joined.energy_exact:
             causes.append(f"{coupling.scheme} of degree {coupling.degree}")
             or_else = ", or coupling.scheme = 'energy'" if self._pair.repeatable else ""
             H = coupling.macro_step or steps["size"].max()
             remedies.append(f"the macro step {H:g} s is too large for it; take a smaller one{or_else}")
-        if self._numerically_damped:
-            assert beam is not None
-            causes.append(f"beam.rho_inf = {beam.rho_inf:g}")
-            remedies.append("no column books what numerical damping takes; beam.rho_inf = 1 takes nothing")
         if not causes:
             causes.append("rounding, or a solver's tolerance,")
             remedies.append("the results are not to be trusted; try another coupling.macro_step")

@@ -136,7 +136,10 @@ def beginning(title: str) -> str:
 # -- errors ------------------------------------------------------------------------------------------------------------
 
 #: Keys and values that scenes had once, as ``[table] key`` or ``[table] key = value``, and what to do instead.
-GONE: dict[str, str] = {}
+GONE: dict[str, str] = {
+    '[beam] integrator = "generalized_alpha"': 'is gone; use "midpoint", which is what it was with rho_inf = 1',
+    "[beam] rho_inf": 'is gone; leave it out: integrator = "midpoint" is rho_inf = 1, alpha_b > 0 damps',
+}
 #: Types of values by those of the JSON Schema; others are given as texts.
 _KINDS: dict[str, type] = {"integer": int, "boolean": bool, "number": float}
 

@@ -35,8 +35,8 @@ BETWEEN_ROWS = 0.01
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
 #: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
 STABLE = 3.0
-#: By which angle generalized-α may let waves lag at the end of the run [rad]: the fastest ones that an impact sets off;
-#: where nothing strikes, those of a few times the beam's lowest frequency, or of a load, which move the tip more.
+#: By which angle the midpoint rule may let waves lag at the end of the run [rad]: the fastest ones that an impact sets
+#: off; where nothing strikes, those of a few times the beam's lowest frequency, or of a load, which move the tip more.
 WAVE_LAG, SMOOTH_LAG, SMOOTH_WAVES = 1.0, 0.01, 5.0
 #: Energy of a start that is bent enough to count, over that of its velocity.
 BENT = 1e-4
@@ -169,7 +169,7 @@ def _unstable(scene: Scene, seen: _Seen) -> dict[str, Any]:
 
 
 def _waves_lag(scene: Scene, seen: _Seen) -> dict[str, Any]:
-    """Return by how much generalized-α makes waves of the beam late, nothing if it follows them.
+    """Return by how much the midpoint rule makes waves of the beam late, nothing if it follows them.
 
     Neither a mismatch of velocities nor the energy would tell. A beam that starts bent to a straight line springs back
     from its clamp as from an impact.
@@ -183,8 +183,7 @@ def _waves_lag(scene: Scene, seen: _Seen) -> dict[str, Any]:
     if not (bent or (scene.contact.rigid and _struck(scene))):
         omega = max(SMOOTH_WAVES * slowest_frequency(beam), *(load.rate for load in scene.loads), 0.0)
         waves, omega, limit = f"waves of {omega:.3g} rad/s", min(omega, lasting_frequency(beam)), SMOOTH_LAG
-    damped = (1.0 - beam.rho_inf) / (1.0 + beam.rho_inf)
-    lag = scene.duration / H * (omega * H) ** 3 * (1.0 + 4.5 * damped**2) / 12.0
+    lag = scene.duration / H * (omega * H) ** 3 / 12.0
     return {"waves": waves, "lag": lag, "size": _rounded_down(H * sqrt(limit / lag))} if lag > limit else {}
 
 
@@ -281,7 +280,7 @@ _OF_EQUAL_STEPS = (
 _OF_ALL_STEPS = (
     Rule(
         _waves_lag,
-        "not resolved: generalized-α lets {waves} lag by {lag:.2g} rad at the end; "
+        "not resolved: the midpoint rule lets {waves} lag by {lag:.2g} rad at the end; "
         "coupling.macro_step <= {size} resolves them, beam.alpha_b > 0 lets them die out, and "
         'beam.integrator = "modal" is exact',
     ),

@@ -250,12 +250,7 @@ EFFECTS: tuple[Rule, ...] = (
     *_counts(
         "beam.n_modes",
         lambda s: _dynamic(s) and s.beam.integrator == "modal" and not s.contact.algorithm,
-        'it counts with fidelity = "dynamic" and integrator = "modal", other integrators keep all modes',
-    ),
-    *_counts(
-        "beam.rho_inf",
-        lambda s: _dynamic(s) and s.beam.integrator == "generalized_alpha",
-        'it counts with fidelity = "dynamic" and integrator = "generalized_alpha"',
+        'it counts with fidelity = "dynamic" and integrator = "modal", the midpoint rule keeps all modes',
     ),
     *_counts("stop.restitution", lambda s: not s.contact.algorithm, "Algorithm 1 has no loss on the foundation"),
     *_counts("contact.law", lambda s: s.coupled, "it counts between two bodies, or a beam and a stop"),

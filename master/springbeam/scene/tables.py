@@ -169,11 +169,8 @@ class Beam(Table):
     mass_matrix: Literal["consistent", "averaged"] = key(
         "–", "the paper's, or averaged with the lumped one so that short waves travel at the right speed", "consistent"
     )
-    integrator: Literal["modal", "generalized_alpha"] = key(
-        "–", "exact in time for each mode, or generalized-α (with rho_inf)", "modal"
-    )
-    rho_inf: float = key(
-        "–", "spectral radius at infinity of generalized-α; 1 is the midpoint rule", 1.0, ge=0.0, le=1.0
+    integrator: Literal["modal", "midpoint"] = key(
+        "–", "exact in time for each mode, or the midpoint rule on the whole mesh", "modal"
     )
     distributed_load: float = key("N/m", "uniform load f_b, upward", 0.0)
     tip_load_coefficient: float = key("N/m", "load of the last element's hat function, upward", 0.0)
@@ -236,11 +233,6 @@ class Beam(Table):
     def section_height(self) -> float:
         """Height of the section in the direction of motion [m]; 0 if only its area and second moment are known."""
         return self.height or self.diameter or 0.0
-
-    @property
-    def damped_numerically(self) -> bool:
-        """Whether the integrator takes energy that nothing books."""
-        return self.fidelity == "dynamic" and self.integrator == "generalized_alpha" and self.rho_inf < 1.0
 
     @property
     def unknowns(self) -> int:

@@ -2,8 +2,7 @@
 
 ===========  ==========================================================================================================
 conserved    done, energy constant to `ledger.EXACT`, nothing lost
-dissipative  done, energy plus booked losses constant to `ledger.EXACT`; or a numerically damped beam (``rho_inf`` < 1)
-             that has only lost energy
+dissipative  done, energy plus booked losses constant to `ledger.EXACT`
 approximate  done, energy changed by more: within the bound of its scheme (`ledger.bounds`), or the run says so
 refused      a scene that cannot be run, with the reason
 stopped      ended early, with the cause
@@ -241,9 +240,8 @@ def _class(run: Trajectory, cause: str, relative: np.ndarray, scale: np.ndarray,
     """Return the class of a run and why, by its relative residuals, the scale of its energy and its overlap."""
     scene, _ = with_scheme_chosen(run.scene)
     residual = float(np.abs(relative).max())
-    damped = scene.beam is not None and scene.beam.damped_numerically
     keeps = scene.coupling.scheme == "energy" and not scene.contact.algorithm
-    if keeps and not damped and residual > _GUARANTEED:
+    if keeps and residual > _GUARANTEED:
         return "garbage", f"energy residual {residual:.1e} of a coupling that changes none; {cause}"
     if cause:
         return "stopped", cause
@@ -252,8 +250,6 @@ def _class(run: Trajectory, cause: str, relative: np.ndarray, scale: np.ndarray,
     if residual <= EXACT:
         lost = run.e_dissipated[-1] + run.e_impact_loss[-1]
         return "dissipative" if lost > EXACT * scale[-1] else "conserved", ""
-    if keeps and damped and relative.max() <= EXACT:
-        return "dissipative", ""
     said = [text for text in run.summary["warnings"] if "energy" in text]
     if said or residual <= bounds(scene)[0]:
         return "approximate", "; ".join(said)
@@ -266,8 +262,6 @@ def _faults(run: Trajectory, overlap: float, scale: np.ndarray) -> Iterator[str]
         if name != "phase" and not np.all(np.isfinite(values)):
             yield f"{name} is not finite"
     lost = {"damping": run.e_dissipated, "impacts": run.e_impact_loss}
-    if run.scene.beam is not None and run.scene.beam.damped_numerically:
-        del lost["damping"]  # what it takes over an unresolved generalized-α step is exact, but of no sign
     if run.scene.contact.impact == "tip":
         del lost["impacts"]
     for what, energy in lost.items():

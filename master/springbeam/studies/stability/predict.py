@@ -98,8 +98,8 @@ def predict(scene: Scene) -> dict[str, Any]:
         found["frequencies"] = frequencies[:3].tolist()
         if reduced is not beam:
             notes.append(f"predicted with the lowest {MOST_MODES} modes of the beam")
-        if beam.integrator == "generalized_alpha":
-            notes.append("predicted for exact modes; generalized_alpha with rho_inf = 1 adds no energy of its own")
+        if beam.integrator == "midpoint":
+            notes.append("predicted for exact modes; the midpoint rule adds no energy of its own")
         if not resolved:
             rates["the beam's lowest mode turns"] = ends[0]
     if scene.contact.algorithm:

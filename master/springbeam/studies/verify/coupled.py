@@ -82,7 +82,7 @@ _TIED = ((1.0, 0.01), (1e4, 1e-3), (1e4, 0.1))
 @section(
     "Coupling: energy scheme, tied",
     *((*pair, degree, "modal", 0.0) for pair, degree in product(_TIED, (0, 1, 2))),
-    *((1e4, 0.02, 0, *body) for body in (("modal", 1e-4), ("generalized_alpha", 0.0), ("generalized_alpha", 1e-4))),
+    *((1e4, 0.02, 0, *body) for body in (("modal", 1e-4), ("midpoint", 0.0), ("midpoint", 1e-4))),
 )
 def energy_scheme(kappa: float, size: float, degree: int, integrator: str, alpha: float) -> Iterator[Check]:
     """Beam and nonlinear spring, tied: the `energy` scheme keeps the energy but what damping takes, whatever H.
