@@ -20,6 +20,7 @@ from ..contact.laws import stiffest
 from ..contact.phases import Impact, Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
 from ..results.columns import ledger
+from ..results.contradictions import contradictions
 from ..results.recording import Recorder
 from ..results.steps import BEAM_TELLS, SPRING_TELLS, STEP, packed
 from ..results.totals import totals
@@ -37,6 +38,7 @@ from .stepping import SIMULTANEOUS, Pair, State
 
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
+_SHORTER = "take a shorter macro step that is not a whole period of a body"
 _NOTHING_FELT = (0.0, 0.0, 0.0, 0.0)
 #: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
 _SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
@@ -371,6 +373,9 @@ class Master(Stateful):
             motion, share = Neglect(scene.coupling, scene.driver_stiffness).by(steps)
             neglect = {"neglected_motion": float(motion[-1]), "neglected_share": float(share[-1])}
         window = force_window(scene, stiffest(scene) if scene.contact.facts.opens else 0.0)
+        amounts = totals(scene, steps, events, window) if len(inside) else {}
+        ruled_out = contradictions(scene, inside, events, amounts.get("contact_duration_total", 0.0))
+        warnings += [f"not resolved: {what}: an event was missed; {_SHORTER}" for what in ruled_out]
         return {
             **neglect,
             **({} if self._choice is None else {"coupling": self._choice._asdict()}),
@@ -380,9 +385,9 @@ class Master(Stateful):
             "halved_steps": self.state.halvings,
             **of_coupling,
             **energies,
-            "resolved": unresolved is None and not changed,
+            "resolved": unresolved is None and not changed and not ruled_out,
             "misplaced_ends": off,
             "warnings": warnings,
             **({"max_velocity_mismatch": mismatch(self._pair, inside)} if len(inside) else {}),
-            **(totals(scene, steps, events, window) if len(inside) else {}),
+            **amounts,
         }

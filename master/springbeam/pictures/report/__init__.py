@@ -200,7 +200,7 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
     if spring is not None:
         cubic = f", cubic stiffness {spring.cubic_stiffness:.4g} N/m³" if spring.cubic_stiffness else ""
         stiffness = f"stiffness {spring.linear_stiffness:.4g} N/m{cubic}"
-        yield "spring", f"mass {spring.mass:.4g} kg, {stiffness}, its top at rest at Ψ = {spring.equilibrium:.4g} m"
+        yield "spring", f"mass {spring.mass:.4g} kg, {stiffness}, its top starts at Ψ = {spring.equilibrium:.4g} m"
     for table, partner in scene.partners.items():
         yield table, f"another body in its place: {kind_of(partner).replace('_', ' ')}"
     if scene.coupled:

@@ -1,0 +1,72 @@
+"""Results that the scene rules out: an end below a rigid stop, ends that pass through each other, times beyond the run.
+
+A step that misses an event leaves no other trace, so these are looked for in what was recorded, whatever made it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..scene import Scene
+from .dense import Extremes, extremes
+from .trajectory import Event
+
+#: How far an end may be where it cannot be, over its own range: what curves between right rows may be off by.
+_MOST = 0.01
+#: Times closer than this share of the run are one.
+_SAME = 1e-9
+
+
+def contradictions(scene: Scene, steps: np.ndarray, events: Sequence[Event], contact_time: float) -> list[str]:
+    """Return in words which results of a run ``scene`` rules out; a right run has none.
+
+    Parameters
+    ----------
+    scene
+        As run.
+    steps, events
+        Of the whole run so far; steps of dtype `springbeam.results.steps.STEP`.
+    contact_time
+        How long all contacts of the run last together [s].
+    """
+    if not len(steps):
+        return []
+    return [*_ends(scene, steps), *_times(steps, events, contact_time)]
+
+
+def _ends(scene: Scene, steps: np.ndarray) -> Iterator[str]:
+    if scene.stop is not None and not scene.elastic_stop:
+        end, name = ("u_tip", "the tip") if scene.lower is None else ("y", "the spring's top")
+        places = extremes(scene, steps, end)
+        if scene.stop.position - places.lowest > _MOST * _range(places):
+            yield (
+                f"{name} is at {places.lowest:.6g} m at {places.lowest_time:.6g} s, below the rigid stop at "
+                f"{scene.stop.position:.6g} m"
+            )
+    if scene.joins and scene.contact.rigid:
+        gap = extremes(scene, steps, "gap")
+        if -gap.lowest > _MOST * min(_range(extremes(scene, steps, end)) for end in ("u_tip", "y")):
+            yield f"the tip is {-gap.lowest:.6g} m below the spring's top at {gap.lowest_time:.6g} s"
+
+
+def _range(places: Extremes) -> float:
+    return places.highest - places.lowest
+
+
+def _times(steps: np.ndarray, events: Sequence[Event], contact_time: float) -> Iterator[str]:
+    start = float(steps["time"][0])
+    end = float(steps["time"][-1])
+    slack = _SAME * (end - start)
+    before = start
+    for event in events:
+        if not before - slack <= event.time <= end + slack:
+            yield (
+                f"the event {event.kind} at {event.time:.9g} s is not between the one before, or the start, at "
+                f"{before:.9g} s and the end at {end:.9g} s"
+            )
+            return
+        before = event.time
+    if contact_time > end - start + slack:
+        yield f"contacts last {contact_time:.6g} s in a run of {end - start:.6g} s"

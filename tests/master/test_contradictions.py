@@ -1,0 +1,86 @@
+"""Results that a scene rules out are found in the records: right runs have none, runs made wrong on purpose have."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from springbeam import load_scene, simulate
+from springbeam.results.contradictions import contradictions
+from springbeam.scene import scene_from_dict
+
+#: A mass on a spring that starts at 0.5 m, above a rigid stop at −0.4 m; it meets the stop at arccos(−0.8)/100 s.
+OSCILLATOR = {
+    "time": {"t_end": 0.5},
+    "beam": {"element": "spring_damper", "mass": 1.0, "stiffness": 1.0e4, "displacement": 0.5},
+    "stop": {"position": -0.4, "restitution": 0.5},
+    "coupling": {"macro_step": 2e-3},
+}
+SCENES = {
+    "pair": lambda: load_scene("soft", ["time.t_end=0.2"]),
+    "spring": lambda: load_scene("duffing", ["time.t_end=2", "coupling.macro_step=0.02"]),
+    "element on a stop": lambda: scene_from_dict(OSCILLATOR),
+    "beam on a stop": lambda: load_scene("beam-on-stop", ["time.t_end=0.2"]),
+}
+
+
+@cache
+def of(name):
+    return simulate(SCENES[name]())
+
+
+def found(run, **changes):
+    """What contradicts the scene if records or events are ``changed``."""
+    steps = run.steps.copy()
+    for field, change in changes.get("steps", {}).items():
+        steps[field] += change
+    events = changes.get("events", run.events)
+    return contradictions(run.scene, steps, events, changes.get("contact_time", 0.0))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_right_run_contradicts_nothing(name):
+    run = of(name)
+    assert run.summary["resolved"]
+    assert found(run, contact_time=run.summary.get("contact_duration_total", 0.0)) == []
+
+
+@pytest.mark.parametrize(("name", "end"), [("pair", "y"), ("element on a stop", "u_tip"), ("beam on a stop", "u_tip")])
+@pytest.mark.parametrize(("share", "seen"), [(0.008, False), (0.012, True)])
+def test_an_end_may_be_below_the_rigid_stop_by_a_percent_of_its_range(name, end, share, seen):
+    """All of them touch the stop, so that a shift down is how far they are below it."""
+    run = of(name)
+    down = share * np.ptp(run[end])
+    fields = [end, f"{end}_after"]
+    told = found(run, steps=dict.fromkeys(fields, -down))
+    assert any("below the rigid stop" in text for text in told) == seen
+
+
+def test_a_tip_may_not_pass_the_top_of_the_spring():
+    run = of("pair")
+    raised = {"y": 0.02, "y_after": 0.02}
+    assert any("below the spring's top" in text for text in found(run, steps=raised))
+
+
+@pytest.mark.parametrize(
+    ("number", "time"), [(0, -1.0), (-1, 0.0), (-1, 0.3)], ids=["before the start", "out of order", "after the end"]
+)
+def test_events_are_in_order_and_within_the_run(number, time):
+    run = of("pair")
+    events = list(run.events)
+    events[number] = replace(events[number], time=time)
+    assert len(found(run, events=events)) == 1
+
+
+def test_contacts_last_no_longer_than_the_run():
+    run = of("pair")
+    assert found(run, contact_time=0.2) == []
+    assert found(run, contact_time=0.201) == ["contacts last 0.201 s in a run of 0.2 s"]
+
+
+def test_a_macro_step_of_one_period_that_misses_all_impacts_is_not_resolved():
+    period = 2.0 * np.pi / 100.0
+    run = simulate(scene_from_dict(OSCILLATOR | {"coupling": {"macro_step": period}}))
+    assert not run.summary["resolved"]
+    assert "an event was missed" in " ".join(run.summary["warnings"])
