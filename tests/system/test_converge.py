@@ -1,15 +1,12 @@
-"""`springbeam converge`, and `--accuracy --mesh`: sequences and beams whose order and limit are known."""
+"""`springbeam converge`: sequences and beams whose order and limit are known."""
 
 import json
 
-import numpy as np
 import pytest
-from commands import printed, refused
+from commands import printed
 from rich.console import Console
 
-from springbeam.run.runner import simulate
 from springbeam.scene import load_scene, with_changes
-from springbeam.studies.accuracy import pick_mesh
 from springbeam.studies.converge import Converge, settled
 
 
@@ -66,20 +63,3 @@ def test_linear_elements_converge_by_order_two(tmp_path):
     assert found["elements"]["settled"]["first_separation"]["limit"] is None  # there is none
     written = {file.name for file in (tmp_path / "found").iterdir()}
     assert written == {"study.jsonl", "converge.csv", "converge.parquet", "converge.png"}
-
-
-def test_an_accuracy_with_the_mesh_is_kept_beside_a_mesh_that_is_much_finer():
-    scene = with_changes(load_scene("soft"), beam={"n_elements": 10}, time={"t_end": 0.06})
-    run = pick_mesh(scene.model_copy(update={"accuracy": 2e-3}))
-    fine = simulate(with_changes(scene, beam={"n_elements": 500}, coupling={"degree": 2}))
-    assert 10 < run.scene.beam.n_elements < 100
-    assert run.summary["accuracy"]["estimated_mesh_error"] <= 1e-3
-    times = np.linspace(0.0, 0.06, 100)
-    for name in ("u_tip", "y"):
-        error = np.abs(run.at(times)[name] - fine.at(times)[name]).max() / np.abs(fine[name]).max()
-        assert 1e-5 < error <= 2e-3
-
-
-def test_a_mesh_that_cannot_keep_the_accuracy_says_how_far_it_comes(tmp_path):
-    accurate = ["--set=time.t_end=0.3", "--accuracy", "1e-2", "--mesh"]
-    assert "400 elements still leave some 2." in refused("run", "soft", *accurate, "--out", tmp_path / "found")

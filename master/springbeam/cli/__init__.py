@@ -18,7 +18,7 @@ import typer
 
 from ..studies.tables import Findings
 from . import checks, look, run, scenes, studies
-from .common import STOPPED, Command
+from .common import STOPPED, Command, Commands
 
 _WHAT = "A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs."
 _START = """\
@@ -32,6 +32,7 @@ springbeam doctor                 is this installation sound?"""
 _NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
 app = typer.Typer(
+    cls=Commands,
     help=_WHAT,
     epilog="springbeam COMMAND --help shows options and an example; springbeam alone shows how to start.",
     invoke_without_command=True,

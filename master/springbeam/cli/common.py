@@ -21,7 +21,7 @@ import typer
 from rich.console import Console
 from rich.progress import Progress, ProgressColumn
 from rich.text import Text
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 from ..bodies.protocol import FmuError
 from ..results.directory import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory
@@ -33,6 +33,10 @@ from ..studies.tables import Findings
 DISAGREES = 1
 BAD_INPUT = 2
 STOPPED = 3
+#: Commands and options that there are no more, with what to do instead.
+GONE = {
+    "--mesh": "springbeam converge SCENE shows how far the mesh is from the continuous beam",
+}
 #: How long a signal waits for Python to act on it [s].
 PATIENCE = 5.0
 
@@ -81,8 +85,23 @@ ForceOption = Annotated[bool, typer.Option("--force", "-f", help="Replace what i
 NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help="Draw no pictures.")]
 
 
+class Commands(TyperGroup):
+    """All commands. One that is gone says what to do instead."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        _refuse_gone(args[:1])
+        return super().resolve_command(ctx, args)
+
+
 class Command(TyperCommand):
-    """A command that can be interrupted; its flags are shown without a type, which would have one try --force true."""
+    """A command that can be interrupted. Its flags are shown without a type, so that no one tries --force true.
+
+    An option that is gone says what to do instead.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        _refuse_gone([word for word in args if word.startswith("--")])
+        return super().parse_args(ctx, args)
 
     def get_params(self, ctx: Any) -> list[Any]:
         parameters: list[Any] = super().get_params(ctx)
@@ -96,6 +115,14 @@ class Command(TyperCommand):
             with bad_input_reported():
                 found: Findings = super().invoke(ctx)
             say(found, quiet=ctx.params.get("quiet", False), as_json=ctx.params.get("as_json", False))
+
+
+def _refuse_gone(words: list[str]) -> None:
+    """End the command if one of ``words`` is in `GONE`."""
+    for word in words:
+        name = word.partition("=")[0]
+        if name in GONE:
+            fail(BAD_INPUT, f"{name}: gone; {GONE[name]}")
 
 
 def console_for(*, silent: bool) -> Console:

@@ -65,10 +65,6 @@ def run(
             help="Largest relative error of motion, contact times and impulses; picks scheme and steps.",
         ),
     ] = None,
-    mesh: Annotated[
-        bool,
-        typer.Option("--mesh", help="With --accuracy: refine the mesh too, until two meshes agree."),
-    ] = False,
     checkpoint: Annotated[
         float | None,
         typer.Option(
@@ -99,7 +95,7 @@ def run(
     _refuse_options(what, checkpoint, interval)
     for line in () if quiet or as_json else implausible(what):
         typer.echo(f"warning: {line}", err=True)
-    made = picked(what, mesh)
+    made = picked(what)
     what = what if made is None else made.scene
     default = Path("results") / Path(scene).stem
     if out is None and not force:
@@ -124,15 +120,15 @@ def _refuse_options(scene: Scene, checkpoint: float | None, interval: float | No
         fail(BAD_INPUT, f"--output-interval {interval:g}: {law}; {apart}")
 
 
-def picked(scene: Scene, mesh: bool = False) -> Trajectory | None:
-    """Return the run that keeps the accuracy asked for, of the ``mesh`` too; ``None`` if none is."""
-    if scene.accuracy is None and not mesh:
+def picked(scene: Scene) -> Trajectory | None:
+    """Return the run that keeps the accuracy asked for; ``None`` if none is."""
+    if scene.accuracy is None:
         return None
     from ..run.outcome import RunStopped
-    from ..studies.accuracy import pick, pick_mesh
+    from ..studies.accuracy import pick
 
     try:
-        return pick_mesh(scene) if mesh else pick(scene)
+        return pick(scene)
     except RunStopped as stopped:
         fail(STOPPED, f"a pilot run for accuracy = {scene.accuracy:g} {stopped}")
 
@@ -240,9 +236,6 @@ def _lines(summary: Mapping[str, Any]) -> Iterator[str]:
     if (found := summary.get("accuracy")) is not None:
         errors = ", ".join(f"{value:.1e} ({name})" for name, value in found["estimated_errors"].items())
         yield f"accuracy  {picked_in_words(found)}\n          errors at most {errors}"
-        if "estimated_mesh_error" in found:
-            mesh = f"{found['picked']['n_elements']} elements"
-            yield f"mesh      {mesh}: error {found['estimated_mesh_error']:.1e} beside the continuous beam"
     yield from (f"warning   {warning}" for warning in summary.get("warnings", ()))
 
 

@@ -1,7 +1,5 @@
 """An accuracy instead of a scheme, a macro step and tolerances: the macro step is halved until two runs agree.
 
-`pick_mesh` halves the elements too.
-
 The error is that of the coupling and the time integration, for the scene's own mesh and modes: these are the model.
 (Impacts on the foundation converge only slowly with the mesh, since what they meet is the mass of its tip.)
 What is compared, and what two runs that agree cannot know, is in ``docs/accuracy.md``.
@@ -24,7 +22,6 @@ from ..run.misplaced import HELD
 from ..run.outcome import Progress, RunStopped
 from ..scene import Scene, SceneError, with_changes
 from ..scene.resolution import STABLE, TURN, choice, joined_frequency, lasting_frequency, slow_oscillations
-from ..scene.tables import ALL_MODES_UP_TO
 from .metrics import motion_errors, worst
 
 #: Fewest and most macro steps of a run.
@@ -37,10 +34,6 @@ _SAFETY = 1.5
 _TOLERANCE = 1e-3
 #: Shares of the time from one row to the next, of either run, at which two runs are compared.
 _BETWEEN = np.arange(4.0) / 4.0
-#: Shares of the accuracy that the mesh may use, and the coupling and the time integration.
-_SHARE = 0.5
-#: Contacts shorter than this share of the run are not compared between meshes.
-_SHORT = 1e-3
 
 
 def simulate(
@@ -206,43 +199,3 @@ def _told(run: Trajectory, asked: float, errors: dict[str, float], pilots: list[
     warnings = [warning for warning in run.summary["warnings"] if CHANGED not in warning]
     resolved = not any(warning.startswith("not resolved") for warning in warnings)
     return replace(run, summary={**run.summary, "accuracy": accuracy, "warnings": warnings, "resolved": resolved})
-
-
-def pick_mesh(scene: Scene) -> Trajectory:
-    """Return a run of ``scene`` that keeps its ``accuracy`` beside the continuous beam.
-
-    The elements, and with them the modes kept, are doubled until two meshes agree. The finer one's error is their
-    difference over 2ᵖ − 1, p being the order that three meshes show, between 1 and 2.
-
-    Raises
-    ------
-    SceneError
-        If the scene asks for no accuracy, has no mesh, or the accuracy cannot be reached; the message says how far it
-        is.
-    RunStopped
-        If a run that does keep it stops early.
-    """
-    if scene.accuracy is None:
-        raise SceneError("accuracy: missing; the mesh is chosen to reach it")
-    if scene.beam is None or scene.massless:
-        raise SceneError("[beam]: the scene has no mesh to choose")
-    beam, asked = scene.beam, scene.accuracy
-    coarse: Trajectory | None = None
-    before: dict[str, float] = {}
-    error, factor = math.inf, 1
-    while beam.unknowns * factor <= ALL_MODES_UP_TO:
-        mesh = {"n_modes": factor * beam.n_modes, "n_elements": factor * beam.n_elements}
-        fine = pick(with_changes(scene, accuracy=_SHARE * asked, beam=mesh))
-        if coarse is not None:
-            before, errors = _estimated(coarse, fine, _SHORT, before)
-            error = max(errors["motion"], errors["times"])
-            if error <= _SHARE * asked:
-                found = fine.summary["accuracy"]
-                found |= {"asked": asked, "picked": {**found["picked"], **mesh}, "estimated_mesh_error": error}
-                return fine
-        coarse, factor = fine, 2 * factor
-    reached = f"{factor // 2 * beam.n_elements} elements still leave some {error:.1e}"
-    raise SceneError(
-        f"accuracy = {asked:g} with the mesh: not reached, {reached}; ask for less, shorten [time] t_end, or take "
-        "elements of a higher degree where the motion is smooth (springbeam converge shows what settles)"
-    )
