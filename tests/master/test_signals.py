@@ -1,4 +1,4 @@
-"""Formulas, shock spectra, power spectra and settled motion, beside closed forms and integrals."""
+"""Signals of a run, shock spectra, power spectra and settled motion, beside closed forms and integrals."""
 
 import sys
 
@@ -8,56 +8,54 @@ from runs import a_trajectory
 from scipy.integrate import quad
 
 from springbeam.scene import Load, SceneError
+from springbeam.signals.curves import signal
 from springbeam.signals.driven import repeating, response
-from springbeam.signals.expressions import Expression, function_of, signal
 from springbeam.signals.spectra import power_spectrum, shock_spectrum, spectra
 
-# -- formulas -----------------------------------------------------------------------------------------------------
+# -- columns and functions ------------------------------------------------------------------------------------------
 
 
-def test_a_formula_takes_columns_row_by_row():
+@pytest.fixture
+def mine(tmp_path, monkeypatch):
+    """Functions of the user, in the directory of the command."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.delitem(sys.modules, "functions_of_mine", raising=False)
+    (tmp_path / "functions_of_mine.py").write_text(
+        "import numpy as np\n"
+        "def distance(run): return np.hypot(run.u_tip, run.y)\n"
+        "def highest(run): return run.y.max()\n"
+        "def complex(run): return 1j * run.y\n"
+        "def infinite(run): return np.where(run.time > 0.0, run.y, np.inf)\n"
+        "def absent(run): return run['speed']\n"
+        "CONSTANT = 3.0\n"
+    )
+
+
+def test_a_signal_is_a_column_or_a_function_found_in_the_directory_of_the_command(mine):
     run = a_trajectory()
-    found = signal(run, "sqrt(u_tip**2 + y**2) - 2*abs(z)")
-    assert np.array_equal(found, np.sqrt(run.u_tip**2 + run.y**2) - 2.0 * np.abs(run.z))
+    assert np.array_equal(signal(run, "u_tip"), run.u_tip)
+    assert np.array_equal(signal(run, "functions_of_mine:distance"), np.hypot(run.u_tip, run.y))
 
 
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("u_tip +", "not a formula: invalid syntax"),
-        ("speed * 2", "speed is unknown; there are time, u_tip"),
-        ("phase", "phase is unknown"),
-        ("max(u_tip)", "gives no number for each of the 400 rows"),
-        ("1j*u_tip", "gives no number for each of the 400 rows"),
-        ("1/(time-time)", "is not finite at t = 0.0 s"),
-        ("sqrt(0*u_tip - 1)", "is not finite"),
-        ("u_tip.__class__", "no safe attribute"),
-        ("open('/etc/hostname')", "open is unknown"),
-        ("[u for u in u_tip]", "unknown|not supported"),
-        ("u_tip if time else y", "truth value|ambiguous|If"),
+        ("speed", "speed: is unknown; allowed: time, u_tip"),
+        ("a_tip/g", "a_tip/g: is unknown; .*or your own, module:function"),
+        ("phase", "phase: is unknown"),
+        ("functions_of_mine:highest", "gives no number for each of the 400 rows"),
+        ("functions_of_mine:complex", "gives no number for each of the 400 rows"),
+        ("functions_of_mine:infinite", "is not finite at t = 0.0 s"),
+        ("functions_of_mine:absent", "functions_of_mine:absent: KeyError: .*speed"),
+        ("functions_of_mine:CONSTANT", "is a float, not a function"),
+        ("nothing.here:f", "nothing.here:f: ModuleNotFoundError: No module named 'nothing'"),
+        ("math:nothing", "math:nothing: AttributeError"),
     ],
 )
-def test_what_is_no_formula_of_columns_is_refused_with_the_reason(text, why):
+def test_what_is_no_signal_is_refused_with_the_reason(mine, text, why):
     with pytest.raises(SceneError, match=why):
         signal(a_trajectory(), text)
-
-
-def test_a_formula_whose_part_did_not_happen_has_no_value():
-    assert Expression("2*rebound")({"rebound": None}.get) is None
-    assert Expression("2*rebound")({"rebound": 3.0}.get) == 6.0
-
-
-@pytest.mark.parametrize("text", ["nothing.here:f", "math:nothing", "math:pi"])
-def test_a_function_that_is_not_there_is_refused(text):
-    with pytest.raises(SceneError, match=text):
-        function_of(text)
-
-
-def test_a_function_is_found_in_the_directory_of_the_command(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    (tmp_path / "metrics_of_mine.py").write_text("def twice(run): return 2 * run")
-    assert function_of("metrics_of_mine:twice")(3.0) == 6.0
 
 
 @pytest.mark.parametrize(("count", "found"), [(31, (6, 3)), (30, None)])

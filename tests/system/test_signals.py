@@ -91,28 +91,44 @@ def test_bouncing_has_no_end_where_the_run_ends_apart():
     assert "bounce_time" not in run.summary
 
 
+# Functions of the user.
+
+
 def spread(run):
     return run.y.max() - run.y.min()
 
 
-def test_a_metric_of_ones_own_is_a_column_of_a_sweep(monkeypatch):
+def highest_in_space(run):
+    return np.abs(run["a_y"] + run["load_0"]).max()
+
+
+def tip_in_g(run):
+    return run["a_tip"] / 9.80665
+
+
+def twice(run):
+    return 2.0 * run.y
+
+
+@pytest.fixture
+def importable(monkeypatch):
     monkeypatch.syspath_prepend(__file__.rpartition("/")[0])
-    metrics = ("y_max", "low=min(y)*1e3", "spread=test_signals:spread", "ratio=y_max/max_z", "g=max(abs(a_y))/g")
+
+
+def test_a_metric_of_ones_own_is_a_column_of_a_sweep(importable):
+    metrics = ("y_max", "y_min", "spread=test_signals:spread")
     study = Sweep(scene=oscillator(t_end=0.5), vary=("spring.mass=0.1,0.2",), metric=metrics)
     for row in record_all(study).values():
         assert row["status"] == "done"
-        assert row["spread"] == pytest.approx(row["y_max"] - row["low"] / 1e3, rel=1e-3)
-        assert row["ratio"] > 0.0
-    run = simulate(oscillator(t_end=0.5))
-    assert row["g"] == pytest.approx(np.abs(run.a_y).max() / 9.80665, rel=1e-12)
+        assert row["spread"] == pytest.approx(row["y_max"] - row["y_min"], rel=1e-3)
 
 
 def test_a_rigid_impact_leaves_no_peak_of_an_acceleration():
-    metrics = ("max_a_tip", "p=max_a_y/g", "q=max(abs(a_y))", "max_v_tip")
+    metrics = ("max_a_tip", "max_a_y", "max_v_tip")
     study = Sweep(scene=load_scene("soft", ["time.t_end=0.05"]), vary=("spring.mass=1,2",), metric=metrics)
     records = record_all(study)
     for row in records.values():
-        assert (row["max_a_tip"], row["p"], row["q"]) == (None, None, None)
+        assert (row["max_a_tip"], row["max_a_y"]) == (None, None)
         assert row["max_v_tip"] > 0.0
         jumps = dict(re.findall(r"(a_\w+) has no peak: a rigid impact changes \w+ by (\S+) m/s", row["warnings"]))
         assert float(jumps["a_tip"]) == pytest.approx(0.99, abs=0.01)  # of 1 m/s, which the inertia of the spring takes
@@ -124,11 +140,11 @@ def test_a_rigid_impact_leaves_no_peak_of_an_acceleration():
     assert all(row["max_a_tip"] > 0.0 and row["warnings"] == "" for row in record_all(soft).values())
 
 
-def test_a_formula_that_gives_no_number_spoils_its_row_only():
-    study = Sweep(scene=oscillator(t_end=0.1), vary=("spring.mass=0.1,0.2",), metric=("a=y*2",))
+def test_a_function_that_gives_no_number_spoils_its_row_only(importable):
+    study = Sweep(scene=oscillator(t_end=0.1), vary=("spring.mass=0.1,0.2",), metric=("a=test_signals:twice",))
     for row in record_all(study).values():
         assert row["status"] == "refused"
-        assert "--metric a=y*2: gives 5" in row["error"]
+        assert "--metric a=test_signals:twice: gives 5" in row["error"]
 
 
 def pulsed(**more):
@@ -138,12 +154,17 @@ def pulsed(**more):
 
 
 @pytest.mark.parametrize(("signal", "more"), [("half_sine", {}), ("sawtooth", {}), ("trapezoid", {"rise": 1e-3})])
-def test_the_damage_boundary_of_an_oscillator_is_that_of_its_shock_spectrum(signal, more, unpainted, tmp_path):
+def test_the_damage_boundary_of_an_oscillator_is_that_of_its_shock_spectrum(
+    signal, more, unpainted, importable, tmp_path
+):
     """The critical peak is limit over the spectrum of a pulse of peak 1; a short one counts by its velocity change."""
     limit, durations = 80.0, (0.004, 0.03, 0.1)
     vary = ("loads.0.amplitude=50,200,2000", f"loads.0.duration={','.join(map(str, durations))}")
     study = Sweep(
-        scene=pulsed(signal=signal, **more), vary=vary, metric=("a=max(abs(a_y+load_0))",), boundary=f"a={limit}"
+        scene=pulsed(signal=signal, **more),
+        vary=vary,
+        metric=("a=test_signals:highest_in_space",),
+        boundary=f"a={limit}",
     )
     records = record_all(study)
     findings = study.findings(records).written(tmp_path, pictures=True)
@@ -216,7 +237,7 @@ def test_a_rigid_impact_has_no_peak_acceleration_and_a_soft_one_has():
     rigid = spectra(run)
     assert rigid.jumps["tip"] > 0.1
     assert any("there is no peak acceleration" in words for _, words in rigid.in_words())
-    of_tip = spectra(run, of=["a_tip/g"])
+    of_tip = spectra(run, of=["a_tip"])
     assert any("of what lies between the impacts: a_tip has no peak" in words for _, words in of_tip.in_words())
     soft = spectra(simulate(load_scene("pulse", ["time.t_end=0.02"])))
     assert soft.jumps == {"tip": 0.0, "spring": 0.0}
@@ -254,12 +275,12 @@ def test_up_and_down_are_different_motions_of_a_hardening_spring():
     assert (up.way, down.way) == ("up", "down")
 
 
-def test_the_command_writes_tables_and_says_what_they_show(here):
+def test_the_command_writes_tables_and_says_what_they_show(here, importable):
     printed("run", "vibro-impact", "--no-plots", "--quiet", "--out", "shaken")
-    shown = printed("spectrum", "shaken", "--of", "a_tip/g", "--quality", "25")
+    shown = printed("spectrum", "shaken", "--of", "test_signals:tip_in_g", "--quality", "25")
     assert "periodic from 0.15" in shown
     assert "2 of the" in shown
-    told = json.loads(printed("spectrum", "shaken", "--of", "a_tip/g", "--json", "--no-plots"))
+    told = json.loads(printed("spectrum", "shaken", "--of", "test_signals:tip_in_g", "--json", "--no-plots"))
     assert told["settled"]["multiple"] == 2
     with open("shaken-spectrum/shock-tip.csv", newline="") as file:
         rows = list(csv.DictReader(file))

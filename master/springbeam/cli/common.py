@@ -75,7 +75,7 @@ MeasuredArgument = Annotated[
 ]
 MapOption = Annotated[
     list[str] | None,
-    typer.Option("--map", metavar="NAME=COLUMN", help="Which column or formula of a run a measured one is."),
+    typer.Option("--map", metavar="NAME=COLUMN", help="Which column of a run, or module:function, a measured one is."),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document, and nothing else, on stdout.")]
 QuietOption = Annotated[

@@ -169,7 +169,6 @@ def _beside_one_another(names: list[str], runs: list[Trajectory]) -> Findings:
 
 def _beside_measured(run: Trajectory, file: Path, names: list[str], shift: float | None) -> Findings:
     """Compare a run with measured curves."""
-    from ..signals.expressions import Expression
     from ..signals.measured import model, read_measured, residuals, time_shift
     from ..signals.spectra import without_peak
     from ..studies.fit import mapping
@@ -186,8 +185,11 @@ def _beside_measured(run: Trajectory, file: Path, names: list[str], shift: float
         diagrams.append(Diagram("time t [s]", name, points, log=False, dots=("measured",)))
     columns = ("curve", "points:", "rms:.4g", "of its spread:.2%", "largest:.4g", "at t [s]:.6g")
     by_what = ", found by correlation" * (shift is None)
-    taken = [column for name in measured.values for column in Expression(name).names]
-    shown = [table(columns, found), f"shift     {moved:.6g} s{by_what}", *filter(None, [without_peak(run, taken)])]
+    shown = [
+        table(columns, found),
+        f"shift     {moved:.6g} s{by_what}",
+        *filter(None, [without_peak(run, measured.values)]),
+    ]
     document = {"shift": moved, "residuals": [row._asdict() for row in found]}
     draw = partial(draw_diagrams, diagrams, "", (8.2, 2.2), wide=1)
     return Findings(document, shown, pictures={"comparison": draw})
@@ -233,8 +235,8 @@ def spectrum(
         list[str] | None,
         typer.Option(
             "--of",
-            metavar="FORMULA",
-            help="Column or formula whose power is wanted, as a_tip or 'a_tip/g'; may be repeated.",
+            metavar="COLUMN",
+            help="Column whose power is wanted, as a_tip, or module:function of the run; may be repeated.",
         ),
     ] = None,
     low: Annotated[float | None, typer.Option("--low", metavar="HZ", help="Lowest oscillator of the shock.")] = None,
@@ -272,7 +274,7 @@ def spectrum(
         columns[f"power-{what if what.isidentifier() else number}"] = power._asdict()
     swept = {(what, chirp.load): chirp for what, several in found.responses.items() for chirp in several}
     for (what, load), chirp in swept.items():
-        name = f"response-{what if what.isidentifier() else 'formula'}-load-{load}"
+        name = f"response-{what if what.isidentifier() else 'function'}-load-{load}"
         columns[name] = {"frequency": chirp.frequency, "amplitude": chirp.amplitude}
     if found.points is not None:
         times, points = found.points

@@ -160,8 +160,8 @@ MetricOption = Annotated[
     list[str] | None,
     typer.Option(
         "--metric",
-        metavar="NAME[=FORMULA]",
-        help="A metric of each run (springbeam keys --metrics), or a formula, a='max(a_tip)/g'; may be repeated.",
+        metavar="NAME[=MODULE:FUNCTION]",
+        help="A metric of each run (springbeam keys --metrics), or a Python function of it; may be repeated.",
     ),
 ]
 QuickOption = Annotated[bool, typer.Option("--quick", help="A smaller study, for a first look.")]

@@ -14,7 +14,7 @@ import numpy as np
 from ..results.dense import at_multiples
 from ..results.trajectory import Trajectory
 from ..scene import Load
-from .expressions import signal
+from .curves import signal
 
 #: A motion has settled where its points repeat themselves within this share of the range of the motion …
 _ALIKE = 0.01
@@ -124,7 +124,7 @@ class Response(NamedTuple):
 
 
 def responses(run: Trajectory, what: str) -> list[Response]:
-    """Return the response of a column, or of a formula of columns, to each chirp of the run."""
+    """Return the response of a column, or of a function of the run, to each chirp of the run."""
     chirps = [number for number, load in enumerate(run.scene.loads) if load.signal == "chirp"]
     values = signal(run, what)
     return [response(number, run.scene.loads[number], run.time, values) for number in chirps]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -15,17 +14,17 @@ from ..results.dense import rows_at
 from ..results.trajectory import Trajectory, columns_of
 from ..scene import Scene, SceneError
 from ..scene.recorded import Recorded
-from .expressions import Expression, signal
+from .curves import check, signal
 
 #: Most samples of a correlation.
 _MOST = 200_000
 
 
 class Measured(NamedTuple):
-    """Measured curves: each belongs to a column of a run, or to a formula of columns."""
+    """Measured curves: each belongs to a column of a run, or to a function of it."""
 
     time: np.ndarray  #: [s], shape (n,)
-    values: dict[str, np.ndarray]  #: by column or formula, in its unit, shapes (n,)
+    values: dict[str, np.ndarray]  #: by column, in its unit, or function, shapes (n,)
 
     def covered(self, run: Trajectory, shift: float = 0.0, margin: float = 0.0) -> np.ndarray:
         """Return which points lie in the run, shape (n,), if the clock is moved by ``shift`` [s].
@@ -58,8 +57,8 @@ def read_measured(path: str | Path, scene: Scene, names: Mapping[str, str] | Non
     scene
         Says which columns a run has, and their units.
     names
-        The column or formula of a run by that of the file, e.g. ``{"CH1": "a_tip + load_0"}``. Without any, columns
-        that are called as those of a run belong to these. Others are left out.
+        The column of a run, or ``module:function`` of it, by the column of the file, e.g. ``{"CH1": "a_tip"}``.
+        Without any, columns that are called as those of a run belong to these. Others are left out.
 
     Raises SceneError, which names file, line and column, and what would be allowed.
     """
@@ -85,19 +84,12 @@ def _read(file: Recorded, units: Mapping[str, str], names: Mapping[str, str]) ->
         )
     values = {}
     for name, what in wanted.items():
-        Expression(what).check(column for column in units if column != "phase")
+        check(what, units)
         k = 1 + there.index(name)
-        own = units[what] if what in units else _unit_of(what, units) if file.units[k] else ""
-        values[what] = file.column(k, own)
+        if what not in units and file.units[k]:
+            raise ValueError(f"{what}: a function has no unit; give the measured column without one")
+        values[what] = file.column(k, units.get(what, ""))
     return Measured(file.times(), values)
-
-
-def _unit_of(formula: str, units: Mapping[str, str]) -> str:
-    """Return the unit of a sum of columns that all have the same one. Raises ValueError for another formula."""
-    found = {units.get(part, "") for part in re.sub(r"[()+-]", " ", formula).split()}
-    if len(found) != 1 or "" in found:
-        raise ValueError(f"{formula}: is no sum of columns of one unit; give the measured column without a unit")
-    return found.pop()
 
 
 def time_shift(run: Trajectory, measured: Measured) -> float:

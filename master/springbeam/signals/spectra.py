@@ -21,8 +21,8 @@ import numpy as np
 from ..results.dense import rows_at
 from ..results.trajectory import Trajectory
 from ..scene import SceneError
+from .curves import signal
 from .driven import Response, Settled, drive_of, poincare, responses, settled
-from .expressions import Expression, signal
 
 #: Most samples that are taken of a run.
 MOST = 4_000_000
@@ -42,7 +42,7 @@ _STEPS, _PERIODS = 20.0, 1.0
 def sampled(
     run: Trajectory, what: str, step: float | None = None, since: float | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return equal steps of time from ``since`` [s] on, and a column of ``run``, or a formula of columns, at these.
+    """Return equal steps of time from ``since`` [s] on, and a column of ``run``, or a function of it, at these.
 
     They are ``step`` [s] long; without that there are as many as rows. Values lie on the curve of the run between its
     rows (`springbeam.Trajectory.at`). Raises SceneError where there is nothing to sample.
@@ -73,7 +73,7 @@ class PowerSpectrum(NamedTuple):
 
 
 def power_spectrum(run: Trajectory, what: str, since: float | None = None, segments: int = 1) -> PowerSpectrum:
-    """Return the spectrum of a column, or of a formula of columns, without its mean.
+    """Return the spectrum of a column, or of a function of the run, without its mean.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def spectra(
     Parameters
     ----------
     of
-        Columns, or formulas of columns, whose power is asked for; without any, tip and spring top.
+        Columns, or functions of the run, whose power is asked for; without any, tip and spring top.
     low, high
         Frequencies of the shock spectra [Hz]; from one period in the run to a period of 20 mean steps.
     quality
@@ -259,7 +259,7 @@ def spectra(
         shock={end: shock_of_run(run, end, frequencies, quality) for end in ends_of(run)},
         jumps={end: largest_jump(run, column) for end, column in ends_of(run).items()},
         power={what: power_spectrum(run, what, begin, segments) for what in wanted},
-        without_peak={what: why for what in wanted if (why := without_peak(run, Expression(what).names))},
+        without_peak={what: why for what in wanted if (why := without_peak(run, [what]))},
         responses={what: found for what in wanted if (found := responses(run, what))},
         points=poincare(run, 1.0 / drive.frequency, drive.start) if drive and drive.frequency else None,
         settled=tail,

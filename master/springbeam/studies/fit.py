@@ -21,7 +21,7 @@ from scipy.stats import t as student
 from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, key_kind
 from ..scene.scene import split_key
-from ..signals.expressions import signal
+from ..signals.curves import signal
 from ..signals.measured import Measured, read_measured, time_shifts
 from .accuracy import simulate
 from .design import design, parse_axis

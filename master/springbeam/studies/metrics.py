@@ -1,7 +1,6 @@
 """Metrics: numbers that studies keep of a run, with its cost and its errors beside a reference.
 
-A metric is named: one of `METRICS`, or one's own, ``NAME=FORMULA`` (of columns and metrics) or
-``NAME=module:function`` (of the run).
+A metric is named: one of `METRICS`, or one's own, ``NAME=module:function``, a Python function of the run.
 """
 
 from __future__ import annotations
@@ -169,7 +168,7 @@ def metrics_of(texts: Sequence[str], *, several: bool = False) -> dict[str, Metr
         if name not in METRICS and not (separator and name.isidentifier()):
             raise SceneError(
                 f"--metric {text}: unknown; {nearest(text, METRICS)}allowed: {', '.join(METRICS)}, and your own, as in "
-                "'shock=max(abs(a_tip))/9.81' or 'shock=module:function'"
+                "shock=module:function"
             )
         found[name] = METRICS[name] if name in METRICS else _own(name, what)
         if found[name].several and not several:
@@ -178,27 +177,24 @@ def metrics_of(texts: Sequence[str], *, several: bool = False) -> dict[str, Metr
 
 
 def _own(name: str, what: str) -> Metric:
-    from ..signals.expressions import Expression, function_of
+    from ..signals.curves import function_of
 
     function = function_of(what)
-    formula = None if function is not None else Expression(what)
-    if formula is not None:
-        formula.check([*_UNITS, "time", *METRICS, *(name for name in formula.names if name.startswith("load_"))])
+    if function is None:
+        raise SceneError(
+            f"--metric {name}={what}: must be module:function, a Python function of the run that returns one number; "
+            "formulas are not read"
+        )
 
     def of(run: Trajectory) -> float | None:
-        def look_up(part: str) -> Any:
-            return run[part] if part in run.columns else METRICS[part](run) if part in METRICS else None
-
-        found = function(run) if function is not None else formula(look_up) if formula is not None else None
+        found = function(run)
         if found is None:
             return None
-        if np.size(found) != 1 or not np.isreal(found):
-            raise SceneError(f"--metric {name}={what}: gives {np.size(found)} values; a metric is one number")
+        if np.size(found) != 1 or not np.isrealobj(found):
+            raise SceneError(f"--metric {name}={what}: gives {np.size(found)} values; a metric is one real number")
         return float(np.asarray(found, dtype=float).item())
 
-    parts = () if formula is None else formula.names
-    takes = (column for part in parts for column in (METRICS[part].takes if part in METRICS else (part,)))
-    return Metric("", what, of, takes=tuple(takes))
+    return Metric("", what, of)
 
 
 def costs(run: Trajectory) -> dict[str, int]:

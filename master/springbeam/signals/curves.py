@@ -1,0 +1,74 @@
+"""Curves and numbers of a run by name: a column, or ``module:function``, a Python function of the run."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Callable, Iterable
+from pkgutil import resolve_name
+from typing import Any
+
+import numpy as np
+
+from ..results.trajectory import Trajectory
+from ..scene import SceneError
+from ..scene.messages import nearest
+
+#: ``package.module:function``
+_FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
+
+
+def check(text: str, columns: Iterable[str]) -> None:
+    """Raise SceneError if ``text`` is neither one of ``columns`` nor a function."""
+    names = [name for name in columns if name != "phase"]
+    if text not in names and function_of(text) is None:
+        raise SceneError(
+            f"{text}: is unknown; {nearest(text, names)}allowed: {', '.join(names)}, or your own, module:function"
+        )
+
+
+def signal(run: Trajectory, text: str) -> np.ndarray:
+    """Return a column of ``run``, or what a function makes of it, row by row.
+
+    Raises SceneError for what is neither, or gives no number a row.
+    """
+    check(text, run.columns)
+    function = function_of(text)
+    found = run[text] if function is None else function(run)
+    values = np.asarray(found, dtype=float) if np.isrealobj(found) else np.empty(0)
+    if values.shape != (len(run),):
+        raise SceneError(f"{text}: gives no number for each of the {len(run)} rows")
+    if not np.isfinite(values).all():
+        raise SceneError(f"{text}: is not finite at t = {run.time[~np.isfinite(values)][0]!s} s")
+    return values
+
+
+def function_of(text: str) -> Callable[[Trajectory], Any] | None:
+    """Return the Python function that ``module:name`` means, ``None`` if ``text`` is nothing of the kind.
+
+    The directory of the command counts as a place of modules. Raises SceneError if there is none; so does the
+    function where it fails.
+    """
+    if _FUNCTION.fullmatch(text) is None:
+        return None
+    if (here := os.getcwd()) not in sys.path:
+        sys.path.append(here)
+    try:
+        found: Any = resolve_name(text)
+    except Exception as error:
+        raise SceneError(f"{text}: {_in_words(error)}") from error
+    if not callable(found):
+        raise SceneError(f"{text}: is a {type(found).__name__}, not a function of a run")
+
+    def guarded(run: Trajectory) -> Any:
+        try:
+            return found(run)
+        except Exception as error:
+            raise SceneError(f"{text}: {_in_words(error)}") from error
+
+    return guarded
+
+
+def _in_words(error: Exception) -> str:
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"
