@@ -7,7 +7,8 @@ import statistics
 from dataclasses import dataclass
 from time import process_time
 
-from springbeam.monolithic import algorithm1, event_driven
+from springbeam.monolithic import event_driven
+from springbeam.paper import monolithic
 from springbeam.run import runner
 from springbeam.studies import rivals
 
@@ -18,7 +19,7 @@ class _Clock:
 
 # What runs report as their wall time.
 runner.perf_counter = rivals.perf_counter = process_time
-algorithm1.clock = event_driven.clock = _Clock
+monolithic.clock = event_driven.clock = _Clock
 
 
 @dataclass(frozen=True)

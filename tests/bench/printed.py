@@ -1,6 +1,6 @@
 """Algorithm 1 as printed, from first contact on each of its linear systems handed to `scipy.sparse.linalg.spsolve`.
 
-`springbeam.monolithic.algorithm1` gets the same numbers from one solution a step with factors made once, because (62)
+`springbeam.paper.monolithic` gets the same numbers from one solution a step with factors made once, because (62)
 is nonlinear at the tip alone.
 """
 
@@ -9,17 +9,17 @@ from functools import partial
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from springbeam.monolithic import algorithm1
+from springbeam.paper import monolithic
 
 
 def simulate(scene):
-    """Run Algorithm 1 as printed; arguments are the defaults of `springbeam.monolithic.algorithm1.simulate`."""
-    algorithm = _AsPrinted(scene, "equation")
+    """Run Algorithm 1 as printed; arguments are the defaults of `springbeam.paper.monolithic.simulate`."""
+    algorithm = _AsPrinted(scene)
     algorithm.run()
     return algorithm.trajectory()
 
 
-class _AsPrinted(algorithm1._Algorithm):
+class _AsPrinted(monolithic._Algorithm):
     def _set_step(self, h):
         super()._set_step(h)
         d, alpha = self.discrete, self.beam.alpha_b

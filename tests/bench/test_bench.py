@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from springbeam import load_scene, with_changes
-from springbeam.monolithic import algorithm1
+from springbeam.paper import monolithic
 
 HERE = Path(__file__).parent
 PAGE = HERE.parents[1] / "docs" / "performance.md"
@@ -31,10 +31,8 @@ def test_every_group_runs(group, fmu_folder, monkeypatch, capsys):
 def test_algorithm_1_as_printed_has_the_same_numbers(monkeypatch):
     monkeypatch.syspath_prepend(HERE)
     printed = importlib.import_module("printed")
-    scene = with_changes(
-        load_scene("paper-fig2"), beam={"n_elements": 40}, contact={"law": "paper"}, time={"t_end": 0.7}
-    )
-    ours, theirs = algorithm1.simulate(scene), printed.simulate(scene)
+    scene = with_changes(load_scene("paper-fig2"), beam={"n_elements": 40}, time={"t_end": 0.7})
+    ours, theirs = monolithic.simulate(scene), printed.simulate(scene)
     for name in ("u_tip", "v_tip", "y", "contact_force"):
         scale = abs(ours[name]).max()
         assert abs(ours[name] - theirs[name]).max() <= 1e-10 * scale, name

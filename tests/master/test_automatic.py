@@ -100,10 +100,8 @@ def test_unresolved_motion_gets_degree_0(turn, expected):
     [
         ({"coupling": {"relative_tolerance": 1e-4}}, ("hermite", 2)),
         # Where hermite is not defined it is not taken.
-        ({"contact": {"law": "paper"}}, ("energy", 0)),
         ({"beam": {"integrator": "midpoint"}}, ("energy", 0)),
         ({"beam": {"fidelity": "quasi_static"}}, ("energy", 2)),
-        ({"contact": {"impact": "rest"}, "coupling": {"macro_step": 1e-6}}, ("energy", 2)),
         ({"coupling": {"macro_step": 1e-6}}, ("hermite", 2)),
     ],
 )

@@ -1,6 +1,5 @@
-"""The references: what the paper reports of Algorithm 1, exact solutions, extended precision, and scipy."""
+"""The references: exact solutions, extended precision, and scipy."""
 
-from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +8,7 @@ from references import dips, integrated_anew
 from scenes import kinds, soft
 from scipy.integrate import quad
 
-from springbeam.monolithic import algorithm1, event_driven
+from springbeam.monolithic import event_driven
 from springbeam.monolithic.event_driven import first_event
 from springbeam.monolithic.exponential import Segment
 from springbeam.monolithic.laws import Phase, Watch
@@ -24,64 +23,6 @@ from springbeam.studies.verify.alone import clamped_free_frequencies
 def linear(**tables):
     """Return the scene of `soft` with a linear spring."""
     return soft(**{**tables, "spring": {"cubic_stiffness": 0.0, **tables.get("spring", {})}})
-
-
-# -- Algorithm 1 ----------------------------------------------------------------------------------------------------
-
-
-def figure(number):
-    return load_scene(f"paper-fig{number}", ['contact.law="paper"'])
-
-
-@cache
-def printed(number):
-    return algorithm1.simulate(figure(number))
-
-
-def small(**tables):
-    """A soft beam whose tip does reach the foundation, resolved in time."""
-    return soft(10, contact={"law": "paper", "impact": "tip", **tables.pop("contact", {})}, **tables)
-
-
-@pytest.mark.parametrize(("number", "reported", "with_this_reading"), [(2, 1.990, 1.998), (4, 2.000, 1.999)])
-def test_algorithm_1_has_the_iterations_of_table_2_and_a_tip_that_flips(number, reported, with_this_reading):
-    """Section 6: "the beams move up and down almost the same speed at each time step" (ω₁h = 967).
-
-    f_b = (0, …, 0, −6) of the next figure bends the tip by 6 h_x/3 × its compliance 4/(3κ) ≈ 7e-14 m: nothing to see.
-    """
-    run, loaded = printed(number), printed(number + 1)
-    assert run.summary["newton"]["spring"] == pytest.approx(with_this_reading, abs=6e-4)
-    assert run.summary["newton"]["spring"] == pytest.approx(reported, abs=0.01)
-    v = run.v_tip
-    assert (run.time[0], len(run)) == (0.5, 876)
-    np.testing.assert_allclose(v[:5], [-1.0, 1.0, -1.0, 1.0, -1.0], atol=2e-4)
-    assert np.mean(v[1:] * v[:-1] < 0.0) > 0.99
-    assert np.max(np.abs(run.u_tip)) < 4.4e-6
-    assert run.summary["steps_apart"] == {2: 0, 4: 1}[number]
-    assert loaded.summary["newton"]["spring"] == pytest.approx(run.summary["newton"]["spring"], abs=1e-12)
-    assert 0.0 < np.max(np.abs(loaded.u_tip - run.u_tip)) < 2e-11
-    # Nothing in the model does the work of the tip that is overwritten: 75 % of the initial energy, ½∫x² dx.
-    assert run.e_total[0] == pytest.approx(1.0 / 6.0, rel=1e-12)
-    if number == 2:
-        assert np.max(run.energy_residual) == pytest.approx(0.1253, abs=2e-4)
-
-
-def test_other_readings_of_algorithm_1_are_other_algorithms():
-    guess = algorithm1.simulate(figure(2), y_temp="guess")
-    assert np.max(np.abs(guess.y)) == 0.0  # nothing ever reaches the spring
-    assert algorithm1.simulate(figure(2), y_temp="both").summary["steps_apart"] > 1
-    with pytest.raises(algorithm1.AlgorithmFailure) as failure:
-        algorithm1.simulate(with_changes(figure(4), contact={"impact": "tip"}))
-    assert np.max(failure.value.trajectory.e_total) > 1e9
-
-
-def test_what_algorithm_1_starts_with_and_does_not_have():
-    short = {"time": {"t_end": 4e-3}, "coupling": {"macro_step": 4e-3}}
-    for impact, expected in (("rest", 0.0), ("tip", -1.0), ("inelastic", 0.0)):
-        assert algorithm1.simulate(small(contact={"impact": impact}, **short)).z[0] == expected
-    for changes in ({"loads": [{"on": "tip", "amplitude": 1.0}]}, {"beam": {"fidelity": "quasi_static"}}):
-        with pytest.raises(ValueError, match=r"\[beam\] that is dynamic, and knows no"):
-            algorithm1.simulate(soft(**changes))
 
 
 # -- the event-driven reference: exact solutions --------------------------------------------------------------------
@@ -176,7 +117,6 @@ CASES = {
     ),
     "stiffer": soft(beam={"initial_deflection_slope": 0.02}, spring=LIFTED),
     "elastic": soft(beam={"initial_deflection_slope": 0.02, "approach": "elastic", "young_modulus": 10.0}),
-    "line 5": soft(contact={"impact": "tip"}),
     "modes": soft(40, beam={"n_modes": 6, "tip_load_coefficient": -6.0}),
     "unstable spring": soft(spring=UNSTABLE),
     "compliance": soft(contact={"law": "compliance", "exponent": 1.5}),
@@ -225,8 +165,6 @@ def test_each_phase_is_integrated_as_scipy_does(name, monkeypatch):
 @pytest.mark.parametrize(
     ("changes", "arguments", "message"),
     [
-        ({"contact": {"impact": "rest"}}, {}, "rigid tie"),
-        ({"contact": {"law": "paper"}}, {}, "know 'transmission', 'compliance'"),
         (
             {
                 "beam": {"fidelity": "quasi_static"},

@@ -66,9 +66,6 @@ GOOD = {
     "500 elements, all modes": changed(beam={"n_elements": 500}),
     "1000 elements, 64 modes": changed(beam={"n_elements": 1000, "n_modes": 64}),
     "1000 elements, midpoint": changed(beam={"n_elements": 1000, "integrator": "midpoint"}),
-    # Algorithm 1 brings its own integrator, so that a shipped scene need not be rewritten for it.
-    "paper on a modal scene": changed(contact={"law": "paper"}),
-    "paper on midpoint": changed(beam={"integrator": "midpoint"}, contact={"law": "paper"}),
     "hermite": changed(coupling={"scheme": "hermite", "degree": 2}),
     "no compliance part": changed(contact={"stiffness": 0.0}),
     "tie, ends at one height": changed(

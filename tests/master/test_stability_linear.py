@@ -162,7 +162,6 @@ def test_a_scene_is_told_by_the_numbers_of_hand_calculation():
 @pytest.mark.parametrize(
     ("changes", "note"),
     [
-        ({"contact": {"law": "paper"}}, "Algorithm 1 (law = 'paper') overwrites the tip's position"),
         ({"beam": {"fidelity": "quasi_static"}}, "a quasi-static beam has no inertia"),
         ({"beam": {"n_elements": 65}, "spring": None, "stop": None}, "predicted with the lowest 128 modes of the beam"),
     ],

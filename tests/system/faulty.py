@@ -12,7 +12,6 @@ from pathlib import Path
 from springbeam.bodies import fmu as fmus
 from springbeam.bodies import functions
 from springbeam.bodies.fmu import release
-from springbeam.coupling.algorithm_1 import Algorithm1
 from springbeam.run import detection
 from springbeam.run.master import Master
 from springbeam.run.stepping import Pair
@@ -175,7 +174,7 @@ def installed(monkeypatch, *faults):
     """The script of all FMUs loaded from now on; it follows where the master is.
 
     That is "start", the phase of the step attempted, "location" while an event is being located, "rollback" while
-    the bodies go back to the mark, "row" while a row is written; in Algorithm 1 "paper".
+    the bodies go back to the mark, "row" while a row is written.
     """
     script = Script(faults)
     release()  # what is kept would not be loaded
@@ -199,7 +198,6 @@ def installed(monkeypatch, *faults):
         (Pair, "rewind", "rollback"),
         (Master, "_record", "row"),
         (detection, "locate", "location"),
-        (Algorithm1, "solve", "paper"),
     ):
         watch(owner, name, lambda *_, where=where: where)
     return script

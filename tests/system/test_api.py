@@ -138,7 +138,6 @@ def test_a_body_need_not_tell_its_shape_or_energies():
         ({}, 1.0, TypeError, r"in place of the spring is a float, not a springbeam\.Body"),
         ({}, DuffingBody(-1.0), SceneError, r"of the spring: mass = -1\.0; give its end a mass of 0 or more"),
         ({"spring": None}, DuffingBody(), SceneError, r"\[spring\]: missing"),
-        ({"contact": {"law": "paper"}, "coupling": {"scheme": "energy", "degree": 0}}, mass(), SceneError, "paper"),
         ({"coupling": {"scheme": "auto", "degree": 0}}, mass(), SceneError, 'coupling.scheme = "auto"'),
         (
             {"beam": {"fidelity": "quasi_static"}, "coupling": {"scheme": "energy"}},

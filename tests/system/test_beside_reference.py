@@ -87,10 +87,6 @@ CASES = {
     "meets a seated spring": (
         OURS, named("meets a seated spring"), {"within": ["seated", "impact", "stop_impact"], "motion": 1e-9}
     ),
-    "meets a seated spring, tip": (
-        OURS, with_changes(named("meets a seated spring"), contact={"impact": "tip"}),
-        {"within": ["seated", "impact", "stop_impact"], "motion": 1e-9},
-    ),
     "past the hilltop": (OURS, named("past the hilltop"), {"motion": 1e-11}),
     "grazing": (OURS, named("grazing"), {"motion": 5e-3}),
     "struck twice in a step": (OURS, named("struck twice in a step"), {"motion": 1e-10}),  # 4e-2 by its end only

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 import tomli_w
 from commands import command, printed
-from scenes import kinds
 
-from springbeam import load_scene, simulate, with_changes
-from springbeam.monolithic import algorithm1, event_driven
+from springbeam import load_scene, with_changes
+from springbeam.monolithic import event_driven
 from springbeam.studies.comparison import _judged, compare
 from springbeam.studies.crosscheck import Crosscheck, Orders
 from springbeam.studies.study import record_all
@@ -119,30 +118,6 @@ def test_a_wrong_reference_fails(monkeypatch, what):
     assert compare(with_changes(SOFT, time={"t_end": 0.1}, coupling=coupling))["verdict"] == "differs"
 
 
-@pytest.mark.parametrize(
-    ("t_end", "steps", "impact"),
-    [
-        (0.5035, 1, "inelastic"),
-        (0.7, 50, "inelastic"),
-        (0.7013, 51, "inelastic"),
-        (0.7 + 1e-10, 50, "inelastic"),
-        (1.0, 125, "rest"),
-    ],
-)
-def test_the_paper_law_agrees_with_algorithm_1_up_to_t_end(t_end, steps, impact):
-    """First contact is at 0.5 s, h_t = 4 ms: off the grid the last step is shorter, by itself it was left out.
-
-    A remainder that would drown in rounding joins the step before it.
-    """
-    changes = {"beam": {"n_elements": 50, "n_modes": 0}, "time": {"t_end": t_end}}
-    law = {"law": "paper", "impact": impact}
-    report = compare(with_changes(load_scene("paper-fig2"), contact=law, **changes))
-    for run in report["runs"].values():
-        assert (len(run["columns"]["time"]) - 1, run["columns"]["time"][-1]) == (steps, t_end)
-    assert report["horizon"] == t_end
-    assert report["verdict"] == "agrees"
-
-
 def test_quick_compares_the_first_quarter_and_leaves_the_last_halving_out(here, unpainted):
     changes = ("time.t_end=0.2", "beam.n_elements=6", "coupling.macro_step=1e-3")
     settings = [*(f"--set={change}" for change in changes), "--quick", "--json"]
@@ -170,64 +145,6 @@ def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
         monkeypatch.setattr(event_driven, "simulate", lambda scene, **more: right(with_changes(scene, **wrong), **more))  # noqa: B023
         assert command(*arguments, *options).exit_code == code
     assert (out / "crosscheck.png").stat().st_size > 10_000
-
-
-def resolved(**tables):
-    """A heavy spring on a stiff foundation under a beam that comes down on it, in steps that resolve both."""
-    beam = {"young_modulus": 1e3, "shear_modulus": 1e3, "n_elements": 4, "approach": "elastic"}
-    spring = {"mass": 100.0, "linear_stiffness": 7e3, "cubic_stiffness": 4e8, "damping": 100.0, "external_force": -9.0}
-    given = {"contact": {"law": "paper", "stiffness": 500.0}, "coupling": {"macro_step": 1e-3}}
-    moving = {"initial_velocity_slope": -0.1, "alpha_b": 1e-3}
-    return with_changes(with_changes(SOFT, beam={**beam, **moving}, spring=spring, **given), **tables)
-
-
-def test_algorithm_1_begins_in_contact_where_an_elastic_approach_begins_at_the_spring():
-    """Its reference let the beam move freely for a step first."""
-    scene = resolved(time={"t_end": 5e-3})
-    assert algorithm1.simulate(scene).phase[0] == "tied"
-    assert compare(scene)["verdict"] == "agrees"
-
-
-@pytest.mark.parametrize(
-    ("impact", "slope", "speed", "stop", "stiffness", "phases"),
-    [
-        ("tip", 0.0, -0.1, -0.015, 500.0, {"tied", "seated"}),
-        ("tip", 0.0, -0.1, -1e-4, 1e5, {"tied", "seated", "free"}),
-        ("rest", 0.0, 0.1, -0.015, 1e5, {"tied", "free"}),
-        ("rest", 2e-4, -0.1, -0.015, 1e5, {"free", "tied"}),
-    ],
-)
-def test_algorithm_1_decides_as_its_reference_does(impact, slope, speed, stop, stiffness, phases):
-    """In all its columns, up to a last step of 0.3 h; a spring sinks before the tip has come and after it has left.
-
-    The midpoint rule and the exact flow differ by (ωh)²/12 ≤ 9e-5 of a step's motion, over 6 steps; 3e-4 is allowed,
-    and more of energies, which grow tenfold in a step, and of which a dashpot takes that of the mean velocity.
-    """
-    contact = {"exponent": 1.0, "impact": impact, "stiffness": stiffness}
-    beam = {"initial_deflection_slope": slope, "initial_velocity_slope": speed}
-    spring = {"initial_velocity": -0.02 if slope else 0.0}
-    scene = resolved(time={"t_end": 5.3e-3}, contact=contact, beam=beam, spring=spring, stop={"position": stop})
-    run, reference = simulate(scene), algorithm1.simulate(scene)
-    assert (list(run.phase), run.summary["macro_steps"]) == (list(reference.phase), 6)
-    assert set(run.phase) == phases
-    assert kinds(run) == kinds(reference)
-    impulses = [[event.impulse_foundation for event in found.events] for found in (run, reference)]
-    assert impulses[0] == pytest.approx(impulses[1], abs=3e-4 * max(impulses[1]))
-    shares = dict.fromkeys(("u_tip", "v_tip", "y", "z", "contact_force", "compliance_force", "foundation_force"), 3e-4)
-    for name, share in (shares | {"e_beam": 3e-4, "energy_residual": 1e-3}).items():
-        largest = np.abs(reference[name]).max()
-        assert run[name] == pytest.approx(reference[name], abs=share * largest, rel=0.0), name
-    assert np.array_equal(run.contact_force_smoothed, run.contact_force)
-    for body, share in {"beam": 3e-4, "spring": 1e-3}.items():
-        injected = reference[f"e_injected_{body}"][-1]
-        assert run.summary[f"injected_into_{body}"] == pytest.approx(injected, rel=share, abs=1e-9)
-
-
-def test_a_reference_that_fails_is_one_error(tmp_path):
-    changes = ["contact.law=paper", "beam.n_elements=4", "coupling.macro_step=1e-3", "time.t_end=0.05"]
-    result = command("crosscheck", "soft", *(f"--set={change}" for change in changes), "--out", tmp_path / "out")
-    assert result.exit_code == 3
-    assert result.stderr.startswith("error: Newton's method for the predicted position does not converge at t = 0.0")
 
 
 def test_orders_are_those_of_the_scheme():

@@ -34,9 +34,6 @@ SCENES = {
     ),
     "beam": with_changes(SOFT, spring=None, stop=None),
     "spring": with_changes(SOFT, beam=None),
-    "paper": with_changes(
-        load_scene("paper-fig2"), time={"t_end": 0.6}, beam={"n_elements": 4, "n_modes": 0}, contact={"law": "paper"}
-    ),
 }
 VALUES = {
     "beam.n_elements": 3,
@@ -46,7 +43,6 @@ VALUES = {
     "beam.integrator": "midpoint",
     "beam.n_modes": 3,
     "stop.restitution": 0.25,
-    "contact.impact": "tip",
     "contact.stiffness": 2e3,
     "contact.exponent": 1.25,
     "contact.force_window": 3e-3,

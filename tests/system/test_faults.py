@@ -29,7 +29,6 @@ LAWS = {
     ),
     "compliance": ({"contact": COMPLIANCE}, ("free", "touch", "seated", "location")),
     "jacobi": ({"contact": COMPLIANCE, "coupling": {"scheme": "jacobi"}}, ("free", "touch", "seated")),
-    "paper": ({"contact": {"law": "paper"}, "beam": {"approach": "undeformed"}}, ("paper",)),
 }
 #: What halving one step changes at the end [m]: its error at H against that at H/2, of order 2 and 6 and none.
 HALVED = {"energy": 1e-5, "hermite": 1e-10, "compliance": 1e-5, "jacobi": 1e-4}
@@ -63,7 +62,7 @@ def whole(run, law):
         assert code == 0
         script.check()
         trajectory = load_trajectory(directory)
-        assert {where for where in LAWS[law][1] if where not in ("location", "paper")} <= set(trajectory.phase)
+        assert {where for where in LAWS[law][1] if where != "location"} <= set(trajectory.phase)
         _WHOLE[law] = written(directory)
     return _WHOLE[law]
 
@@ -82,7 +81,7 @@ def check_stopped(code, directory, expected, cause):
 
 
 EVERYWHERE = [(law, where) for law, (_, places) in LAWS.items() for where in places]
-THOROUGH = [("energy", "tied"), ("energy", "location"), ("paper", "paper")]
+THOROUGH = [("energy", "tied"), ("energy", "location")]
 ELSEWHERE = [place for place in EVERYWHERE if place not in THOROUGH]
 #: What may go wrong anywhere, and what is said; elsewhere two of the first three are tried, in turn.
 COMMON = [
@@ -101,11 +100,9 @@ LASTING = [
     ("hermite", "touch", "fmi2SetFMUstate", "raise", "ZeroDivisionError"),
     ("energy", "location", "fmi2SetFMUstate", "Error", "cannot restore the state"),
     ("compliance", "touch", "fmi2SetFMUstate", "Fatal", "cannot restore the state"),
-    ("paper", "paper", "fmi2SetFMUstate", "Error", "cannot restore the state"),
     ("energy", "start", "fmi2GetFMUstate", "Discard", "cannot save the state"),
     ("energy", "start", "fmi2GetFMUstate", "Fatal", "cannot save the state"),
     ("jacobi", "start", "fmi2GetFMUstate", "Error", "cannot save the state"),
-    ("paper", "start", "fmi2GetFMUstate", "Error", "cannot save the state"),
     ("hermite", "tied", "fmi2SetRealInputDerivatives", "Discard", "cannot set input derivatives"),
     ("hermite", "touch", "fmi2SetRealInputDerivatives", "Error", "cannot set input derivatives"),
     ("hermite", "location", "fmi2SetRealInputDerivatives", "Fatal", "cannot set input derivatives"),
@@ -152,7 +149,7 @@ def alternating(*axes):
 @pytest.mark.parametrize(
     ("fmu", "place", "fault"),
     # One FMU or the other in turn, and one fault or the other in every second place.
-    [(FMUS[k % 2], place, PASSING[k // 2 % 2]) for k, place in enumerate(EVERYWHERE) if place[0] != "paper"],
+    [(FMUS[k % 2], place, PASSING[k // 2 % 2]) for k, place in enumerate(EVERYWHERE)],
 )
 def test_a_fault_that_passes_is_stepped_over(run, fmu, place, fault):
     (law, where), (function, kind) = place, fault

@@ -58,8 +58,6 @@ def _body(
 
 
 def _beam(scene: Scene, spec: Beam, start_time: float, contact: float) -> Body:
-    if scene.contact.algorithm:  # (62): the midpoint rule on the whole mesh
-        spec = spec.model_copy(update={"integrator": "midpoint", "n_modes": 0})
     slope = spec.initial_deflection_slope + start_time * spec.initial_velocity_slope
     held = (0.0, scene.loads, contact) if scene.static else (slope, scene.loads)
     return FmuBeam(spec, start_time, *held)

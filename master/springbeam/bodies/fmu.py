@@ -149,13 +149,6 @@ class Fmu:
 
         self._asked("cannot be initialised", self._slave.initialise, time, set_parameters)
 
-    def reset(self, time: float, changed: Mapping[str, float]) -> None:
-        """Start again at ``time`` with some parameters changed."""
-        for name, value in changed.items():
-            self._give(name, value)
-        self._asked("cannot be reset", self._slave.reset)
-        self._initialise(time)
-
     # -- calls bound to their arguments --------------------------------------------------------------------------------
 
     def _function(self, name: str) -> Any:

@@ -156,7 +156,6 @@ class FmuState(NamedTuple):
     motion: Motion = Motion(0.0, 0.0, 0.0, 0.0)
     told: tuple[float, ...] = ()  #: motion and energies as the FMU has told them, with the work of impulses since
     pending: float = 0.0  #: upward impulse that the FMU applies at the start of its next step [N·s]
-    dissipated: float = 0.0  #: before the FMU was last started again [J]
 
 
 class FmuBody(Body):
@@ -284,17 +283,17 @@ class OwnBody(FmuBody):
 
     def _take(self, told: tuple[float, ...]) -> Motion:
         motion = made_of(Motion, told[:4])
-        self.state = made_of(FmuState, (motion, told, 0.0, self.state.dissipated))
+        self.state = made_of(FmuState, (motion, told, 0.0))
         return motion
 
     def energies(self) -> Energies:
-        motion, told, _, before = self.state
+        motion, told, _ = self.state
         kinetic, potential, dissipated, *load = told[4:]
         if not load:  # the spring has none but its external force
             of_loads = -self._constants["external_force"] * motion.displacement
         else:
             of_loads = -load[0] if self._shares else load[0]
-        return made_of(Energies, (kinetic, potential, before + dissipated, of_loads))
+        return made_of(Energies, (kinetic, potential, dissipated, of_loads))
 
     def close(self) -> None:
         self.fmu.give_back()
@@ -389,9 +388,3 @@ class FmuSpring(OwnBody, EndLoaded):
     def expect_loads(self, loads: Sequence[Load]) -> None:
         OwnBody.expect_loads(self, loads)
         EndLoaded.expect_loads(self, loads)
-
-    def restart(self, time: float, displacement: float, velocity: float, dissipated: float = 0.0) -> None:
-        """Start again from y [m] and z [m/s], by the exact start values of the FMU."""
-        self.fmu.reset(time, {"displacement": displacement, "velocity": velocity})
-        self.state = FmuState(dissipated=dissipated)
-        self._begin(self.mass)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import inf
 from typing import Any
 
 from ..scene import SAME, Scene, SceneError
@@ -139,11 +138,6 @@ FORBIDDEN_STARTS = (
         lambda s, start: s.contact.lasting and s.contact.rigid and start["apart"],
         f'{{contact.law}}: {_ENDS}; let them start at one height, or use "link"',
         lambda s, start: start,
-    ),
-    Rule(
-        lambda s, start: s.contact.facts.strikes and s.contact.impact == "tip" and start["mass"] == inf,
-        "{contact.impact}: gives the lower body the velocity of the tip, and the body in [spring] has an infinite "
-        'mass; use impact = "inelastic"',
     ),
     Rule(
         lambda s, start: not s.contact.lasting and start["time"] > 0.0 and start["z"] != 0.0,

@@ -170,10 +170,6 @@ class Body(Stateful):
         if abs(impulse) > ROUNDED_IMPULSE * self.mass * abs(self.motion().velocity):
             raise BodyFailed(f"{type(self).__name__} has no apply_impulse, and meets an impulse of {impulse:.6g} N·s")
 
-    def restart(self, time: float, displacement: float, velocity: float, dissipated: float = 0.0) -> None:
-        """Put the end elsewhere at ``time`` [s], where the body has ``dissipated`` so much [J]; for Algorithm 1."""
-        raise NotImplementedError(f"{type(self).__name__} has no restart, which Algorithm 1 needs")
-
     def holding_force(self, displacement: float, velocity: float) -> float:
         """Return the upward force [N] that keeps the end at ``displacement`` [m] and ``velocity`` [m/s].
 

@@ -17,7 +17,7 @@ from typing import Annotated
 import typer
 
 from ..studies.tables import Findings
-from . import checks, look, run, scenes, studies
+from . import checks, look, paper, run, scenes, studies
 from .common import STOPPED, Command, Commands
 
 _WHAT = "A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs."
@@ -76,7 +76,7 @@ def _common(
 
 _COMMANDS: dict[str, tuple[Callable[..., Findings], ...]] = {
     "Scenes": (scenes.scenes, scenes.keys, scenes.new),
-    "Run": (run.run, studies.resume, studies.sweep),
+    "Run": (run.run, studies.resume, studies.sweep, paper.paper),
     "Look": (look.report, look.animate, look.export, look.compare, look.spectrum, studies.fit),
     "Choose scheme and accuracy": (scenes.predict, studies.tradeoff, studies.converge),
     "Check": (studies.crosscheck, checks.verify, studies.stability, checks.doctor),

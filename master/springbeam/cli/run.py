@@ -115,9 +115,6 @@ def _refuse_options(scene: Scene, checkpoint: float | None, interval: float | No
     if interval is not None and not end / _MOST_ROWS <= interval < inf:
         rows = f"of which at most {_MOST_ROWS:,} lie before time.t_end = {end:g} s"
         fail(BAD_INPUT, f"--output-interval {interval:g}: must be a time [s], {rows}")
-    if interval is not None and scene.contact.algorithm:
-        law = f'contact.law = "{scene.contact.law}" has no data between its steps'
-        fail(BAD_INPUT, f"--output-interval {interval:g}: {law}; {apart}")
 
 
 def picked(scene: Scene) -> Trajectory | None:

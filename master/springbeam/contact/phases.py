@@ -60,20 +60,16 @@ class Impact:
     energy_loss: float = 0.0
 
 
-def meeting(kind: str, v: float, z: float, tip_mass: float, mass: float) -> Impact:
-    """Tip [m/s, kg] meets spring top [m/s, kg] (docs/model.md, "What happens at an event").
+def meeting(v: float, z: float, tip_mass: float, mass: float) -> Impact:
+    """Return the impact of tip [m/s, kg] and spring top [m/s, kg] (docs/model.md, "What happens at an event").
 
-    ``inelastic``: J = (z − v)/(1/m_tip + 1/m), equal and opposite, both leave with one velocity; ``rest``: velocities
-    are kept; ``tip``: z := v (Ahn & Tate, Algorithm 1, line 5), which takes the energy from nowhere and books it.
-    A massless tip takes no impulse.
+    J = (z − v)/(1/m_tip + 1/m), equal and opposite, and both leave with one velocity. A massless tip takes no impulse.
     """
-    if kind == "inelastic" and tip_mass > 0.0:
-        reduced = 1.0 / (1.0 / tip_mass + 1.0 / mass)
-        j = reduced * (z - v)
-        return Impact(on_beam=j, on_spring=-j, energy_loss=0.5 * reduced * (z - v) ** 2)
-    if kind == "tip":
-        return Impact(on_spring=mass * (v - z), energy_loss=0.5 * mass * (z * z - v * v))
-    return Impact()
+    if tip_mass == 0.0:
+        return Impact()
+    reduced = 1.0 / (1.0 / tip_mass + 1.0 / mass)
+    j = reduced * (z - v)
+    return Impact(on_beam=j, on_spring=-j, energy_loss=0.5 * reduced * (z - v) ** 2)
 
 
 def rebound(velocity: float, mass: float, restitution: float) -> tuple[float, float]:
@@ -164,7 +160,7 @@ class Transitions(Stateful):
         return kind, opened, self._part(opened, tip, low)
 
     def _meet(self, phase: Phase, tip: Motion, low: Motion, tolerance: float) -> tuple[Phase, Impact]:
-        impact = meeting(self._scene.contact.impact, tip.velocity, low.velocity, self._tip_mass, self._mass)
+        impact = meeting(tip.velocity, low.velocity, self._tip_mass, self._mass)
         common = low.velocity + impact.on_spring / self._mass
         if self._scene.contact.lasting:
             tied = True
@@ -233,4 +229,4 @@ class Transitions(Stateful):
         if self._alone or held.seated:
             on_beam, loss = rebound(tip.velocity, self._tip_mass, restitution=0.0)
             return Impact(on_beam, of_foundation=on_beam, energy_loss=loss)
-        return meeting("inelastic", tip.velocity, low.velocity, self._tip_mass, self._mass)
+        return meeting(tip.velocity, low.velocity, self._tip_mass, self._mass)

@@ -4,8 +4,7 @@ On a step of size H the force is a polynomial of degree d; a *coupling* (``proto
 coefficients and advances both bodies. ``tie`` holds ends together by the conditions of a scheme (``energy`` creates no
 energy at any H, with ``hermite`` velocities agree, too), ``soft`` applies a contact law that is a function of the
 penetration, ``projection`` says what that is over a step; both are ``solver`` with another aim. ``one_way`` leaves one
-end unmoved, ``exchange`` is what ordinary masters do, ``algorithm_1`` what Ahn & Tate do. Imports `contact`, `bodies`
-and `scene`.
+end unmoved, ``exchange`` is what ordinary masters do. Imports `contact`, `bodies` and `scene`.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from ..contact.laws import SoftLaw
 from ..scene import Scene
 from ..scene.statics import tip_reach
 from ..scene.tables import ORDINARY_SCHEMES
-from .algorithm_1 import Algorithm1
 from .exchange import Exchange
 from .one_way import OneWay
 from .protocol import Coupling
@@ -25,8 +23,6 @@ from .tie import Tie
 def coupling_of(scene: Scene, law: SoftLaw | None) -> Coupling:
     """Return what couples the bodies of ``scene`` while ``law`` acts between them, or a tie if there is none."""
     asked = scene.coupling
-    if scene.contact.algorithm:
-        return Algorithm1(scene)
     if law is None:
         expected = 0.0 if scene.beam is None else tip_reach(scene.beam)
         # An exchange of values is for soft laws; a tip alone rests on its foundation by the default scheme.

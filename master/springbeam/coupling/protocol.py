@@ -6,8 +6,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Memory, Motion, Stateful, StepRefused
-from ..contact.phases import Impact, Phase
-from ..results.trajectory import EventKind
 
 #: Conditions on the gap over a step of size H as a linear map of an end's motion, each in metres.
 Conditions = Callable[[Motion, float], tuple[float, ...]]
@@ -63,9 +61,6 @@ class Coupling(Stateful):
     sharpest: float = 1.0
     #: Whether the force does no net work but what is booked, at any step.
     energy_exact: bool = True
-    #: Whether it decides by itself what touches, by `settle`, and may put the ends elsewhere: no event is then looked
-    #: for, no step repeated, nothing known of the motion inside steps, and energy that appears stops no run.
-    decides: bool = False
     state: Counts
 
     def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
@@ -91,13 +86,6 @@ class Coupling(Stateful):
 
     def accept(self, step: Step) -> None:
         """Count from now on what ``step``, which is made, has dissipated."""
-
-    def settle(self, time: float, upper: Body, lower: Body) -> tuple[Phase, EventKind | None, Impact]:
-        """Return what one that `decides` has made of the last step, or of the start of the run, at ``time`` [s].
-
-        That is the phase, and the kind of an event, if there was one, with its impact; both bodies show it already.
-        """
-        raise NotImplementedError
 
     def report(self) -> tuple[dict[str, Any], list[str]]:
         """Return what the summary of a run says of the coupling, and warnings."""

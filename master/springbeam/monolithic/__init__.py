@@ -3,6 +3,6 @@
 
 Start with ``laws`` (what joins the ends, a class each) and ``hybrid_system`` (coordinates of mass 1, and what holds and
 moves them in each phase, also for a beam without inertia). ``event_driven`` is the run: ``exponential``
-integrates up to an event, ``transitions`` applies what happens there, ``rows`` makes the result. ``algorithm1`` is
-Ahn & Tate's own scheme, ``semi_discrete`` their beam.
+integrates up to an event, ``transitions`` applies what happens there, ``rows`` makes the result. ``semi_discrete`` is
+the beam.
 """

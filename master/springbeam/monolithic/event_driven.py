@@ -3,9 +3,6 @@
 Each phase is one constraint-eliminated ODE (`hybrid_system`) under the scene's law (`laws`), integrated between events
 that are located to rounding; impacts and phase changes are applied there (`transitions`). It shares no
 code with the coupled simulation.
-
-With ``contact.impact = "rest"`` tip and spring keep different velocities, which the rigid tie u = y cannot: the
-law `transmission` then has no solution with bounded force, and the scene is refused.
 """
 
 from __future__ import annotations
@@ -91,11 +88,6 @@ def refuse(scene: Scene) -> None:
         raise SceneError(
             f"[{table}] {'fmu' if table in scene.foreign else 'element'}: no reference knows this body, a "
             f"{type(body).__name__}; springbeam run --accuracy compares runs of smaller and smaller steps instead"
-        )
-    if scene.coupled and law.rigid and scene.contact.impact == "rest":
-        raise SceneError(
-            "contact.impact = 'rest': no reference has it, since it leaves tip and spring with velocities that differ, "
-            f"which the rigid tie of law '{scene.contact.law}' excludes; use 'inelastic' or 'tip'"
         )
     if scene.massless and not law.rigid:
         raise SceneError(

@@ -1,8 +1,8 @@
 """What events do to the state of a `HybridSystem`: impacts, changes of phase, and what is booked with them.
 
 =============  ====================================================================================================
-impact         tip and spring meet: perfectly inelastic, J = (z − v)/(eᵀM⁻¹e + 1/m) on the tip, −J on the spring;
-               ``contact.impact = "tip"`` sets z = v instead (Algorithm 1, line 5). A law that is a force: no impulse
+impact         tip and spring meet: perfectly inelastic, J = (z − v)/(eᵀM⁻¹e + 1/m) on the tip, −J on the spring. A law
+               that is a force: no impulse
 stop_impact    y = φ with z < 0: z → −e z, and the joined tip likewise, by J = −(1+e) v/(eᵀM⁻¹e); without a spring
                the tip on the stop
 release        tied, y rises through Ψ; goes on as `touch` if C > 0 there, else as `free`
@@ -94,11 +94,8 @@ class HybridState:
         if not s.law.rigid:
             self._go_on("meet")
             return
-        m, before, impulse = s.motion(self.phase, X), self._mechanical_energy(), 0.0
-        if s.scene.contact.impact == "tip":
-            X[s.n + s.r] = s.root_mass * m.v
-        else:
-            impulse = float(m.z - m.v) / s.mobility
+        m, before = s.motion(self.phase, X), self._mechanical_energy()
+        impulse = float(m.z - m.v) / s.mobility
         was_seated, self.phase = self.phase.seated, Phase("tied")
         s.synchronise(self.phase, X)
         self._go_on("meet", before, impulse)

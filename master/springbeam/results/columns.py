@@ -50,7 +50,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
         "contact_force": contact,
         "contact_force_smoothed": np.where(apart, contact, steps["smoothed"]),
         "compliance_force": inside,
-        "tie_reaction": contact - inside if rigid or scene.contact.algorithm else zeros,
+        "tie_reaction": contact - inside if rigid else zeros,
         "foundation_force": np.where(steps["phase"] < 3.0, 0.0, force(steps, steps["size"], "foundation_force")),
         "gap": u - y,
         "velocity_mismatch": np.where(apart, 0.0, v - z),

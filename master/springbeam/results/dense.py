@@ -81,7 +81,7 @@ def rows_at(run: Trajectory, times: Any) -> Trajectory:
         raise ValueError(f"times of shape {wanted.shape}: one number, or a sequence of them")
     steps = run.steps
     if steps is None:
-        raise ValueError("this run has no data between its rows: it is by a reference or by contact.law = 'paper'")
+        raise ValueError("this run has no data between its rows: it is by a reference")
     known = steps["time"]
     outside = ~((wanted >= known[0]) & (wanted <= known[-1]))
     if outside.any():

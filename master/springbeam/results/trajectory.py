@@ -134,9 +134,9 @@ def columns_of(scene: Scene) -> dict[str, str]:
     }
     units = {name: unit for name, (unit, part) in COLUMNS.items() if there[part]}
     units |= {f"load_{i}": load.unit for i, load in enumerate(scene.loads)}
-    own = scene.beam is not None and not scene.massless and not scene.contact.algorithm
+    own = scene.beam is not None and not scene.massless
     section = own and scene.beam is not None and scene.beam.section_height > 0.0
-    tells = {"beam": own, "section": section, "spring": scene.spring is not None and not scene.contact.algorithm}
+    tells = {"beam": own, "section": section, "spring": scene.spring is not None}
     return units | {name: unit for name, (unit, body) in TOLD.items() if tells[body]}
 
 

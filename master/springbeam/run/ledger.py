@@ -62,7 +62,7 @@ class Balance:
         self._warns, self._stops = bounds(scene)
         #: Bodies of the caller's may tell no energies; there is then no balance to judge by.
         self._untold = any(type(body).energies is Body.energies and body.mass < inf for body in pair.bodies)
-        if self._untold or pair.joined.decides:
+        if self._untold:
             self._warns = self._stops = inf
         self._scale = 0.0  #: the largest energy so far [J]
 

@@ -171,8 +171,6 @@ class Master(Stateful):
             state.macro_steps += 1
             if pair.opens_softly:
                 self._note_soft_contact(step)
-            elif pair.joined.decides:
-                step = self._settled()
         if event is None:
             self._record(step, step.end)
         else:
@@ -187,8 +185,6 @@ class Master(Stateful):
         halvings, cause = 0, ""
         while True:
             try:
-                if pair.joined.decides:
-                    return pair.attempt(state, size, start), None
                 at_start = self._detector.at_start(state, start)
                 if at_start is not None:
                     return Step(state.time, 0.0, state.contact, state.foundation, start, start), at_start
@@ -214,8 +210,6 @@ class Master(Stateful):
     def _begin(self) -> None:
         """Record the start, after an event that is due there."""
         state, pair = self.state, self._pair
-        if pair.joined.decides:
-            self._settled()
         start = pair.ends()
         step = Step(state.time, 0.0, NO_FORCE, NO_FORCE, start, start)
         # The ledger starts with the bodies as they arrive, before an impact.
@@ -235,12 +229,7 @@ class Master(Stateful):
     def _in_contact(self, start: Ends) -> bool:
         """Is the tip on the spring top (or the stop), moving down or at rest?"""
         pair = self._pair
-        if (
-            self._scene.upper is None
-            or pair.law is not None
-            or pair.joined.decides
-            or (pair.alone and pair.stop is None)
-        ):
+        if self._scene.upper is None or pair.law is not None or (pair.alone and pair.stop is None):
             return False
         tip, low = start
         tolerance = self._detector.tolerance(start) + 1e-12 * abs(low.displacement)
@@ -281,16 +270,6 @@ class Master(Stateful):
         u, v = (None, None) if self._scene.upper is None else tip[:2]
         self.state.events += 1
         self._log.events.append(Event(self.state.time, kind, y, z, u, v, impact.on_beam, impact.of_foundation, lost))
-
-    def _settled(self) -> Step:
-        """Let the coupling decide what touches now; return a step of no size, for nothing is known inside the last."""
-        state, pair = self.state, self._pair
-        phase, event, impact = pair.joined.settle(state.time, pair.upper, pair.lower)
-        state.phase, state.smoothed = phase, state.contact[0]
-        if event is not None:
-            self._happened(event, impact, 0.0)
-        tip, low = (end._replace(integral=0.0, integral_2=0.0) for end in pair.ends())
-        return Step(state.time, 0.0, state.contact, state.foundation, (tip, low), (tip, low))
 
     def _note_soft_contact(self, step: Step) -> None:
         state = self.state
@@ -361,20 +340,19 @@ class Master(Stateful):
         scene, steps = self._scene, self._recorder.steps()
         known = int(steps["events"][-1]) if len(steps) else 0  # a full disk may have events without their records
         events = self._recorder.events()[:known]
-        made, joined = int(np.count_nonzero(np.diff(steps["time"]))), self._pair.joined
-        inside = steps[:0] if joined.decides else steps  # what tells of the motion inside steps
+        made = int(np.count_nonzero(np.diff(steps["time"])))
         energies, warnings, changed = self._balance.report(steps)
-        of_coupling, warned = joined.report()
-        off = misplaced(scene, self._pair, inside, events)
-        unresolved = why_not_resolved(scene, self._pair, self._steps.size, inside, events, off)
-        warnings += filter(None, [*warned, unresolved or peak_force_doubt(scene), not_shown(scene, self._pair, inside)])
+        of_coupling, warned = self._pair.joined.report()
+        off = misplaced(scene, self._pair, steps, events)
+        unresolved = why_not_resolved(scene, self._pair, self._steps.size, steps, events, off)
+        warnings += filter(None, [*warned, unresolved or peak_force_doubt(scene), not_shown(scene, self._pair, steps)])
         neglect = {}
         if scene.driver_stiffness is not None and len(steps):
             motion, share = Neglect(scene.coupling, scene.driver_stiffness).by(steps)
             neglect = {"neglected_motion": float(motion[-1]), "neglected_share": float(share[-1])}
         window = force_window(scene, stiffest(scene) if scene.contact.facts.opens else 0.0)
-        amounts = totals(scene, steps, events, window) if len(inside) else {}
-        ruled_out = contradictions(scene, inside, events, amounts.get("contact_duration_total", 0.0))
+        amounts = totals(scene, steps, events, window) if len(steps) else {}
+        ruled_out = contradictions(scene, steps, events, amounts.get("contact_duration_total", 0.0))
         warnings += [f"not resolved: {what}: an event was missed; {_SHORTER}" for what in ruled_out]
         return {
             **neglect,
@@ -388,6 +366,6 @@ class Master(Stateful):
             "resolved": unresolved is None and not changed and not ruled_out,
             "misplaced_ends": off,
             "warnings": warnings,
-            **({"max_velocity_mismatch": mismatch(self._pair, inside)} if len(inside) else {}),
+            **({"max_velocity_mismatch": mismatch(self._pair, steps)} if len(steps) else {}),
             **amounts,
         }

@@ -323,7 +323,6 @@ def _without_own(scene: Scene, **own: Body | None) -> Scene:
         if getattr(scene, place) is None:
             raise SceneError(f"[{name}]: missing; a body of your own takes the place of one that the scene has")
     asked = {
-        f'contact.law = "{scene.contact.law}"': scene.contact.algorithm,
         'time.initial_state = "static"': scene.static,
         'coupling.scheme = "auto"': scene.coupling.scheme == "auto",
         'beam.fidelity = "quasi_static"': scene.massless,

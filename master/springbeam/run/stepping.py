@@ -102,7 +102,7 @@ class Pair:
     def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
         self.stop = None if scene.stop is None else scene.stop.position
         #: What holds a lower end that is seated.
-        self._held = None if self.stop is None or scene.contact.algorithm else RigidWall(self.stop)
+        self._held = None if self.stop is None else RigidWall(self.stop)
         self.upper: Body = beam or RigidWall(0.0)
         self.lower: Body = spring or self._held or RigidWall(0.0)
         self.alone = spring is None  #: whether nothing but the foundation is below the tip
@@ -124,10 +124,9 @@ class Pair:
         self.opens_softly = self.law is not None and not self.lasting
         #: What couples the bodies where the law acts, and where the ends are apart.
         self.joined = coupling_of(scene, self.law)
-        self._uncoupled = self.joined if self.law or self.joined.decides else Uncoupled()
+        self._uncoupled = self.joined if self.law else Uncoupled()
         #: Whether a step can be repeated with another size.
         self.divides = self.repeatable and all(body.abilities.any_size for body in self.bodies)
-        self.divides &= not self.joined.decides
 
     def initial_state(self, time: float, contact: float = 0.0) -> State:
         """Return the state before anything happens; ends that a soft law joins for good are joined from the start.

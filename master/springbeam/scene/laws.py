@@ -14,8 +14,8 @@ class LawFacts(NamedTuple):
     """What a law is, which keys of ``[contact]`` it has, and what people call it."""
 
     #: rigid: ends that have met share one position, C is a reaction; soft: C is a function of the penetration and its
-    #: rate; algorithm: it decides what touches once a macro step, which is part of the law.
-    kind: Literal["rigid", "soft", "algorithm"]
+    #: rate.
+    kind: Literal["rigid", "soft"]
     #: Whether it joins the ends from the start and for good, for either sign of C.
     lasting: bool = False
     #: Keys that the motion depends on.
@@ -54,7 +54,6 @@ class LawFacts(NamedTuple):
 LAWS: dict[str, LawFacts] = {
     "transmission": LawFacts(
         "rigid",
-        takes=("impact",),
         shows=("stiffness", "exponent"),
         words="the tip and the spring move together while they touch",
     ),
@@ -75,12 +74,6 @@ LAWS: dict[str, LawFacts] = {
         force="of the link λ(y − u)",
         damper=" + c(z − v)",
         words="an elastic link",
-    ),
-    "paper": LawFacts(
-        "algorithm",
-        takes=("impact", "stiffness", "exponent"),
-        needs=("stiffness", "exponent"),
-        words="Algorithm 1 of Ahn & Tate",
     ),
 }
 

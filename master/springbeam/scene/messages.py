@@ -139,6 +139,9 @@ def beginning(title: str) -> str:
 GONE: dict[str, str] = {
     '[beam] integrator = "generalized_alpha"': 'is gone; use "midpoint", which is what it was with rho_inf = 1',
     "[beam] rho_inf": 'is gone; leave it out: integrator = "midpoint" is rho_inf = 1, alpha_b > 0 damps',
+    '[contact] law = "paper"': "is no law of a run; springbeam paper 2, 3, 4 or 5 runs Algorithm 1",
+    "[contact] impact": "is gone; leave it out: ends that a rigid law joins meet inelastically (docs/paper.md has what "
+    "Algorithm 1 does)",
 }
 #: Types of values by those of the JSON Schema; others are given as texts.
 _KINDS: dict[str, type] = {"integer": int, "boolean": bool, "number": float}

@@ -130,10 +130,7 @@ def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
         return {}
     raises = coupling.scheme == "energy" and coupling.degree < 2
     raises &= scene.beam is None or scene.beam.integrator == "modal"
-    if scene.contact.rigid and scene.contact.impact != "inelastic":
-        remedy = f'impact = "{scene.contact.impact}" leaves their velocities apart, "inelastic" does not'
-    else:
-        remedy = _shorter(scene, 2.0 * sqrt(excess)) + (_HIGHER if raises and not coupling.adaptive else "")
+    remedy = _shorter(scene, 2.0 * sqrt(excess)) + (_HIGHER if raises and not coupling.adaptive else "")
     far = f"about {100.0 * seen.misplaced:.2g} %" if seen.misplaced <= 1.0 else "more than all"
     return {"far": far, "remedy": remedy}
 
@@ -431,12 +428,10 @@ _DECIDED: tuple[tuple[Rule, str, int], ...] = (
         0,
     ),
     (Rule(lambda s: s.partners, "a body that is not our own"), "energy", 2),
-    (Rule(lambda s: s.contact.algorithm, "{contact.law}"), "energy", 0),
     (Rule(lambda s: s.beam is None, "one body"), "energy", 0),
     (Rule(lambda s: s.beam.integrator != "modal", "{beam.integrator}"), "energy", 0),
     (Rule(lambda s: s.massless, "{beam.fidelity}"), "energy", 2),
     (Rule(lambda s: not s.contact.rigid, "{contact.law}"), "energy", 2),
-    (Rule(lambda s: s.contact.impact == "rest" and s.spring, "{contact.impact}"), "energy", 2),
     (Rule(lambda s: s.coupling.adaptive, "the steps follow from tolerances"), "hermite", 2),
     (
         Rule(

@@ -179,19 +179,10 @@ FORBIDDEN: tuple[Rule, ...] = (
         "{spring.element}: nothing moves in this scene; give it a body in [beam]",
     ),
     Rule(lambda s: _wall_below(s) and s.upper is not None and s.stop is not None, "{spring.element}: leave [stop] out"),
-    Rule(
-        lambda s: _wall_below(s) and s.contact.facts.strikes and s.contact.impact == "tip",
-        "{contact.impact}: gives the lower body the velocity of the tip, and {spring.element} cannot move; "
-        'use impact = "inelastic"',
-    ),
     # A start at rest
     Rule(
         lambda s: s.static and s.beam is not None and s.beam.approach == "undeformed",
         '{time.initial_state}: bends the beam from the start; use approach = "elastic" with it, not {beam.approach}',
-    ),
-    Rule(
-        lambda s: s.static and s.contact.algorithm,
-        "{time.initial_state}: {contact.law} starts as the paper says; leave initial_state out",
     ),
     *(
         Rule(
@@ -236,17 +227,6 @@ FORBIDDEN: tuple[Rule, ...] = (
         "{contact.stiffness}: {contact.law} needs a stiffness or a damping greater than 0",
     ),
     Rule(
-        lambda s: s.contact.lasting and s.contact.rigid and s.contact.impact != "inelastic",
-        '{contact.impact}: {contact.law} gives both ends one velocity; use "inelastic"',
-    ),
-    *(
-        Rule(
-            lambda s, table=table: s.contact.algorithm and s.under(table) is None,
-            f"{{contact.law}}: Algorithm 1 needs a [{table}]",
-        )
-        for table in ("beam", "spring", "stop")
-    ),
-    Rule(
         lambda s: s.contact.facts.opens and s.contact.stiffness == 0.0,
         "{contact.stiffness}: with {contact.law} nothing would hold the bodies apart; it must be greater than 0",
     ),
@@ -278,11 +258,6 @@ FORBIDDEN: tuple[Rule, ...] = (
         '{coupling.scheme}: needs a rigid law; with {contact.law} use scheme = "energy", "gauss_seidel" or "jacobi"',
     ),
     Rule(
-        lambda s: s.coupling.scheme == "hermite" and s.contact.impact == "rest" and s.contact.facts.strikes and s.joins,
-        "{coupling.scheme}: gives both ends one velocity, but {contact.impact} leaves two; "
-        'use scheme = "energy" or impact = "inelastic"',
-    ),
-    Rule(
         lambda s: _averages(s) and s.coupling.scheme == "hermite",
         '{coupling.scheme}: {beam.integrator} sees only the mean of the contact force; use "modal", or '
         'scheme = "energy"',
@@ -306,15 +281,6 @@ FORBIDDEN: tuple[Rule, ...] = (
         "{beam.fidelity}: the tip between the beam and {contact.law} would have no inertia; use "
         'law = "transmission", fidelity = "dynamic", or neglect the force on the beam: [coupling] '
         'feedback = "beam_drives"',
-    ),
-    Rule(
-        lambda s: s.massless and s.contact.algorithm,
-        '{beam.fidelity}: {contact.law} integrates the beam by (62); use fidelity = "dynamic"',
-    ),
-    Rule(
-        lambda s: s.massless and s.contact.facts.strikes and s.contact.impact == "tip",
-        "{beam.fidelity}: {contact.impact} gives the spring the velocity of the tip, which without inertia has none "
-        'of its own; use impact = "inelastic"',
     ),
     Rule(
         lambda s: s.massless and s.coupling.scheme == "hermite",
@@ -457,10 +423,6 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     # Bodies that are not our own
     *_of_others(
-        lambda s: s.contact.algorithm,
-        "{body}: {contact.law} is Algorithm 1, which needs our own bodies; take another law",
-    ),
-    *_of_others(
         lambda s: s.coupling.feedback != "two_way",
         '{body}: {coupling.feedback} bounds what it neglects for our own bodies only; use "two_way"',
     ),
@@ -469,11 +431,6 @@ FORBIDDEN: tuple[Rule, ...] = (
         '{body}: {contact.law} needs our own spring below {beam.fidelity}; use law = "tie", or fidelity = "dynamic"',
     ),
     # Steps; an accuracy picks scheme, degree and steps that go together
-    Rule(
-        lambda s: s.accuracy is None and s.coupling.adaptive and s.contact.algorithm,
-        "{tolerance}: {contact.law} is Algorithm 1, which has one macro_step",
-        _tolerance,
-    ),
     Rule(
         lambda s: s.accuracy is None and s.coupling.adaptive and s.coupling.scheme in ORDINARY_SCHEMES,
         "{tolerance}: {coupling.scheme} never repeats a step; give macro_step instead",
@@ -560,10 +517,6 @@ FORBIDDEN_LOADS: tuple[Rule, ...] = (
         lambda s, load: s.massless and load.on != "spring",
         '{load.on}: {beam.fidelity} takes no loads that vary; use fidelity = "dynamic", or distributed_load for a '
         "constant",
-    ),
-    Rule(
-        lambda s, load: s.contact.algorithm,
-        "{load.on}: {contact.law} is Algorithm 1, which knows constant loads only; take another law",
     ),
     Rule(
         lambda s, load: (

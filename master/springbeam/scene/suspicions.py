@@ -244,28 +244,21 @@ EFFECTS: tuple[Rule, ...] = (
     ),
     *_counts(
         "beam.integrator",
-        lambda s: _dynamic(s) and not s.contact.algorithm,
-        'it counts with fidelity = "dynamic"; Algorithm 1 is the midpoint rule',
+        _dynamic,
+        'it counts with fidelity = "dynamic"',
     ),
     *_counts(
         "beam.n_modes",
-        lambda s: _dynamic(s) and s.beam.integrator == "modal" and not s.contact.algorithm,
+        lambda s: _dynamic(s) and s.beam.integrator == "modal",
         'it counts with fidelity = "dynamic" and integrator = "modal", the midpoint rule keeps all modes',
     ),
-    *_counts("stop.restitution", lambda s: not s.contact.algorithm, "Algorithm 1 has no loss on the foundation"),
     *_counts("contact.law", lambda s: s.coupled, "it counts between two bodies, or a beam and a stop"),
-    *_of_law("impact"),
     *_of_law("stiffness"),
     *_of_law("exponent"),
     *_counts(
         "contact.force_window",
-        lambda s: not s.contact.algorithm and (s.coupled or (s.upper is not None and s.stop is not None)),
+        lambda s: s.coupled or (s.upper is not None and s.stop is not None),
         "it counts where the run tells a peak contact force",
-    ),
-    *_counts(
-        "coupling.scheme coupling.degree coupling.tolerance",
-        lambda s: not s.contact.algorithm,
-        "Algorithm 1 is a scheme of its own",
     ),
     *_counts(
         "coupling.tolerance",

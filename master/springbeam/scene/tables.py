@@ -287,17 +287,13 @@ class Contact(Table):
     """What force C belongs to the penetration p = y − u_tip (``docs/model.md``, "Interface laws")."""
 
     law: str = key("–", "the interface law (docs/contact.md says which)", "transmission", one_of=tuple(LAWS))
-    impact: Literal["inelastic", "rest", "tip"] = key(
-        "–", "when rigid ends meet: both get their common velocity, both keep theirs, or the spring gets the tip's",
-        "inelastic",
-    )  # fmt: skip
     stiffness: float = key(
         "N/m^p", "stiffness λ_nc of normal compliance, or of a link (N/m)", 1.0e4, ge=0.0,
-        otherwise="1e4; needed with compliance, link and paper",
+        otherwise="1e4; needed with compliance and link",
     )  # fmt: skip
     exponent: float = key(
         "–", "exponent p of normal compliance; a link has none", 3.0, ge=1.0, le=100.0,
-        otherwise="3; needed with compliance and paper",
+        otherwise="3; needed with compliance",
     )  # fmt: skip
     damping: float = key("s/m", "χ of compliance (Hunt & Crossley 1975), or damping c of a link (N·s/m)", 0.0, ge=0.0)
     force_window: float | None = key(
@@ -326,11 +322,6 @@ class Contact(Table):
     def soft(self) -> bool:
         """Whether C is a function of the penetration and its rate."""
         return self.facts.soft
-
-    @property
-    def algorithm(self) -> bool:
-        """Whether the law decides what touches once a macro step, which is part of the law."""
-        return self.facts.kind == "algorithm"
 
     @property
     def lasting(self) -> bool:

@@ -246,7 +246,7 @@ def spectra(
     Raises SceneError for what the run does not have.
     """
     if run.steps is None:
-        raise SceneError("the run left no steps: it is by a reference, or by law 'paper', and has no curve to sample")
+        raise SceneError("the run left no steps: it is by a reference, and has no curve to sample")
     duration, tail, drive = float(run.time[-1] - run.time[0]), settled(run), drive_of(run)
     low = _PERIODS / duration if low is None else low
     high = max(2.0 * low, (len(run) - 1) / duration / _STEPS) if high is None else high

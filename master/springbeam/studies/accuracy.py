@@ -80,10 +80,6 @@ def pick(scene: Scene) -> Trajectory:
         If the run with these settings would stop early.
     """
     assert scene.accuracy is not None
-    if scene.contact.algorithm:
-        raise SceneError(
-            f'accuracy: [contact] law = "{scene.contact.law}" is defined by its macro step; take another law'
-        )
     asked, steps = scene.accuracy, _first(scene)
     pilots: list[Trajectory] = []
     coarse: Trajectory | None = None

@@ -24,7 +24,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..monolithic import algorithm1, event_driven
+from ..monolithic import event_driven
 from ..pictures.drawing import present
 from ..results.contact_times import ContactChange, contact_changes
 from ..results.trajectory import TOLD, Trajectory, columns_of
@@ -71,7 +71,7 @@ def compare(scene: Scene) -> Row:
     """
     found: Row = {"verdict": "differs", "from": scene.contact_time or 0.0, "t_end": scene.time.t_end, "growth": 1.0}
     found |= {"quantities": [], "events": [], "notes": [], "scene": scene.model_dump(exclude_none=True)}
-    runs = (_beside_algorithm_1 if scene.contact.algorithm else _beside_event_driven)(scene, found)
+    runs = _beside_event_driven(scene, found)
     found["runs"] = {
         name: {"columns": {column: run[column] for column in present(run, _DRAWN)}, "events": run.events}
         for name, run in zip(("co-simulation", "reference"), runs, strict=False)
@@ -91,30 +91,6 @@ def _judged(name: str, times: np.ndarray, error: np.ndarray, changed: np.ndarray
         "quantity": name, "error": float(error[at]), "at": float(times[at]), "l2": float(np.sqrt(np.mean(error**2))),
         "bound": float(bound[at]), "passed": bool(np.all(error <= bound)),
     }  # fmt: skip
-
-
-def _beside_algorithm_1(scene: Scene, found: Row) -> tuple[Trajectory, ...]:
-    """Compare law `paper` through the FMUs with Algorithm 1 as one system, which differs by the midpoint rule alone.
-
-    With a = (ωh)² one midpoint step and the exact flow differ in the displacement by y a²/12 and h z a/12. Algorithm 1
-    restarts the spring at every step, so this does not add up to a frequency shift; a stiffness 1/3 larger changes the
-    step by y a/6 and h z a/12, at least as much, and running Algorithm 1 with it shows what IDA may change.
-    """
-    assert scene.spring is not None
-    stiffer = {name: 4.0 / 3.0 * getattr(scene.spring, name) for name in ("linear_stiffness", "cubic_stiffness")}
-    reference, run = algorithm1.simulate(scene), simulate(scene)
-    moved = algorithm1.simulate(with_changes(scene, spring=stiffer))
-    n = min(len(reference), len(run), len(moved))
-    found["horizon"] = float(run.time[n - 1])
-    for name in ("u_tip", "y", "z", "v_tip", "contact_force", "e_beam", "e_spring"):
-        q, exact, other = (each[name][:n] for each in (run, reference, moved))
-        floor = _step_error(scene) * np.arange(1, n + 1) * (float(np.abs(exact).max()) or 1.0)
-        found["quantities"].append(_judged(name, run.time[:n], np.abs(q - exact), np.abs(other - exact), floor))
-    found["notes"].append(
-        "bounds from Algorithm 1 with 4/3 of its stiffness: as much as the midpoint rule changes a step of "
-        f"{scene.coupling.H:g} s"
-    )
-    return run, reference
 
 
 def _beside_event_driven(scene: Scene, found: Row) -> tuple[Trajectory, ...]:

@@ -30,14 +30,13 @@ class Crosscheck(Study):
     """A scene beside the reference of its law."""
 
     kind: ClassVar[str] = "crosscheck"
-    announced: ClassVar[str] = "2 runs (1 with law paper) and 2 references"
+    announced: ClassVar[str] = "2 runs and 2 references"
 
     scene: Scene  #: its first quarter if quick
 
     def cases(self) -> dict[str, Row]:
         """Return the one comparison. Raises SceneError if there is no reference."""
-        if not self.scene.contact.algorithm:
-            event_driven.refuse(self.scene)
+        event_driven.refuse(self.scene)
         start, end = self.scene.contact_time or 0.0, self.scene.time.t_end
         return {_CASE: {"time.t_end": start + 0.25 * (end - start)} if self.quick else {}}
 

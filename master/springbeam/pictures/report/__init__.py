@@ -204,7 +204,7 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
     for table, partner in scene.partners.items():
         yield table, f"another body in its place: {kind_of(partner).replace('_', ' ')}"
     if scene.coupled:
-        values = {key: getattr(contact, key) for key in contact.facts.takes if key != "impact"}
+        values = {key: getattr(contact, key) for key in contact.facts.takes}
         numbers = [f"{key} {value:.4g}" for key, value in values.items() if key != "damping" or value > 0.0]
         yield "contact", f"{contact.law}: {', '.join([contact.facts.words, *numbers])}"
     if stop is not None:

@@ -17,13 +17,12 @@ from ..design import RIGID, SOFT, Axis, design
 #: Radians of the spring's own motion in one macro step, and in a cell: IDA takes some hundred steps for each.
 _MOST_PHASE_PER_STEP, _MOST_PHASE = 30.0, 1000.0
 _AUTO = ("auto", 0)
-#: law, scheme, degree: all that a scene may ask for; Algorithm 1 has no scheme.
+#: law, scheme, degree: all that a scene may ask for.
 COUPLINGS = (
     *(("transmission", *scheme) for scheme in (*RIGID, _AUTO)),
     *(("compliance", *scheme) for scheme in (*SOFT, _AUTO)),
     *(("tie", *scheme) for scheme in (*RIGID, _AUTO)),
     *(("link", *scheme) for scheme in (*SOFT, _AUTO)),
-    ("paper", "energy", 0),
 )
 
 #: What varies, over its range; a share of the cells has none of what may be 0.
@@ -50,7 +49,6 @@ PARAMETERS = (
     Axis("equilibrium", (), -0.1, 0.1),
     Axis("clearance", (), 1e-9, 0.1, log=True, zero=0.6),  # tip above the spring at the start
     Axis("approach", ("undeformed", "elastic")),
-    Axis("impact", ("inelastic", "inelastic", "rest", "tip")),
     Axis("bodies", ("both", "both", "both", "both", "both", "both", "beam", "spring")),
     Axis("fidelity", ("dynamic", "dynamic", "dynamic", "dynamic", "quasi_static")),
     Axis("n_elements", (1, 2, 5, 10, 20, 50)),
@@ -85,7 +83,6 @@ AT_REST: dict[str, Any] = {
     "equilibrium": 0.0,
     "clearance": 0.0,
     "approach": "undeformed",
-    "impact": "inelastic",
     "bodies": "both",
     "fidelity": "dynamic",
     "n_elements": 20,
@@ -177,16 +174,14 @@ def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
     clearance = cell["clearance"]
     if elastic:
         clearance = min(clearance, 0.1 * speed * steps * H)  # else most would never meet
-    impact = cell["impact"]
-    if LAWS[law].lasting:  # joined from the start, a tie by the inelastic impact
-        clearance, impact = 0.0, "inelastic"
+    if LAWS[law].lasting:  # joined from the start, a tie by the impact
+        clearance = 0.0
     # What takes the beam's kinetic energy v²/6.
     reach = abs(psi) + speed / np.sqrt(3.0 * k1)
     k2 = {"hardening": k2, "softening": -k1 / (cell["escape"] * reach) ** 2, "linear": 0.0}[cell["k2_kind"]]
     scene: dict[str, Any] = {
         "contact": {
             "law": law,
-            "impact": impact,
             "stiffness": cell["contact_stiffness"],
             "exponent": cell["exponent"],
             "damping": cell["contact_damping"] if "damping" in LAWS[law].takes else 0.0,

@@ -240,7 +240,7 @@ def _class(run: Trajectory, cause: str, relative: np.ndarray, scale: np.ndarray,
     """Return the class of a run and why, by its relative residuals, the scale of its energy and its overlap."""
     scene, _ = with_scheme_chosen(run.scene)
     residual = float(np.abs(relative).max())
-    keeps = scene.coupling.scheme == "energy" and not scene.contact.algorithm
+    keeps = scene.coupling.scheme == "energy"
     if keeps and residual > _GUARANTEED:
         return "garbage", f"energy residual {residual:.1e} of a coupling that changes none; {cause}"
     if cause:
@@ -262,8 +262,6 @@ def _faults(run: Trajectory, overlap: float, scale: np.ndarray) -> Iterator[str]
         if name != "phase" and not np.all(np.isfinite(values)):
             yield f"{name} is not finite"
     lost = {"damping": run.e_dissipated, "impacts": run.e_impact_loss}
-    if run.scene.contact.impact == "tip":
-        del lost["impacts"]
     for what, energy in lost.items():
         change = np.diff(energy)
         if np.any(change < -_SLACK * scale[1:]):
@@ -284,6 +282,6 @@ def _overlap(run: Trajectory) -> float:
     if scene.contact.rigid and scene.coupled:
         joined, free = np.isin(run.phase, ("tied", "touch")), run.phase == "free"
         overlaps += [np.abs(run.gap[joined]).max(initial=0.0), np.max(-run.gap[free], initial=0.0)]
-    if scene.stop is not None and not scene.contact.algorithm and not scene.elastic_stop:
+    if scene.stop is not None and not scene.elastic_stop:
         overlaps.append(np.max(scene.stop.position - (run.y if "y" in run.columns else run.u_tip)))
     return float(max(overlaps)) / motion if motion > 0.0 else 0.0

@@ -102,9 +102,7 @@ def predict(scene: Scene) -> dict[str, Any]:
             notes.append("predicted for exact modes; the midpoint rule adds no energy of its own")
         if not resolved:
             rates["the beam's lowest mode turns"] = ends[0]
-    if scene.contact.algorithm:
-        notes.append("Algorithm 1 (law = 'paper') overwrites the tip's position: no matrix of this kind")
-    elif modal is not None:
+    if modal is not None:
         pair = linear_pair(scene, modal)
     if pair is not None:
         found["contact_frequency"] = pair.contact_frequency if pair.soft else None

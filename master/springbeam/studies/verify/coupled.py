@@ -31,9 +31,9 @@ from .alone import (
 def _held(stiffness: float, size: float) -> np.ndarray:
     """Return y, z of a unit mass after a step, from those before it and a force held over it; shape (2, 3)."""
     found = []
-    with closing(FmuSpring(Spring.with_ones(linear_stiffness=stiffness), 0.0)) as spring:
-        for y, z, force in np.eye(3).tolist():
-            spring.restart(0.0, y, z)
+    for y, z, force in np.eye(3).tolist():
+        spec = Spring.with_ones(linear_stiffness=stiffness, initial_velocity=z)
+        with closing(FmuSpring(spec, 0.0, y)) as spring:
             found.append(spring.advance(0.0, size, (-force, 0.0, 0.0))[:2])
     return np.transpose(found)
 

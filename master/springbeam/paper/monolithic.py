@@ -2,9 +2,8 @@
 
 Line numbers in comments are those of the printed algorithm. Where it leaves something open the choice has a name:
 
-``contact.impact``
-    z at t_c: ``"tip"`` the tip's velocity (line 5), which in the semi-discrete model does not jump, so that it is also
-    the average of eq. (11); else as it is, which is 0 of a spring that rests (section 6).
+``at_contact``
+    z at t_c: see `springbeam.paper.problem.AtContact`.
 ``y_temp`` (lines 16–17, "accommodate the transmission condition")
     ``"equation"``: (53) starts from the tip's position u instead of yˡ, and line 29 forms z from the true yˡ.
     ``"guess"``: u is where Newton's method starts; (53) keeps yˡ.
@@ -28,22 +27,16 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import scipy.sparse.linalg as spla
 
+from ..monolithic.semi_discrete import assemble, constant_forces, inner_forces
 from ..results.trajectory import Event, EventKind, Trajectory
 from ..scene import Scene
-from .hybrid_system import ReferenceFailure
-from .rows import finished
-from .semi_discrete import assemble, constant_forces, inner_forces
+from . import problem
+from .problem import AlgorithmFailure, AtContact
 
 YTemp = Literal["equation", "guess", "both"]
 
 #: Of Newton's method, on the change of the unknown [m].
 _MAX_ITERATIONS, _TOLERANCE = 50, 1e-12
-
-
-class AlgorithmFailure(ReferenceFailure):
-    """Newton's method did not converge, or the solution overflows; ``trajectory`` holds what came before."""
-
-    trajectory: Trajectory | None = None
 
 
 class _Row(NamedTuple):
@@ -63,13 +56,13 @@ class _Row(NamedTuple):
     booked: bool = False  #: whether the step was one in contact
 
 
-def simulate(scene: Scene, *, y_temp: YTemp = "equation") -> Trajectory:
+def simulate(scene: Scene, *, at_contact: AtContact = "rest", y_temp: YTemp = "equation") -> Trajectory:
     """Run Algorithm 1 with h_t = ``coupling.macro_step`` on a scene with beam and spring, and a shorter last step to
     ``time.t_end`` where that is off the grid.
 
     Parameters
     ----------
-    y_temp
+    at_contact, y_temp
         See the module.
 
     Returns
@@ -81,16 +74,17 @@ def simulate(scene: Scene, *, y_temp: YTemp = "equation") -> Trajectory:
         ``e_injected_spring`` [J], and ``case`` (11, 14, or 0 where neither line holds).
         ``summary["newton"]`` holds Newton iterations per solve (Table 2), counted up to and including the first step
         |Δ| ≤ 1e-12 m: ``spring`` of lines 10 and 17, (53), and each by itself, ``spring_predicted`` and
-        ``spring_joined``. ``solves`` of (53) were made; ``time_per_step`` is in s.
+        ``spring_joined``. ``solves`` of (53) were made.
 
     Raises
     ------
-    ValueError
+    SceneError
         If the scene is not one that Algorithm 1 is written for.
     AlgorithmFailure
         With the time and the trajectory so far, where an iteration fails or the solution overflows.
     """
-    algorithm = _Algorithm(scene, y_temp)
+    problem.refuse(scene)
+    algorithm = _Algorithm(scene, at_contact, y_temp)
     try:
         algorithm.run()
     except AlgorithmFailure as failure:
@@ -100,11 +94,11 @@ def simulate(scene: Scene, *, y_temp: YTemp = "equation") -> Trajectory:
 
 
 class _Algorithm:
-    def __init__(self, scene: Scene, y_temp: YTemp) -> None:
-        if scene.beam is None or scene.spring is None or scene.loads or scene.massless:
-            raise ValueError("Algorithm 1 needs [spring] and a [beam] that is dynamic, and knows no [[loads]]")
+    def __init__(self, scene: Scene, at_contact: AtContact = "rest", y_temp: YTemp = "equation") -> None:
+        assert scene.beam is not None
+        assert scene.spring is not None
         self.scene, self.beam, self.spring = scene, scene.beam, scene.spring
-        self.y_temp = y_temp
+        self.at_contact, self.y_temp = at_contact, y_temp
         self.discrete = d = assemble(scene.beam)
         self.load = d.nodal(*constant_forces(scene.beam))
         self._set_step(scene.coupling.H)
@@ -168,11 +162,10 @@ class _Algorithm:
         row, psi = self._start(), self.spring.equilibrium
         touched = self.beam.approach == "undeformed" or row.q[-1] <= psi  # else lines 1–4 come first
         self.rows.append(self._first_contact(row)._replace(phase="tied") if touched else row)
-        (whole, rest), start = self.scene.equal_steps, self.time
-        for step in range(1, whole + (rest > 0.0) + 1):
-            if step > whole:
-                self._set_step(rest)
-            self.time = start + step * self.h if step <= whole else self.scene.time.t_end
+        for end, size in problem.steps(self.scene):
+            self.time = end
+            if size != self.h:
+                self._set_step(size)
             row = self._contact_step(self.rows[-1]) if touched else self._free_step(self.rows[-1])
             if not touched and row.q[-1] <= psi:
                 touched, row = True, self._first_contact(row)
@@ -186,7 +179,7 @@ class _Algorithm:
     def _first_contact(self, row: _Row) -> _Row:
         """Make lines 5 and 6."""
         self.stiffness = self.scene.contact.stiffness
-        z = float(row.v[-1]) if self.scene.contact.impact == "tip" else row.z
+        z = float(row.v[-1]) if self.at_contact == "tip" else row.z
         row = row._replace(y=self.spring.equilibrium, z=z)
         self._note("impact", row)
         return row
@@ -284,20 +277,20 @@ class _Algorithm:
             "foundation_force": found["foundation"],
             "e_beam": 0.5 * np.sum(v * (d.M @ v.T).T, axis=1) + 0.5 * np.sum((d.B @ q.T) ** 2, axis=0),
             "e_spring": e_spring,
-            "e_contact": np.zeros(len(y)),
             "e_dissipated": total(taken),
-            "e_impact_loss": np.zeros(len(y)),
             "e_load": -(q @ self.load) - p.external_force * y,
             "case": found["case"].astype(float),
             "e_injected_beam": total(booked * overwritten),
             "e_injected_spring": total(booked * (np.diff(e_spring) - worked)),
         }
-        cases, steps = found["case"], max(len(self.rows) - 1, 1)
         predicted, joined = self.iterations["predicted"], self.iterations["joined"]
         solves = {"spring_predicted": predicted, "spring_joined": joined, "spring": predicted + joined}
         newton = {name: float(np.mean(counts)) if counts else 0.0 for name, counts in solves.items()}
-        newton |= {"solves": len(solves["spring"]), "time_per_step": seconds / steps}
-        summary: dict[str, Any] = {"reference": "algorithm1", "newton": newton, "steps_apart": int(np.sum(cases == 11))}
-        extra = ("case", "e_injected_beam", "e_injected_spring")
+        summary: dict[str, Any] = {
+            "algorithm": "monolithic",
+            "newton": {**newton, "solves": len(solves["spring"])},
+            "steps_apart": int(np.sum(found["case"] == 11)),
+            "wall_time": seconds,
+        }
         shapes = np.hstack([q @ d.interpolated().T, (q + alpha * v) @ inner_forces(self.beam, d).T])
-        return finished(self.scene, columns, shapes, self.events, summary, extra)
+        return problem.result(self.scene, columns, shapes, self.events, summary)

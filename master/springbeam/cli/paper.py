@@ -1,0 +1,66 @@
+"""``springbeam paper``: Algorithm 1 of Ahn & Tate on the cases of their figures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from ..results.directory import RunDirectory
+from ..results.recording import FileRecorder
+from ..scene import load_scene
+from ..studies.tables import Findings
+from .common import STOPPED, ForceOption, JsonOption, NoPlotsOption, QuietOption, SettingsOption
+from .run import carry_out
+
+
+def paper(
+    figure: Annotated[
+        Literal["2", "3", "4", "5"], typer.Argument(metavar="FIGURE", help="Which figure's case: 2, 3, 4 or 5.")
+    ],
+    monolithic: Annotated[
+        bool, typer.Option("--monolithic", help="Solve each step as one system, not through the FMUs.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="DIR", help="Where results go. Default: results/paper-figN, or …-2, …"),
+    ] = None,
+    settings: SettingsOption = None,
+    no_plots: NoPlotsOption = False,
+    force: ForceOption = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> Findings:
+    """Run Algorithm 1 of Ahn & Tate on the case of a figure; write what springbeam run writes.
+
+    Example: springbeam paper 2 --monolithic
+    """
+    from ..paper import co_simulation
+    from ..paper import monolithic as as_one_system
+    from ..paper.problem import AlgorithmFailure
+
+    scene = load_scene(f"paper-fig{figure}", settings or ())
+    failed = ""
+    try:
+        made = (as_one_system if monolithic else co_simulation).simulate(scene)
+    except AlgorithmFailure as failure:
+        failed = f"the run stopped early: {failure}"
+        if failure.trajectory is None:
+            raise
+        made = failure.trajectory
+        made.summary |= {"status": "stopped", "cause": str(failure)}
+    directory = _directory(Path("results") / f"paper-fig{figure}", out, force=force)
+    found = carry_out(
+        FileRecorder(scene, directory), seconds=None, made=made, no_plots=no_plots, silent=quiet or as_json
+    )
+    if failed:
+        return replace(found, code=STOPPED, error=f"{failed}; what was computed is in {directory.path}")
+    return found
+
+
+def _directory(default: Path, out: Path | None, *, force: bool) -> RunDirectory:
+    if out is None and not force:
+        return RunDirectory.create_numbered(default)
+    return RunDirectory.create(out or default, replace=force)

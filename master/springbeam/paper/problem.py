@@ -1,0 +1,90 @@
+"""What Algorithm 1 asks of a scene, and the result of a run by it, whoever makes its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal
+
+import numpy as np
+
+from ..monolithic.rows import finished
+from ..results.trajectory import Event, Trajectory
+from ..scene import Scene, SceneError
+from ..scene.resolution import not_resolved
+
+#: z at t_c: ``"rest"``, as it is, which is 0 of a spring at rest (section 6); ``"tip"``, the tip's velocity (line 5).
+#: The tip of the semi-discrete beam does not jump, so that this is also the average of eq. (11).
+AtContact = Literal["rest", "tip"]
+
+#: Columns that runs of a scene do not have: the lines that decided (11, 14, or 0 where neither holds), and the work
+#: that no force of the model does: of the overwritten tip on the beam, of the exchange of yˡ on the spring [J].
+EXTRA = ("case", "e_injected_beam", "e_injected_spring")
+
+
+class AlgorithmFailure(RuntimeError):
+    """Newton's method did not converge, a body refused a step, or the solution overflows.
+
+    ``trajectory`` holds the steps before.
+    """
+
+    trajectory: Trajectory | None = None
+
+
+def refuse(scene: Scene) -> None:
+    """Raise SceneError if ``scene`` is not one that Algorithm 1 is written for."""
+    if scene.beam is None or scene.spring is None or scene.massless or scene.loads or scene.static:
+        raise SceneError(
+            'Algorithm 1 needs a [spring] and a [beam] with fidelity = "dynamic", and knows neither [[loads]] nor a '
+            "start at rest"
+        )
+    if scene.accuracy is not None or scene.coupling.adaptive:
+        raise SceneError("Algorithm 1 has one step size; give [coupling] macro_step, no accuracy and no tolerance")
+
+
+def steps(scene: Scene) -> Iterator[tuple[float, float]]:
+    """Yield the end [s] and the size [s] of each step of h_t = ``coupling.macro_step``; the last one may be shorter."""
+    start, h = scene.contact_time or 0.0, scene.coupling.H
+    whole, rest = scene.equal_steps
+    for number in range(1, whole + 1):
+        yield start + number * h, h
+    if rest > 0.0:
+        yield scene.time.t_end, rest
+
+
+def result(
+    scene: Scene,
+    columns: dict[str, np.ndarray],
+    shapes: np.ndarray,
+    events: list[Event],
+    summary: Mapping[str, Any],
+) -> Trajectory:
+    """Return the result of a run: ``columns``, what follows from them, and the balance of its energy.
+
+    Parameters
+    ----------
+    columns
+        All columns of a step but those of `springbeam.monolithic.rows.finished`; forces are means over the step [N].
+    shapes
+        Deflections [m], bending moments [N·m] and shear forces [N] of each row, shape (n, 63).
+    events
+        First contact, and impacts on the foundation.
+    summary
+        What only one of the two programs can say.
+    """
+    columns["contact_force_smoothed"] = columns["contact_force"]
+    columns |= {name: np.zeros(len(columns["time"])) for name in ("e_contact", "e_impact_loss")}
+    unresolved = not_resolved(scene)
+    warnings = ["Algorithm 1 overwrites the tip's position, which changes the energy by energy_residual"]
+    found = finished(scene, columns, shapes, events, {}, EXTRA)
+    found.summary = {
+        "status": "done",
+        "macro_steps": len(found) - 1,
+        **summary,
+        "max_energy_residual": found.summary["largest_relative_energy_residual"],
+        "injected_into_beam": float(columns["e_injected_beam"][-1]),
+        "injected_into_spring": float(columns["e_injected_spring"][-1]),
+        "resolved": unresolved is None,
+        "warnings": [*warnings, *([] if unresolved is None else [unresolved])],
+        "scene": scene.model_dump(exclude_none=True),
+    }
+    return found

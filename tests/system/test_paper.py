@@ -1,0 +1,229 @@
+"""Algorithm 1: what the paper reports of it; the program through the FMUs beside the one as one system; its command."""
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import command, refused
+from scenes import SOFT, kinds, soft
+
+from springbeam import SceneError, load, load_scene, with_changes
+from springbeam.bodies import fmu_bodies
+from springbeam.bodies.protocol import StepRefused
+from springbeam.paper import co_simulation, monolithic
+from springbeam.paper.problem import AlgorithmFailure
+from springbeam.scene.reading import tomllib
+
+PROGRAMS = {"monolithic": monolithic, "co_simulation": co_simulation}
+RECORDED = tomllib.loads(Path(__file__).with_name("paper.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def found(program, number):
+    return PROGRAMS[program].simulate(load_scene(f"paper-fig{number}"))
+
+
+# -- the figures
+
+
+@pytest.mark.parametrize("number", [2, 3, 4, 5])
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_the_figures_have_the_numbers_that_they_had(program, number):
+    """Rounding moves them by at most 5e-12 of their size."""
+    run, before = found(program, number), RECORDED[program][str(number)]
+    curves = {**run.columns, "energy": run.e_beam + run.e_spring + run.e_load}
+    solves = run.summary.get("newton", {}).get("spring") or run.summary["spring_steps_per_solve"]
+    assert solves == pytest.approx(before["iterations"], abs=1e-12)
+    for name, (low, high) in before["extremes"].items():
+        size = 1e-8 * max(abs(low), abs(high))
+        assert (curves[name].min(), curves[name].max()) == pytest.approx((low, high), abs=size, rel=0.0), name
+
+
+@pytest.mark.parametrize(("number", "reported"), [(2, 1.990), (4, 2.000)])
+def test_the_iterations_are_those_of_table_2_and_the_tip_flips(number, reported):
+    """Section 6: "the beams move up and down almost the same speed at each time step" (ω₁h = 967).
+
+    f_b = (0, …, 0, −6) of the next figure bends the tip by 6 h_x/3 × its compliance 4/(3κ) ≈ 7e-14 m: nothing to see.
+    """
+    run, loaded = found("monolithic", number), found("monolithic", number + 1)
+    assert run.summary["newton"]["spring"] == pytest.approx(reported, abs=0.01)
+    v = run.v_tip
+    assert (run.time[0], len(run)) == (0.5, 876)
+    np.testing.assert_allclose(v[:5], [-1.0, 1.0, -1.0, 1.0, -1.0], atol=2e-4)
+    assert np.mean(v[1:] * v[:-1] < 0.0) > 0.99
+    assert np.max(np.abs(run.u_tip)) < 4.4e-6
+    assert run.summary["steps_apart"] == {2: 0, 4: 1}[number]
+    assert loaded.summary["newton"]["spring"] == pytest.approx(run.summary["newton"]["spring"], abs=1e-12)
+    assert 0.0 < np.max(np.abs(loaded.u_tip - run.u_tip)) < 2e-11
+    # Nothing in the model does the work of the tip that is overwritten: 75 % of the initial energy, ½∫x² dx.
+    assert run.e_total[0] == pytest.approx(1.0 / 6.0, rel=1e-12)
+    if number == 2:
+        assert np.max(run.energy_residual) == pytest.approx(0.1253, abs=2e-4)
+
+
+@pytest.mark.parametrize("number", [2, 4])
+def test_both_programs_differ_by_the_midpoint_rule_of_the_spring(number):
+    """docs/paper.md, rows 1 and 2 of its pictures; Figure 4 has the stiffer spring."""
+    ours, theirs = found("co_simulation", number), found("monolithic", number)
+    y, v = {2: (1.9e-10, 2e-5), 4: (1.1e-9, 1.8e-4)}[number]
+    assert 0.5 * y < np.abs(ours.y - theirs.y).max() < 1.1 * y
+    assert 0.5 * v < np.abs(ours.v_tip - theirs.v_tip).max() < 1.1 * v
+    assert list(ours.columns) == list(theirs.columns)
+    assert len(ours.shapes[0]) == len(theirs.shapes[0]) == len(ours)
+    assert np.abs(ours.shapes[1] - theirs.shapes[1]).max() < 1e-3 * np.abs(theirs.shapes[1]).max()
+
+
+# -- readings
+
+
+def test_other_readings_are_other_algorithms():
+    guess = monolithic.simulate(load_scene("paper-fig2"), y_temp="guess")
+    assert np.max(np.abs(guess.y)) == 0.0  # nothing ever reaches the spring
+    assert monolithic.simulate(load_scene("paper-fig2"), y_temp="both").summary["steps_apart"] > 1
+    with pytest.raises(AlgorithmFailure) as failure:
+        monolithic.simulate(load_scene("paper-fig4"), at_contact="tip")
+    assert np.max(failure.value.trajectory.e_total) > 1e9
+
+
+@pytest.mark.parametrize("program", PROGRAMS.values())
+def test_what_it_starts_with_and_does_not_have(program):
+    short = soft(10, time={"t_end": 4e-3}, coupling={"macro_step": 4e-3})
+    for at_contact, expected in (("rest", 0.0), ("tip", -1.0)):
+        assert program.simulate(short, at_contact=at_contact).z[0] == expected
+    for changes in (
+        {"loads": [{"on": "tip", "amplitude": 1.0}]},
+        {"beam": {"fidelity": "quasi_static"}},
+        {"spring": None, "stop": None},
+    ):
+        with pytest.raises(SceneError, match=r"needs a \[spring\] and a \[beam\] with fidelity"):
+            program.simulate(with_changes(short, **changes))
+    for coupling in ({"relative_tolerance": 1e-3}, {"macro_step": None, "absolute_tolerance": 1e-6}):
+        with pytest.raises(SceneError, match="has one step size"):
+            program.simulate(with_changes(SOFT, coupling=coupling))
+
+
+# -- one program beside the other
+
+
+def resolved(**tables):
+    """A heavy spring on a stiff foundation under a beam that comes down on it, in steps that resolve both."""
+    beam = {"young_modulus": 1e3, "shear_modulus": 1e3, "n_elements": 4, "approach": "elastic"}
+    spring = {"mass": 100.0, "linear_stiffness": 7e3, "cubic_stiffness": 4e8, "damping": 100.0, "external_force": -9.0}
+    given = {"contact": {"stiffness": 500.0}, "coupling": {"macro_step": 1e-3}}
+    moving = {"initial_velocity_slope": -0.1, "alpha_b": 1e-3}
+    return with_changes(with_changes(SOFT, beam={**beam, **moving}, spring=spring, **given), **tables)
+
+
+def test_an_elastic_approach_that_begins_at_the_spring_begins_in_contact():
+    for program in PROGRAMS.values():
+        run = program.simulate(resolved(time={"t_end": 5e-3}))
+        assert (run.phase[0], kinds(run)[0], run.events[0].time) == ("tied", "impact", 0.0)
+
+
+@pytest.mark.parametrize(
+    ("at_contact", "slope", "speed", "stop", "stiffness", "phases"),
+    [
+        ("tip", 0.0, -0.1, -0.015, 500.0, {"tied", "seated"}),
+        ("tip", 0.0, -0.1, -1e-4, 1e5, {"tied", "seated", "free"}),
+        ("rest", 0.0, 0.1, -0.015, 1e5, {"tied", "free"}),
+        ("rest", 2e-4, -0.1, -0.015, 1e5, {"free", "tied"}),
+    ],
+)
+def test_both_programs_decide_alike(at_contact, slope, speed, stop, stiffness, phases):
+    """In all their columns, up to a last step of 0.3 h; a spring sinks before the tip has come and after it has left.
+
+    The midpoint rule and the exact flow differ by (ωh)²/12 ≤ 9e-5 of a step's motion, over 6 steps; 3e-4 is allowed,
+    and more of energies, which grow tenfold in a step, and of which a dashpot takes that of the mean velocity.
+    """
+    contact = {"exponent": 1.0, "stiffness": stiffness}
+    beam = {"initial_deflection_slope": slope, "initial_velocity_slope": speed}
+    spring = {"initial_velocity": -0.02 if slope else 0.0}
+    scene = resolved(time={"t_end": 5.3e-3}, contact=contact, beam=beam, spring=spring, stop={"position": stop})
+    run, reference = (program.simulate(scene, at_contact=at_contact) for program in (co_simulation, monolithic))
+    assert (list(run.phase), run.summary["macro_steps"]) == (list(reference.phase), 6)
+    assert np.array_equal(run.time, reference.time)
+    assert set(run.phase) == phases
+    assert kinds(run) == kinds(reference)
+    impulses = [[event.impulse_foundation for event in each.events] for each in (run, reference)]
+    assert impulses[0] == pytest.approx(impulses[1], abs=3e-4 * max(impulses[1]))
+    shares = dict.fromkeys(("u_tip", "v_tip", "y", "z", "contact_force", "compliance_force", "foundation_force"), 3e-4)
+    for name, share in (shares | {"e_beam": 3e-4, "e_spring": 3e-4, "energy_residual": 1e-3}).items():
+        largest = np.abs(reference[name]).max()
+        assert run[name] == pytest.approx(reference[name], abs=share * largest, rel=0.0), name
+    assert np.array_equal(run.case, np.where(run.phase == "free", run.case, 14.0) * (run.case != 0.0))
+    for body, share in {"beam": 3e-4, "spring": 1e-3}.items():
+        injected = reference.summary[f"injected_into_{body}"]
+        assert run.summary[f"injected_into_{body}"] == pytest.approx(injected, rel=share, abs=1e-9)
+
+
+@pytest.mark.parametrize(("t_end", "steps"), [(0.5035, 1), (0.7, 50), (0.7013, 51), (0.7 + 1e-10, 50)])
+def test_runs_end_at_t_end_where_it_is_off_the_grid(t_end, steps):
+    """First contact is at 0.5 s, h_t = 4 ms. A remainder that would drown in rounding joins the step before it."""
+    scene = with_changes(load_scene("paper-fig2"), beam={"n_elements": 50, "n_modes": 0}, time={"t_end": t_end})
+    for program in PROGRAMS.values():
+        run = program.simulate(scene)
+        assert (len(run) - 1, run.time[-1]) == (steps, pytest.approx(t_end, rel=1e-14))
+
+
+# -- what fails
+
+
+def test_a_solution_that_grows_beyond_all_bounds_keeps_what_came_before():
+    """The tip is thrown about, until Newton's method finds no step, or the FMU no spring that high."""
+    scene = soft(4, time={"t_end": 0.05})
+    says = {monolithic: "Newton's method for the predicted position", co_simulation: "the hilltop of its potential"}
+    for program, why in says.items():
+        with pytest.raises(AlgorithmFailure, match=rf"{why}.* at t = 0\.0") as failed:
+            program.simulate(scene)
+        assert len(failed.value.trajectory) > 1
+        assert np.isfinite(failed.value.trajectory.energy_residual).all()
+
+
+def test_a_body_that_refuses_a_step_stops_the_command_and_what_was_computed_stays(tmp_path, monkeypatch):
+    advance, calls = fmu_bodies.OwnBody.advance, []
+
+    def failing(self, *given):
+        calls.append(given)
+        if len(calls) > 100:
+            raise StepRefused("the spring breaks")
+        return advance(self, *given)
+
+    monkeypatch.setattr(fmu_bodies.OwnBody, "advance", failing)
+    result = command("paper", 2, "--set=beam.n_elements=4", "--set=beam.n_modes=0", "-q", "-o", tmp_path, "--no-plots")
+    assert result.exit_code == 3
+    assert "error: the run stopped early: the spring breaks at t = 0.6" in result.stderr
+    run = load(tmp_path)
+    assert (run.summary["status"], len(run) > 10) == ("stopped", True)
+
+
+# -- the command
+
+
+@pytest.mark.parametrize("options", [(), ("--monolithic",)])
+def test_the_command_writes_what_a_run_writes(options, tmp_path):
+    settings = ("--set=beam.n_elements=20", "--set=beam.n_modes=0", "--set=time.t_end=0.6")
+    result = command("paper", 4, *options, *settings, "--out", tmp_path / "four", "--json")
+    assert (result.exit_code, json.loads(result.stdout)["macro_steps"]) == (0, 25)
+    names = {file.name for file in (tmp_path / "four").iterdir()}
+    assert {"trajectory.csv", "events.csv", "shapes.csv", "summary.json"} <= names
+    for letter in "abcde":
+        assert [name for name in names if name.startswith(f"{letter}_") and name.endswith(".png")], letter
+    run = load(tmp_path / "four")
+    with_law = command("run", "paper-fig4", *settings, "--out", tmp_path / "law", "--no-plots", "-q")
+    assert with_law.exit_code == 0
+    told = ("a_tip", "clamp_force", "clamp_moment", "a_y")  # by bodies at the end of a step of a run
+    columns = [name for name in load(tmp_path / "law").columns if name not in told]
+    assert list(run.columns) == [*columns, "case", "e_injected_beam", "e_injected_spring"]
+
+
+def test_what_cannot_be_run_is_bad_input(tmp_path):
+    assert "'6' is not one of '2', '3', '4'" in refused("paper", 6)
+    assert "has one step size" in refused("paper", 2, "--set=coupling.relative_tolerance=1e-3", "-o", tmp_path / "no")
+    assert not (tmp_path / "no").exists()
+    for setting, says in {
+        "contact.law=paper": "springbeam paper 2, 3, 4 or 5 runs Algorithm 1",
+        "contact.impact=rest": "leave it out: ends that a rigid law joins meet inelastically",
+    }.items():
+        assert says in refused("run", "paper-fig2", f"--set={setting}")
