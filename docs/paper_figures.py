@@ -7,58 +7,38 @@ from __future__ import annotations
 
 from typing import Any
 
-import matplotlib
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from pages import IMAGES  # beside this script
 from scipy.sparse.linalg import splu
 
 from springbeam import Scene, Trajectory, load_scene, simulate, with_changes
-from springbeam.monolithic import algorithm1, event_driven, semi_discrete
-from springbeam.pictures.drawing import BLACK, BLUE, GREEN, VERMILLION, decimated
+from springbeam.monolithic import event_driven, semi_discrete
+from springbeam.paper import co_simulation, monolithic
+from springbeam.paper.figures import TABLE_2, draw, energy
+from springbeam.paper.problem import AlgorithmFailure
 
 FIGURES = (2, 3, 4, 5)
 #: The resolved run: a window after the contact at 0.5 s, and a macro step below 1/ω of the model's fastest mode.
 WINDOW = 4e-5
 RESOLVED_STEP = 1.5e-8
-#: Table 2 as printed (its header says "Figure 5" twice; the third is taken as Figure 4).
-PRINTED = {2: (1.990, 5.63e-3), 3: (3.010, 5.84e-3), 4: (2.000, 5.90e-3), 5: (2.978, 5.83e-3)}
-
-STYLE: Any = {
-    "font.size": 8.0,
-    "axes.titlesize": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-3, 5),
-}
-KEYS = ((BLUE, "beam, its tip"), (VERMILLION, "spring, its top"), (BLACK, "energy (63)"))
-
 TREATMENTS = (
     "Algorithm 1, monolithic\n$h_t$ = 4 ms",
-    "law paper, FMUs\nH = 4 ms",
+    "Algorithm 1, FMUs\n$h_t$ = 4 ms",
     "law transmission\nH = 4 ms (aliased)",
     "law transmission\nresolved, 40 µs",
 )
-
-
-def energy(run: Trajectory) -> np.ndarray:
-    """Return the energy (63), with the potential of the loads."""
-    return run.e_beam + run.e_spring + run.e_load
 
 
 def treatments(number: int) -> tuple[Trajectory, ...]:
     scene = load_scene(f"paper-fig{number}")
     resolved = with_changes(scene, time={"t_end": 0.5 + WINDOW}, coupling={"macro_step": RESOLVED_STEP})
     runs = (
-        algorithm1.simulate(scene),
-        simulate(with_changes(scene, contact={"law": "paper"})),
+        monolithic.simulate(scene),
+        co_simulation.simulate(scene),
         simulate(scene),
         simulate(resolved),
     )
-    print(f"\nFigure {number}                    algorithm 1        paper     aliased    resolved")
+    print(f"\nFigure {number}                      algorithm 1    its FMUs     aliased    resolved")
     for name, what in {
         "largest |u_tip| [m]": lambda r: np.abs(r.u_tip).max(),
         "largest |v_tip| [m/s]": lambda r: np.abs(r.v_tip).max(),
@@ -76,57 +56,21 @@ def treatments(number: int) -> tuple[Trajectory, ...]:
     }.items():
         print(f"  {name:26s}" + "".join(f"{what(run):12.4g}" for run in runs))
     difference = {name: float(np.abs(runs[0][name] - runs[1][name]).max()) for name in ("u_tip", "v_tip", "y", "z")}
-    print(f"  algorithm 1 - paper law     {difference}")
+    print(f"  algorithm 1 - through FMUs  {difference}")
     return runs
 
 
-def draw(number: int, runs: tuple[Trajectory, ...]) -> None:
-    """Draw a figure; rows: the four treatments; columns: tip, spring top, velocities, energy."""
-    figure = Figure(figsize=(10.5, 8.4), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(4, 4)
-    spring = runs[0].scene.spring
-    assert spring is not None
-    load = "" if number in (2, 4) else ", load −6 at the tip"
-    data = f"k1 = {spring.linear_stiffness:g}, k2 = {spring.cubic_stiffness:g}{load}"
-    figure.suptitle(f"Case of Figure {number}: {data}", x=0.01, ha="left", fontsize=11)
-    titles = ("beam's tip u(t,1) [µm]", "spring's top y [µm]", "velocities [m/s]", "energy [J]")
-    for ax, title in zip(axes[0], titles, strict=True):
-        ax.set_title(title)
-    for row, run, label in zip(axes, runs, TREATMENTS, strict=True):
-        resolved = run is runs[3]
-        time = 1e6 * (run.time - 0.5) if resolved else run.time
-        columns: tuple[tuple[tuple[np.ndarray, str], ...], ...] = (
-            ((1e6 * run.u_tip, BLUE),),
-            ((1e6 * run.y, VERMILLION),),
-            ((run.v_tip, BLUE), (run.z, VERMILLION)),
-            ((energy(run), BLACK), (run.e_beam, BLUE), (run.e_spring, VERMILLION)),
-        )
-        for ax, lines in zip(row, columns, strict=True):
-            ax.axhline(0.0, color=GREEN, lw=0.6, ls="--", zorder=0)
-            for values, colour in lines:
-                keep = decimated(time, values, 500)
-                total = colour == BLACK
-                look: dict[str, Any] = {"lw": 2.4 if total else 0.9}
-                if not resolved:  # step to step it alternates: dots
-                    look = {"ls": "none", "marker": ".", "ms": 5.0 if total else 2.0, "mew": 0.0}
-                ax.plot(time[keep], values[keep], color=colour, **look)
-            ax.set_xlabel("t − 0.5 s [µs]" if resolved else "t [s]", labelpad=1.0)
-        row[0].set_ylabel(label)
-    keys = [Line2D([], [], color=colour, lw=2.0, label=label) for colour, label in KEYS]
-    figure.legend(handles=keys, loc="outside upper right", ncols=len(keys), frameon=False)
-    figure.savefig(IMAGES / f"paper-fig{number}.png", dpi=100)
-
-
 def table_2(all_runs: dict[int, tuple[Trajectory, ...]]) -> None:
-    print("\nTable 2: iterations printed | algorithm 1 (line 10, line 17) | paper law;  ms per step likewise; aliased")
+    print(
+        "\nTable 2: iterations printed | algorithm 1 (line 10, line 17) | through FMUs;  ms per step likewise; aliased"
+    )
     for number, (first, paper, aliased, _) in all_runs.items():
-        newton, printed = first.summary["newton"], PRINTED[number]
-        per_step = [1e3 * run.summary["wall_time"] / run.summary["macro_steps"] for run in (paper, aliased)]
+        newton, printed = first.summary["newton"], TABLE_2[number]
+        per_step = [1e3 * run.summary["wall_time"] / run.summary["macro_steps"] for run in (first, paper, aliased)]
         print(
-            f"  {number}: {printed[0]:.3f} | {newton['spring']:.4f} ({newton['spring_predicted']:.4f}, "
-            f"{newton['spring_joined']:.4f}) | {paper.summary['spring_steps_per_solve']:.4f}; "
-            f"{1e3 * printed[1]:.2f} | {1e3 * newton['time_per_step']:.2f} | {per_step[0]:.2f} | {per_step[1]:.2f}"
+            f"  {number}: {printed[0]:.3f} | {first.summary['iterations_per_solve']:.4f} ({newton['predicted']:.4f}, "
+            f"{newton['joined']:.4f}) | {paper.summary['iterations_per_solve']:.4f}; "
+            f"{1e3 * printed[1]:.2f} | {' | '.join(f'{time:.2f}' for time in per_step)}"
         )
 
 
@@ -155,7 +99,7 @@ def statements(all_runs: dict[int, tuple[Trajectory, ...]]) -> None:
         print(f"  E_D: {e[0]:.6f} -> {e[-1]:.6f} J, in [{e.min():.4f}, {e.max():.4f}]; rises in {np.sum(de > 1e-12)} of"
               f" the steps (by up to {de.max():.3g} J), {np.sum(joined & (de > 1e-12))} of them joined "
               f"({de[joined].max():.3g} J); all work of λ(Ψ-u)^p ≤ {work:.2g} J")  # fmt: skip
-        print(f"  injected into the beam {run.e_injected_beam[-1]:+.6f} J (paper law "
+        print(f"  injected into the beam {run.e_injected_beam[-1]:+.6f} J (through FMUs "
               f"{paper.summary['injected_into_beam']:+.6f}), spring {run.e_injected_spring[-1]:+.3g} J")  # fmt: skip
     for loaded, bare in ((3, 2), (5, 4)):
         a, b = all_runs[loaded][0], all_runs[bare][0]
@@ -197,13 +141,13 @@ def report(label: str, scene: Scene, **choices: Any) -> None:
     """Print a run of Algorithm 1, also where it breaks down."""
     broke = ""
     try:
-        run = algorithm1.simulate(scene, **choices)
-    except algorithm1.AlgorithmFailure as failure:
+        run = monolithic.simulate(scene, **choices)
+    except AlgorithmFailure as failure:
         if failure.trajectory is None:
             raise
         run, broke = failure.trajectory, f"  STOPPED: {failure}"
     e = energy(run)
-    solves, apart = run.summary["newton"]["spring"], run.summary["steps_apart"]
+    solves, apart = run.summary["iterations_per_solve"], run.summary["steps_apart"]
     print(f"  {label:30s} iterations {solves:.4f}  apart {apart}  |z| ≤ {np.abs(run.z).max():.3g}  |u| ≤ "
           f"{np.abs(run.u_tip).max():.3g}  y ≥ {run.y.min():.3g}  E {e[0]:.3g} -> ≤ {e.max():.3g} J  "
           f"N ≤ {run.foundation_force.max():.3g}{broke}")  # fmt: skip
@@ -212,10 +156,10 @@ def report(label: str, scene: Scene, **choices: Any) -> None:
 def readings() -> None:
     for number in (2, 4):
         scene = load_scene(f"paper-fig{number}")
-        print(f"\nReadings, Figure {number} (contact.impact, y_temp)")
-        for impact in ("rest", "tip"):
+        print(f"\nReadings, Figure {number} (at_contact, y_temp)")
+        for at_contact in ("rest", "tip"):
             for y_temp in ("equation", "guess", "both"):
-                report(f"{impact}, {y_temp}", with_changes(scene, contact={"impact": impact}), y_temp=y_temp)
+                report(f"{at_contact}, {y_temp}", scene, at_contact=at_contact, y_temp=y_temp)
         print(f"Time step of Algorithm 1, Figure {number}")
         for h in (0.02, 0.008, 0.004, 0.002, 0.001):
             report(f"h_t = {h}", with_changes(scene, coupling={"macro_step": h}))
@@ -245,10 +189,9 @@ def resolution(all_runs: dict[int, tuple[Trajectory, ...]]) -> None:
 
 
 def main() -> None:
-    with matplotlib.rc_context(STYLE):
-        runs = {number: treatments(number) for number in FIGURES}
-        for number in FIGURES:
-            draw(number, runs[number])
+    runs = {number: treatments(number) for number in FIGURES}
+    for number, found in runs.items():
+        draw(number, dict(zip(TREATMENTS, found, strict=True))).savefig(IMAGES / f"paper-fig{number}.png", dpi=100)
     table_2(runs)
     statements(runs)
     load_readings()

@@ -2,6 +2,7 @@
 
 The algorithm decides in each step what touches, overwrites states, and changes the energy by that, so it is no contact
 law of a run. ``co_simulation`` advances the beam and the spring FMU by it, ``monolithic`` solves the same steps as one
-system; neither knows the other. ``problem`` has what both ask of a scene, and makes their results. Imports `bodies`,
-`monolithic` (mesh and energies of the beam) and `scene`, and nothing of a run.
+system; neither knows the other. ``problem`` has what both ask of a scene, and makes their results; ``figures`` has
+Table 2 and draws runs of a figure's case below each other. Imports `bodies`, `monolithic` (the beam's mesh, and columns
+that follow from others), `pictures`, `results` and `scene`, and nothing of a run.
 """

@@ -70,8 +70,7 @@ def simulate(scene: Scene, *, at_contact: AtContact = "rest") -> Trajectory:
     -------
     Trajectory
         A row per step from t_c on (from 0 with ``approach = "elastic"``), as of
-        `springbeam.paper.monolithic.simulate`. ``summary["spring_steps_per_solve"]`` stands for the iterations of
-        Table 2.
+        `springbeam.paper.monolithic.simulate`. ``summary["iterations_per_solve"]`` (Table 2) are steps of the spring.
 
     Raises
     ------
@@ -144,7 +143,7 @@ class _Algorithm:
         columns = dict(zip(Row._fields, map(np.array, zip(*self._rows, strict=True)), strict=True))
         summary: dict[str, Any] = {
             "algorithm": "through the FMUs",
-            "spring_steps_per_solve": self._iterations / self._solves if self._solves else 0.0,
+            "iterations_per_solve": self._iterations / self._solves if self._solves else 0.0,
             "wall_time": perf_counter() - self._began,
         }
         return problem.result(self._scene, columns, np.array(self._shapes), self._events, summary)
