@@ -1,6 +1,6 @@
 """Measure the tables of own_fmu.md and draw its picture: FMUs of others against the elements that they describe.
 
-It needs `pip install pythonfmu pythonfmu3` and a C compiler: python docs/own_fmu.py   (about a minute)
+It needs `pip install pythonfmu3` and a C compiler: python docs/own_fmu.py   (about a minute)
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ def built(folder: Path, *, version: int) -> dict[str, Any]:
         source = source.replace("self.m = 1.0", f"{clock}self.m = 1.0")
     (folder / tool).mkdir()
     (folder / tool / "msd.py").write_text(source, "utf-8")
-    subprocess.run([tool, "build", "-f", "msd.py", "--handle-state"], cwd=folder / tool, check=True)
+    build = [sys.executable, "-m", tool, "build", "-f", "msd.py", "--handle-state"]
+    subprocess.run(build, cwd=folder / tool, check=True)
     path = folder / tool / "MassSpringDamper.fmu"
     return {"fmu": str(path), "force": "F", "displacement": "x", "velocity": "v"}
 

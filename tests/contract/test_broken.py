@@ -17,6 +17,7 @@ from springbeam.bodies.protocol import FmuError
 
 XML = "modelDescription.xml"
 BINARY = "binaries/linux64/beam.so"
+HERE = ("linux64",)
 
 
 def edited(pattern, replacement):
@@ -45,12 +46,19 @@ def both(*edits):
     return lambda files: [edit(files) for edit in edits]
 
 
+def in_utf_16(files):
+    files[XML] = files[XML].decode().encode("utf-16")
+
+
+OTHERS = "it has binaries for win64 and none .* those of linux64"
+DOCUMENT_TYPE = '<!DOCTYPE x [<!ENTITY secret SYSTEM "file:///etc/passwd">]>\n<fmi'
 TIP_FORCE = r'(name="tip_force" valueReference=")\d+'
 BROKEN = {
     "no description": (without(XML), "modelDescription.xml"),
     "description is not XML": (replaced(XML, b"<fmiModelDescription"), "XML|markup|parse|syntax|find end"),
-    "an entity from outside": (
-        edited("<fmi", '<!DOCTYPE x [<!ENTITY secret SYSTEM "file:///etc/passwd">]>\n<fmi'),
+    "an entity from outside": (edited("<fmi", DOCUMENT_TYPE), "document type declaration"),
+    "an entity from outside in UTF-16": (
+        both(edited("<fmi", DOCUMENT_TYPE), edited('encoding="UTF-8"', 'encoding="UTF-16"'), in_utf_16),
         "document type declaration",
     ),
     "description breaks the schema": (edited(r"<CoSimulation", '<CoSimulation colour="red"'), "colour"),
@@ -68,7 +76,7 @@ BROKEN = {
     ),
     "wrong GUID": (edited(r'guid="\{[^"]*\}"', 'guid="{0}"'), r"the GUID \{0\} is not that of this FMU"),
     "no binary": (without(BINARY), r"beam\.so|platform|binary|binaries"),
-    "binary of another platform": (renamed(BINARY, "binaries/win64/beam.dll"), r"linux64|platform|beam\.so|binar"),
+    "binary of another platform": (renamed(BINARY, "binaries/win64/beam.dll"), OTHERS),
     "binary is no library": (replaced(BINARY, b"not an ELF file"), r"ELF|invalid|header|too short"),
     "empty binary": (replaced(BINARY, b""), r"file too short|ELF|empty"),
     "a variable is missing": (edited(r'name="tip_force"', 'name="tip_farce"'), "tip_force"),
@@ -140,7 +148,7 @@ def test_refused_by_name_and_nothing_is_unpacked(tmp_path, name):
         file.writestr("modelDescription.xml", b"<x/>")
         file.writestr(named(name), b"evil")
     with pytest.raises(UnsafeArchive) as refusal:
-        unpack(tmp_path / "evil.fmu", folder)
+        unpack(tmp_path / "evil.fmu", folder, HERE)
     assert f"member {name!r} is no plain name" in str(refusal.value)
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["evil.fmu", "inner", "outer"]
 
@@ -151,18 +159,39 @@ def test_links_and_devices_become_files(tmp_path, kind):
     info.external_attr = (kind | 0o777) << 16
     with ZipFile(tmp_path / "evil.fmu", "w") as file:
         file.writestr(info, b"/etc")
-    unpack(tmp_path / "evil.fmu", tmp_path / "in")
+    unpack(tmp_path / "evil.fmu", tmp_path / "in", HERE)
     found = tmp_path / "in" / "resources" / "link"
     assert stat.S_ISREG(found.lstat().st_mode)
     assert found.read_bytes() == b"/etc"
+
+
+def test_what_a_run_does_not_use_has_no_limit(tmp_path, monkeypatch):
+    monkeypatch.setattr(archive, "MOST_BYTES", 1000)
+    with ZipFile(tmp_path / "large.fmu", "w") as file:
+        for name in ("binaries/win64/large.dll", "sources/large.c", "binaries/linux64/small.so"):
+            file.writestr(name, bytes(1000))
+    unpack(tmp_path / "large.fmu", tmp_path / "in", HERE)
+    assert [path.name for path in (tmp_path / "in").rglob("*") if path.is_file()] == ["small.so"]
+
+
+def test_a_program_among_the_resources_can_be_executed(tmp_path):
+    modes = {"resources/tool": 0o4755, "resources/data": 0o644, "resources/mine": 0o700}
+    with ZipFile(tmp_path / "tool.fmu", "w") as file:
+        for name, mode in modes.items():
+            info = ZipInfo(name)
+            info.external_attr = (stat.S_IFREG | mode) << 16
+            file.writestr(info, b"#!/bin/sh")
+    unpack(tmp_path / "tool.fmu", tmp_path, HERE)
+    found = {name: (tmp_path / name).stat().st_mode & 0o7111 for name in modes}
+    assert found == {"resources/tool": 0o111, "resources/data": 0, "resources/mine": 0o100}
 
 
 def test_a_bomb_is_not_unpacked(tmp_path, monkeypatch):
     monkeypatch.setattr(archive, "MOST_BYTES", 4_000_000)
     with ZipFile(tmp_path / "bomb.fmu", "w") as file:
         file.writestr("resources/zeros", bytes(5_000_000), zipfile.ZIP_DEFLATED)
-    with pytest.raises(UnsafeArchive, match="1 members of 5000000 bytes"):
-        unpack(tmp_path / "bomb.fmu", tmp_path / "in")
+    with pytest.raises(UnsafeArchive, match="take 5000000 bytes unpacked, at most 4000000 are allowed; pack smaller"):
+        unpack(tmp_path / "bomb.fmu", tmp_path / "in", HERE)
     assert not (tmp_path / "in").exists()
 
 
@@ -170,8 +199,8 @@ def test_too_many_members(tmp_path):
     with ZipFile(tmp_path / "many.fmu", "w") as file:
         for i in range(archive.MOST_MEMBERS + 1):
             file.writestr(ZipInfo(str(i)), b"")
-    with pytest.raises(UnsafeArchive, match="10001 members of 0 bytes"):
-        unpack(tmp_path / "many.fmu", tmp_path / "in")
+    with pytest.raises(UnsafeArchive, match="10001 members, at most 10000 are allowed"):
+        unpack(tmp_path / "many.fmu", tmp_path / "in", HERE)
 
 
 def test_a_size_that_is_declared_too_small_is_not_exceeded(tmp_path):
@@ -184,13 +213,13 @@ def test_a_size_that_is_declared_too_small_is_not_exceeded(tmp_path):
     content[entry + 24 : entry + 28] = (1000).to_bytes(4, "little")
     path.write_bytes(content)
     with pytest.raises(zipfile.BadZipFile):
-        unpack(path, tmp_path / "in")
+        unpack(path, tmp_path / "in", HERE)
     assert sum(file.stat().st_size for file in (tmp_path / "in").rglob("zeros")) <= 1000
 
 
 @pytest.mark.parametrize("name", ["beam", "spring"])
 def test_what_our_own_need_is_unpacked_to_the_last_byte(fmu_folder, tmp_path, name):
-    unpack(fmu_folder / f"{name}.fmu", tmp_path)
+    unpack(fmu_folder / f"{name}.fmu", tmp_path, HERE)
     with ZipFile(fmu_folder / f"{name}.fmu") as file:
         files = {info.filename: file.read(info) for info in file.infolist() if not info.is_dir()}
     unused = ("documentation/", "extra/", "model.png", "sources/")

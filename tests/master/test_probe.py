@@ -10,25 +10,58 @@ from bodies import DuffingBody, Upper
 from springbeam import SceneError, load_scene, with_changes
 from springbeam.bodies.gate import admit, refusals
 from springbeam.bodies.probe import Bench, _try_slopes
-from springbeam.bodies.protocol import Abilities, Body
+from springbeam.bodies.protocol import Abilities, Body, StepRefused
 
 SIZES = [1.0, 0.1, 0.01]
-BENCH = SimpleNamespace(sizes=SIZES, body=SimpleNamespace(abilities=SimpleNamespace(any_size=True)))
+
+
+class SizedBench(Bench):
+    """Tries sizes of steps on what is no FMU."""
+
+    def __init__(self):
+        self.sizes, self.body = SIZES, SimpleNamespace(abilities=SimpleNamespace(any_size=True))
+        self.renewed = 0
+
+    def renew(self, **_):
+        self.renewed += 1
+
+
+BENCH = SizedBench()
+
+
+def refusing(below, value):
+    """What is tried of a body that refuses shorter steps."""
+
+    def tried(size):
+        if size < below:
+            raise StepRefused(f"{size} s is too short")
+        return value(size)
+
+    return tried
 
 
 @pytest.mark.parametrize(("short", "wrong"), [(set(), set()), ({"a", "c"}, {"a"}), ({"b"}, set())])
 def test_what_holds_at_one_size_is_right(short, wrong):
     found = dict(zip(SIZES, ({"a", "b"}, {"a", "c"}, short), strict=True))
-    assert Bench.wrong(BENCH, found.__getitem__) == wrong
+    assert BENCH.wrong(found.__getitem__) == wrong
+
+
+def test_a_size_that_is_refused_is_no_verdict_on_another():
+    bench = SizedBench()
+    assert bench.wrong(refusing(0.1, lambda _: {"a"})) == {"a"}
+    assert bench.renewed == 1  # after 0.01
+    assert bench.extrapolated(refusing(0.5, lambda h: 3.0 + h)) == pytest.approx(3.0, rel=1e-13)
+    with pytest.raises(StepRefused, match=r"1\.0 s is too short"):
+        bench.wrong(refusing(2.0, lambda _: set()))
 
 
 def test_an_inertia_is_that_of_no_step():
     """A parabola is exact; where the shortest steps show nothing, or where they do not agree, longer ones do."""
-    assert Bench.extrapolated(BENCH, lambda h: 3.0 + h - 2.0 * h**2) == pytest.approx(3.0, rel=1e-13)
-    assert Bench.extrapolated(BENCH, lambda h: None if h < 0.05 else 3.0 + h) == pytest.approx(3.0, rel=1e-13)
-    assert Bench.extrapolated(BENCH, lambda h: 3.0 if h > 0.02 else h) == 3.0
-    assert Bench.extrapolated(BENCH, lambda h: 3.0 if h < 0.02 else 4.0) == 3.0
-    assert Bench.extrapolated(BENCH, lambda _: None) is None
+    assert BENCH.extrapolated(lambda h: 3.0 + h - 2.0 * h**2) == pytest.approx(3.0, rel=1e-13)
+    assert BENCH.extrapolated(lambda h: None if h < 0.05 else 3.0 + h) == pytest.approx(3.0, rel=1e-13)
+    assert BENCH.extrapolated(lambda h: 3.0 if h > 0.02 else h) == 3.0
+    assert BENCH.extrapolated(lambda h: 3.0 if h < 0.02 else 4.0) == 3.0
+    assert BENCH.extrapolated(lambda _: None) is None
 
 
 class MassBench(Bench):

@@ -8,8 +8,10 @@
 
 typedef enum { OK, WARNING, DISCARD, ERROR } Status;
 enum { FORCE, IMPULSE, X, V, I1, I2, KINETIC, POTENTIAL, DISSIPATED, LOAD_POTENTIAL, MASS, K, C, LOAD, X0, V0, SIGN, LIE, N };
-enum { HONEST, STATE, VELOCITY, INTEGRAL, SLOPES, HANG, CRASH, NAN_OUT, ENERGY, INTEGRAL_2, EARLY, EVENT, END, LATE_CRASH, LATE_ABORT, LATE_EXIT, LATE_HANG };
-typedef struct { double r[N], slope, bend; unsigned calls; } Fmu;
+enum { HONEST, STATE, VELOCITY, INTEGRAL, SLOPES, HANG, CRASH, NAN_OUT, ENERGY, INTEGRAL_2, EARLY, EVENT, END, LATE_CRASH, LATE_ABORT, LATE_EXIT, LATE_HANG, MESSAGE, SHORT, PAST };
+typedef void Logger(void *environment, const char *instance, Status status, const char *category, const char *format, ...);
+typedef struct { Logger *logger; void *allocate, *release, *finished, *environment; } Callbacks;
+typedef struct { double r[N], slope, bend, stop; unsigned calls; const Callbacks *callbacks; } Fmu;
 
 #define API __attribute__((visibility("default")))
 static void initial(Fmu *f) {
@@ -17,12 +19,21 @@ static void initial(Fmu *f) {
     f->r[MASS] = f->r[SIGN] = 1.0;
 }
 API void *fmi2Instantiate(const char *name, int type, const char *guid, const char *where, const void *callbacks, int v, int l) {
+    static int instances;
+    if (!strcmp(guid, "unlicensed") || (!strcmp(guid, "once") && instances++)) {
+        fputs("reading the licence\nno licence found\n", stderr);
+        return NULL;
+    }
     Fmu *f = malloc(sizeof *f);
     initial(f);
+    f->callbacks = callbacks;
     return f;
 }
 API void fmi2FreeInstance(void *c) { free(c); }
-API Status fmi2SetupExperiment(void *c, int t, double tol, double start, int s, double stop) { return OK; }
+API Status fmi2SetupExperiment(void *c, int t, double tol, double start, int s, double stop) {
+    ((Fmu *)c)->stop = s ? stop : start;
+    return OK;
+}
 static void outputs(Fmu *f) {
     double *r = f->r;
     r[KINETIC] = 0.5 * r[MASS] * r[V] * r[V] * (r[LIE] == ENERGY ? 2.0 : 1.0);
@@ -36,7 +47,12 @@ API Status fmi2ExitInitializationMode(void *c) {
     outputs(f);
     return OK;
 }
-API Status fmi2Reset(void *c) { initial(c); return OK; }
+API Status fmi2Reset(void *c) {
+    const Callbacks *callbacks = ((Fmu *)c)->callbacks;
+    initial(c);
+    ((Fmu *)c)->callbacks = callbacks;
+    return OK;
+}
 API Status fmi2GetReal(void *c, const unsigned vr[], size_t n, double value[]) {
     Fmu *f = c;
     for (size_t i = 0; i < n; ++i) {
@@ -62,6 +78,12 @@ API Status fmi2SetRealInputDerivatives(void *c, const unsigned vr[], size_t n, c
 API Status fmi2DoStep(void *c, double time, double H, int no_set) {
     Fmu *f = c;
     double *r = f->r, h = H, rate = (r[C] + 1.0) / r[MASS] + r[K] / r[MASS] + 1.0;
+    if (r[LIE] == SHORT && H < 2e-4) return DISCARD;
+    if (r[LIE] == PAST && time + H > f->stop * (1 + 1e-12)) return ERROR;
+    if (r[LIE] == MESSAGE) {
+        f->callbacks->logger(f->callbacks->environment, "oscillator", ERROR, "solver", "k = %g of %s", r[K], "the spring");
+        return ERROR;
+    }
     bool begun = ++f->calls > 2, late = time > 1.49;
     if ((begun && r[LIE] == HANG) || (late && r[LIE] == LATE_HANG)) {
         fputs("hanging\n", stderr);
@@ -123,7 +145,9 @@ API void *fmi3InstantiateCoSimulation(const char *name, const char *token, const
     return event_mode || early ? NULL : fmi2Instantiate(name, 1, token, where, log, v, l);
 }
 API void fmi3FreeInstance(void *c) { fmi2FreeInstance(c); }
-API Status fmi3EnterInitializationMode(void *c, bool t, double tol, double start, bool s, double stop) { return OK; }
+API Status fmi3EnterInitializationMode(void *c, bool t, double tol, double start, bool s, double stop) {
+    return fmi2SetupExperiment(c, t, tol, start, s, stop);
+}
 API Status fmi3ExitInitializationMode(void *c) { return fmi2ExitInitializationMode(c); }
 API Status fmi3GetFloat64(void *c, const unsigned vr[], size_t n, double value[], size_t m) {
     return n == m ? fmi2GetReal(c, vr, n, value) : ERROR;

@@ -1,19 +1,23 @@
 """FMUs that others made, and elements, in the places of beam and spring: exact solutions, and what is refused."""
 
 import functools
+import importlib
 import os
+import re
 import signal
+import sys
 import threading
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from itertools import product
 from multiprocessing.connection import Connection
+from pathlib import Path
 from time import sleep
 
 import numpy as np
 import oscillator
 import pytest
 import tomli_w
-from commands import HANGS, command, printed, refused
+from commands import HANGS, command, printed, ran, refused
 from scenes import kinds
 
 from springbeam import RunStopped, SceneError, resume, simulate, with_changes
@@ -230,7 +234,9 @@ def test_a_state_that_cannot_be_written_is_refused_before_a_run_with_checkpoints
     assert not directory.results()
 
 
-@pytest.mark.parametrize("lie", [name for name in oscillator.LIES if name not in ("none", "hang", *LATE)])
+@pytest.mark.parametrize(
+    "lie", [name for name in oscillator.LIES if name not in ("none", "hang", "short", "past", *LATE)]
+)
 def test_an_fmu_that_lies_is_found_before_the_run(fmu, lie):
     parameters = {"m": M2, "k": K, "lie": oscillator.LIES[lie]}
     said = {
@@ -245,12 +251,147 @@ def test_an_fmu_that_lies_is_found_before_the_run(fmu, lie):
         "early": "fmi3DoStep returned early, which it was not allowed to",
         "event": "fmi3DoStep asks for event mode",
         "end": "fmi3DoStep asks that the simulation end",
+        "message": f"k = {K:g} of the spring",
     }
     path = fmu("three", version="3.0") if "fmi3" in said[lie] else fmu()
     with pytest.raises(FmuError) as caught:
         simulate(pair(path, spring={"parameters": parameters}, coupling={"degree": 0}))
     assert said[lie] in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_an_fmu_that_refuses_short_steps_is_used_with_long_ones(fmu):
+    """The check tries shorter steps than those of the run."""
+    parameters = {"m": M2, "k": K, "c": C, "lie": oscillator.LIES["short"]}
+    run = simulate(pair(fmu(), spring={"parameters": parameters}, coupling={"macro_step": 1e-3}))
+    assert error(run, linked) < 1e-12
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_an_fmu_knows_when_the_run_ends(fmu, version):
+    """It refuses steps beyond its stop time, and all if it has none."""
+    spring = {"parameters": {"m": M2, "k": K, "lie": oscillator.LIES["past"]}}
+    run = simulate(pair(fmu(f"ends{version}", version=version), spring=spring, coupling={"degree": 0}))
+    assert (run.summary["status"], run.time[-1]) == ("done", 1.0)
+
+
+def test_a_guess_is_set(fmu):
+    before = 'name="x0" valueReference="14" causality="'
+    edit = (f'{before}parameter" variability="fixed"', f'{before}local" variability="continuous" initial="approx"')
+    spring = {"parameters": {"m": M2, "k": 0.0, "x0": -0.5}}
+    assert simulate(pair(fmu("guessed", edits=(edit,)), spring=spring)).y[0] == -0.5
+    constant = (f'{before}parameter" variability="fixed"', f'{before}local" variability="constant" initial="exact"')
+    with pytest.raises(FmuError, match="variable 'x0' is constant, not a parameter"):
+        simulate(pair(fmu("constant", edits=(constant,)), spring=spring))
+
+
+ONCE = ('modelIdentifier="oscillator"', 'modelIdentifier="oscillator" canBeInstantiatedOnlyOncePerProcess="true"')
+
+
+@pytest.mark.parametrize("state", [True, False])
+def test_an_fmu_that_a_process_instantiates_once_has_a_process_for_each_instance(fmu, state):
+    path = fmu(f"once{state}", state=state, slopes=state, edits=(ONCE, ('guid="oscillator"', 'guid="once"')))
+    coupling = {"degree": 0, "macro_step": 1e-3} | ({} if state else {"scheme": "jacobi"})
+    scene = pair(path, coupling=coupling, time={"t_end": 0.01})
+    first, second = simulate(scene), simulate(scene)
+    assert first.y.tobytes() == second.y.tobytes()
+
+
+def test_what_an_fmu_prints_before_it_fails_is_told(fmu):
+    path = fmu("unlicensed", edits=(('guid="oscillator"', 'guid="unlicensed"'),))
+    with pytest.raises(FmuError, match=r"unlicensed\.fmu: cannot be instantiated: .*: no licence found$"):
+        simulate(pair(path))
+
+
+#: Units of an FMU that counts in mm, ms and kN, its masses in kg: SI units of each.
+_MM, _MS, _KN = 'm="1" factor="0.001"', 's="1" factor="0.001"', 'kg="1" m="1" s="-2" factor="1000"'
+BASES = {
+    "mm": _MM,
+    "ms": _MS,
+    "kN": _KN,
+    "mm/ms": 'm="1" s="-1"',
+    "kN.ms": 'kg="1" m="1" s="-1"',
+    "mm.ms": 'm="1" s="1" factor="1e-6"',
+    "mm.ms2": 'm="1" s="2" factor="1e-9"',
+    "J": 'kg="1" m="2" s="-2"',
+}
+UNITS = {
+    "F": "kN",
+    "J": "kN.ms",
+    "x": "mm",
+    "v": "mm/ms",
+    "ix": "mm.ms",
+    "ix2": "mm.ms2",
+    **dict.fromkeys(("Ek", "Ep", "Ed", "El"), "J"),
+}
+
+
+def test_units_that_an_fmu_declares_are_converted(fmu, tmp_path):
+    """F [kN] = m [kg] a [mm/ms²], k [kN/mm] and c [kN ms/mm]: 1e-6 and 1e-3 of their values in SI units."""
+    path = fmu("millimetres", edits=oscillator.in_units("ms", UNITS, BASES))
+    scene = pair(path, spring={"parameters": {"m": M2, "k": 1e-6 * K, "c": 1e-3 * C}})
+    run = simulate(scene)
+    assert error(run, linked) < 1e-9
+    assert run["e_spring"] == pytest.approx(simulate(pair(fmu())).e_spring, rel=1e-9, abs=1e-12)
+    tie = {"spring": {"parameters": {"m": M2, "k": 1e-6 * K, "c": 1e-3 * C}}, "contact": TIE}
+    assert error(simulate(pair(path, **tie)), tied) < 1e-12  # by an impulse
+    file = tmp_path / "scene.toml"
+    file.write_text(tomli_w.dumps(scene.model_dump(exclude_none=True)), encoding="utf-8")
+    shown = printed("doctor", file)
+    assert "the time is in ms, that is 0.001 s" in shown
+    assert "x is in mm, that is 0.001 m" in shown
+    assert "SI units are assumed" not in shown
+
+
+def test_that_si_units_are_assumed_is_told(fmu, tmp_path):
+    file = tmp_path / "scene.toml"
+    bare = dict.fromkeys(("integral", "integral_2", "impulse", *ENERGIES))
+    scene = pair(fmu(), spring=bare, contact={"damping": 0.0}, coupling={"degree": 0})
+    file.write_text(tomli_w.dumps(scene.model_dump(exclude_none=True)), encoding="utf-8")
+    assert "no unit is declared, so SI units are assumed: F in N, x in m, v in m/s" in printed("doctor", file)
+
+
+#: A unit of which variable, what the FMU says of it, and what is said of that.
+MISTAKEN = {
+    "no BaseUnit": ("x", "mm", None, "variable 'x' is in 'mm', and the FMU does not say how much that is"),
+    "an angle": ("x", "rad", 'rad="1"', "variable 'x' is in 'rad', which is not a unit of displacement (m)"),
+    "a torque": ("F", "N.m", 'kg="1" m="2" s="-2"', "variable 'F' is in 'N.m', which is not a unit of force (N)"),
+    "an offset": ("x", "m_above", 'm="1" offset="5"', "has factor 1 and offset 5; use a unit"),
+    "SI units by name": ("ix", "m.s", None, None),
+    "SI units by name, spelled": ("F", "kg.m/s^2", None, None),
+}
+
+
+@pytest.mark.parametrize("what", MISTAKEN)
+def test_a_unit_of_something_else_is_refused(fmu, what):
+    name, unit, base, said = MISTAKEN[what]
+    edits = oscillator.in_units("s", {name: unit}, {} if base is None else {unit: base})
+    with nullcontext() if said is None else pytest.raises(FmuError, match=re.escape(said)):
+        simulate(pair(fmu(what, edits=edits)))
+
+
+def test_the_body_that_the_page_builds_by_python_fmu_is_the_element(tmp_path, monkeypatch):
+    """docs/own_fmu.md says how close it is, 1e-12 m: Runge-Kutta steps of order 4 at H = 1e-3 s."""
+    monkeypatch.syspath_prepend(Path(__file__).parents[2] / "docs")
+    page = importlib.import_module("own_fmu")
+    below = page.body(page.built(tmp_path, version=2), m=1.0, k=30.0, c=0.5)
+    beam = {"element": "point_mass", "mass": 2.0, "velocity": -0.5}
+    run, _, apart = page.compared(beam, below, page.LINK)
+    assert apart < 1e-11
+    assert run.summary["max_interface_residual"] < 1e-11
+
+
+def test_a_working_directory_that_is_gone_is_no_matter(fmu, tmp_path):
+    """What is named by whole paths is found."""
+    file, gone = tmp_path / "scene.toml", tmp_path / "gone"
+    file.write_text(tomli_w.dumps(pair(fmu("of others")).model_dump(exclude_none=True)), encoding="utf-8")
+    gone.mkdir()
+    run = f"springbeam run {file} --out {tmp_path / 'run'} --no-plots --quiet"
+    program = (
+        f"import os, sys; os.rmdir(os.getcwd()); from springbeam.cli import main; sys.argv = {run.split()!r}; main()"
+    )
+    ran(sys.executable, "-c", program, cwd=gone)
+    assert load_summary(tmp_path / "run")["status"] == "done"
 
 
 @pytest.mark.parametrize(("version", "lacks"), [("2.0", "fmi2DoStep"), ("3.0", "fmi3SetFMUState")])
@@ -295,7 +436,7 @@ def test_an_fmu_that_hangs_is_given_up(fmu):
 def test_the_process_of_an_fmu_that_hangs_ends_with_the_master(fmu, hanging):
     """That it is gone is what the process sees: nobody holds its standard input open."""
     spec = pair(fmu(), spring={"parameters": {"lie": oscillator.LIES["late hang"]}}).lower
-    body = ForeignBody(spec, False, 0.0, None)
+    body = ForeignBody(spec, False, (0.0, 2.0), None)
     process = body._port._process._process
     process.send_signal(signal.SIGINT)  # Ctrl-C in a terminal, which the process leaves to the master
 
@@ -318,7 +459,7 @@ def test_a_process_waits_for_the_next_body_of_its_file(fmu, monkeypatch):
 
     def used(path, lie="none"):
         spec = pair(path, spring={"parameters": {"lie": oscillator.LIES[lie]}}).lower
-        body = ForeignBody(spec, False, 0.0, None)
+        body = ForeignBody(spec, False, (0.0, 2.0), None)
         process = body._port._process
         with suppress(FmuError):
             body.advance(1.5, 0.1, (0.0, 0.0, 0.0))

@@ -9,12 +9,14 @@ from pathlib import Path
 
 from .protocol import FmuError
 
-#: Largest size of all members of an archive together, and largest number of them.
-MOST_BYTES, MOST_MEMBERS = 1 << 28, 10_000
+#: Largest size of all members together that are unpacked, and largest number of members.
+MOST_BYTES, MOST_MEMBERS = 1 << 31, 10_000
 #: Parts that mean no other folder on any system, between slashes.
 _PLAIN = re.compile(r"(?:(?!\.{1,2}(?:/|$))[^/\\:\x00-\x1f]+(?:/|$))+")
-#: What a running FMU may use. The sources of the beam, with Eigen's, are 300 files: they would take most of the time.
-_USED = ("modelDescription.xml", "binaries/", "resources/")
+#: What a running FMU may use beside the binaries of this platform. The sources of the beam, with Eigen's, are 300
+#: files: they would take most of the time.
+_USED = ("modelDescription.xml", "resources/")
+_BINARIES, _EXECUTABLE = "binaries/", 0o111
 #: What the names of our FMUs end with, by version of FMI.
 _ENDINGS = {"2.0": "", "3.0": "3"}
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -44,14 +46,18 @@ class UnsafeArchive(ValueError):
     """An archive that is not unpacked; the message names the member and the cause."""
 
 
-def unpack(path: Path, folder: Path) -> None:
+def unpack(path: Path, folder: Path, platforms: tuple[str, ...]) -> None:
     """Unpack what a run needs of the FMU ``path`` into ``folder``; links and devices become plain files.
+
+    ``platforms`` are the names of this platform's folders of binaries.
 
     Raises
     ------
     UnsafeArchive
-        If a member's name leads elsewhere than into ``folder`` on some system, or if the archive is too large unpacked;
+        If a member's name leads elsewhere than into ``folder`` on some system, or if what a run needs is too large;
         nothing is unpacked then.
+    ValueError
+        If there are binaries, but none for this platform.
     zipfile.BadZipFile, RuntimeError
         If it is not a ZIP archive, damaged, or encrypted.
     OSError
@@ -59,12 +65,27 @@ def unpack(path: Path, folder: Path) -> None:
     """
     with zipfile.ZipFile(path) as archive:
         members = archive.infolist()
-        # What is read of a member is never more than the size it declares.
-        size, remedy = sum(member.file_size for member in members), "it is not unpacked, take it from its source again"
-        if size > MOST_BYTES or len(members) > MOST_MEMBERS:
-            most = f"at most {MOST_MEMBERS} members and {MOST_BYTES} bytes are"
-            raise UnsafeArchive(f"{len(members)} members of {size} bytes unpacked, {most} allowed; {remedy}")
+        if len(members) > MOST_MEMBERS:
+            raise UnsafeArchive(f"{len(members)} members, at most {MOST_MEMBERS} are allowed; pack fewer files")
         for name in (member.orig_filename for member in members):  # `filename` has been made harmless for this system
             if not _PLAIN.fullmatch(name):
-                raise UnsafeArchive(f"member {name[:100]!r} is no plain name inside the archive; {remedy}")
-        archive.extractall(folder, [member for member in members if member.filename.startswith(_USED)])
+                what = f"member {name[:100]!r} is no plain name inside the archive"
+                raise UnsafeArchive(f"{what}; it is not unpacked, take it from its source again")
+        here = tuple(f"{_BINARIES}{platform}/" for platform in platforms)
+        used = [member for member in members if member.filename.startswith((*_USED, *here))]
+        # What is read of a member is never more than the size it declares.
+        size = sum(member.file_size for member in used)
+        if size > MOST_BYTES:
+            what = f"resources/ and the binaries of this platform take {size} bytes unpacked"
+            raise UnsafeArchive(f"{what}, at most {MOST_BYTES} are allowed; pack smaller resources")
+        others = {m.filename.split("/")[1] for m in members if m.filename.startswith(_BINARIES) and not m.is_dir()}
+        if others and others.isdisjoint(platforms):
+            raise ValueError(
+                f"it has binaries for {', '.join(sorted(others))} and none for this platform; export it with those of "
+                f"{' or '.join(platforms)}"
+            )
+        for member in used:
+            unpacked = Path(archive.extract(member, folder))
+            # Only whether a file may be executed, as a program among the resources: nothing else of its mode.
+            if not member.is_dir() and (mode := member.external_attr >> 16 & _EXECUTABLE):
+                unpacked.chmod(unpacked.stat().st_mode | mode)

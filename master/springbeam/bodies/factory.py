@@ -49,7 +49,7 @@ def _body(
     scene: Scene, spec: Beam | Spring | Partner, start_time: float, found: Findings | None, contact: float
 ) -> Body:
     if isinstance(spec, ForeignFmu):
-        return ForeignBody(spec, spec is scene.upper, start_time, found)
+        return ForeignBody(spec, spec is scene.upper, (start_time, scene.time.t_end), found)
     if isinstance(spec, Spring):
         return FmuSpring(spec, start_time, top_at_rest(scene, contact) if scene.static else None)
     if isinstance(spec, Beam):
@@ -98,7 +98,8 @@ def top_at_rest(scene: Scene, contact: float) -> float:
 def findings(scene: Scene) -> dict[str, Findings]:
     """Examine the foreign FMUs of ``scene`` (`springbeam.bodies.probe`), by table. Raises FmuError."""
     H = scene.coupling.macro_step or 1e-3 * scene.time.t_end
-    return {table: examined(spec, table == "beam", 0.0, H) for table, spec in scene.foreign.items()}
+    times = 0.0, scene.time.t_end
+    return {table: examined(spec, table == "beam", times, H) for table, spec in scene.foreign.items()}
 
 
 def fingerprints(scene: Scene) -> dict[str, str]:

@@ -11,21 +11,23 @@ import difflib
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Hashable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from ctypes import byref, c_double, c_int, c_size_t, c_uint, c_void_p, cast
 from functools import cache, lru_cache, partial
 from math import prod
 from pathlib import Path
 from struct import Struct
 from typing import Any, NoReturn, TypeVar
+from xml.parsers import expat
 
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, read_model_description
 
 from .archive import UnsafeArchive, own_fmu, unpack
-from .functions import DISCARD, ERROR, FATAL, FMU2, FMU3, VERSIONS, WARNING, Advance, advances
+from .functions import DISCARD, ERROR, FATAL, FMU2, FMU3, PLATFORMS, VERSIONS, WARNING, Advance, advances
 from .protocol import FmuError, StepRefused
+from .units import Unit, unit_of
 
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 
@@ -33,13 +35,11 @@ _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 @lru_cache(maxsize=8)
 def _opened(path: Path, modified: int) -> tuple[ModelDescription, FMU2 | FMU3]:
     """Return what the FMU at ``path`` says of itself, and its library. Raises FmuError."""
-    folder, here = Path(tempfile.mkdtemp(prefix="springbeam-")), Path.cwd()
+    folder = Path(tempfile.mkdtemp(prefix="springbeam-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     try:
-        unpack(path, folder)
-        # External entities of a document type would name files of this computer; FMI's schema knows none.
-        if b"<!DOCTYPE" in (folder / "modelDescription.xml").read_bytes():
-            raise UnsafeArchive("modelDescription.xml: a document type declaration is not part of an FMU")
+        unpack(path, folder, PLATFORMS)
+        _refuse_document_types(folder / "modelDescription.xml")
         description = read_model_description(str(folder))
         version = VERSIONS.get(description.fmiVersion)
         if description.coSimulation is None or version is None:
@@ -49,11 +49,41 @@ def _opened(path: Path, modified: int) -> tuple[ModelDescription, FMU2 | FMU3]:
                 f"{' or '.join(VERSIONS)}"
             )
         identifier = description.coSimulation.modelIdentifier
-        return description, version(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder))
+        with _back_again(folder):
+            return description, version(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder))
     except Exception as error:  # FMPy raises bare Exceptions for whatever is wrong with an archive
-        raise FmuError(f"{path}: not a usable FMU: {error}") from error
+        raise FmuError(f"{path}: not a usable FMU: {' '.join(str(error).split())}") from error
+
+
+def _refuse_document_types(path: Path) -> None:
+    """Raise UnsafeArchive if the XML file ``path`` has one: its entities may name files; FMI's schema has none."""
+
+    def refuse(*_: Any) -> NoReturn:
+        raise UnsafeArchive("modelDescription.xml: a document type declaration is not part of an FMU")
+
+    parser = expat.ParserCreate()  # which knows the encodings that a file may have
+    parser.StartDoctypeDeclHandler = refuse
+    try:
+        parser.Parse(path.read_bytes(), True)
+    except expat.ExpatError as error:
+        raise ValueError(f"modelDescription.xml is not XML: {error}") from error
+
+
+@contextmanager
+def _back_again(folder: Path) -> Iterator[None]:
+    """Return to the working directory in the end, even to one that has been removed; begin in ``folder``.
+
+    FMPy asks for its name, which one that has been removed lacks, and stays in the folder of a library that cannot be
+    loaded.
+    """
+    here = os.open(".", os.O_RDONLY) if os.chdir in os.supports_fd else os.getcwd()
+    try:
+        os.chdir(folder)
+        yield
     finally:
-        os.chdir(here)  # FMPy stays in the folder of a library that cannot be loaded
+        os.chdir(here)
+        if isinstance(here, int):
+            os.close(here)
 
 
 #: A value of a parameter.
@@ -74,12 +104,20 @@ class Fmu:
         The file.
     parameters
         Parameters and start values.
-    start_time
-        [s].
+    start_time, stop_time
+        When its first step begins, and when the last one ends, where that is known [s].
     """
 
-    def __init__(self, name: str | None, path: Path, parameters: Mapping[str, Value], start_time: float) -> None:
+    def __init__(
+        self,
+        name: str | None,
+        path: Path,
+        parameters: Mapping[str, Value],
+        start_time: float,
+        stop_time: float | None = None,
+    ) -> None:
         self.path, self._own = path, name is not None
+        self._stop_time = stop_time
         self._name = path.stem if name is None else name
         self._message = ""  #: the last that the FMU has logged
         self._worst = 0  #: status of the calls that have failed
@@ -113,6 +151,10 @@ class Fmu:
         #: What it says it can do, and the version of FMI.
         self.says, self.version = description.coSimulation, opened.VERSION
         self._variables = {v.name: v for v in description.modelVariables}
+        self._units = {unit.name: unit for unit in description.unitDefinitions}
+        clocks = [v.name for v in description.modelVariables if v.causality == "independent"]
+        #: The unit of its time.
+        self.time_unit = self.unit(clocks[0], "time") if clocks else Unit()
         try:
             return opened.instance(self._name, self._log)
         except Exception as error:  # FMPy's own have no other type
@@ -133,7 +175,9 @@ class Fmu:
     def _give(self, name: str, value: Value) -> None:
         """Take the value of a parameter or a start value. Raises FmuError for one that cannot be set."""
         variable = self.variable(name)
-        if variable.causality not in ("parameter", "input") and variable.initial != "exact":
+        if variable.variability == "constant":
+            raise FmuError(f"{self.path}: variable {name!r} is constant, not a parameter")
+        if variable.causality not in ("parameter", "input") and variable.initial not in ("exact", "approx"):
             raise FmuError(f"{self.path}: variable {name!r} is {variable.causality}, not a parameter")
         kind = self._slave.ENUMERATION if variable.type == "Enumeration" else variable.type
         if not self._slave.holds(kind, value):
@@ -147,7 +191,9 @@ class Fmu:
             for setter, given in self._parameters.items():
                 getattr(self._slave, setter)(list(given), list(given.values()))
 
-        self._asked("cannot be initialised", self._slave.initialise, time, set_parameters)
+        second = self.time_unit.factor
+        end = None if self._stop_time is None else self._stop_time / second
+        self._asked("cannot be initialised", self._slave.initialise, time / second, end, set_parameters)
 
     # -- calls bound to their arguments --------------------------------------------------------------------------------
 
@@ -216,6 +262,15 @@ class Fmu:
         library = self._asked("cannot be used", advances)
         return partial(library[f"advance{self.version[0]}"], byref(advance)), given, told
 
+    def unit(self, name: str, key: str) -> Unit:
+        """Return the unit of a variable that is a scene's ``key``. Raises FmuError if it is none, or not known."""
+        variable = self.variable(name)
+        declared = variable.unit or (variable.declaredType and variable.declaredType.unit)
+        try:
+            return unit_of(key, declared, self._units.get(declared))
+        except ValueError as error:
+            raise FmuError(f"{self.path}: variable {name!r} {error}; it is the scene's {key}") from None
+
     def variable(self, name: str) -> Any:
         """Return what the FMU says of a variable. Raises FmuError if it has none of this name."""
         try:
@@ -244,7 +299,7 @@ class Fmu:
     def refuse(self, status: int, time: float, otherwise: str = "") -> NoReturn:
         """Raise StepRefused, or FmuError, for a step from ``time`` [s] that has returned ``status``."""
         if status not in (DISCARD, ERROR):
-            raise self.failed(status, f"cannot step at t = {time:.9g} s")
+            raise self.failed(status, f"cannot step at t = {time * self.time_unit.factor:.9g} s")
         self._worst = max(self._worst, status)
         cause = self._cause(otherwise or f"{self._slave.PREFIX}DoStep returned {_STATUS[status]}")
         # Also after fmi2Error a saved state may be restored and the step tried again (FMI 2.0.4, section 2.1.3).

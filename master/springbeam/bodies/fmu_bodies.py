@@ -135,8 +135,10 @@ class Port:
     def restore(self, content: bytes) -> None:
         self._fmu.deserialize(content)
 
-    def close(self) -> None:
+    def close(self) -> bool:
+        """Free the FMU; return whether this process may instantiate it again."""
         self._fmu.close()
+        return not self._fmu.says.canBeInstantiatedOnlyOncePerProcess
 
 
 class Names(NamedTuple):

@@ -9,7 +9,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from operator import mul, truediv
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +22,7 @@ from .fmu import Fmu
 from .fmu_bodies import FmuBody, Port
 from .isolated import RemotePort
 from .protocol import NO_FORCE, Abilities, Body, BodyFailed, Energies, FmuError, Force, Motion
+from .units import Unit
 
 #: Relative tolerance of a holding force, and the share of motion without it that it may leave.
 _AT_REST, _STAYS = 1e-12, 1e-6
@@ -34,6 +37,7 @@ class Findings:
     velocity: float = 0.0  #: at the start [m/s]
     H: float = 0.0  #: a macro step, for trial steps [s]
     faults: tuple[str, ...] = ()  #: what it says, or a scene says of it, and is not so
+    units: Mapping[str, Unit] = field(default_factory=dict)  #: of the variables that the scene names, by key
 
 
 def _promised(spec: ForeignFmu, says: Any) -> Abilities:
@@ -51,23 +55,48 @@ def _promised(spec: ForeignFmu, says: Any) -> Abilities:
     )
 
 
-def opened(spec: ForeignFmu, start_time: float, found: Findings | None) -> tuple[Port, Findings]:
-    """Return an FMU at ``start_time`` [s], and what was ``found`` out: by default, what it says. Raises FmuError."""
-    fmu = Fmu(None, Path(spec.fmu), spec.parameters, start_time)
+def opened(spec: ForeignFmu, times: tuple[float, float], found: Findings | None) -> tuple[Port, Findings]:
+    """Return an FMU at the start of ``times``, and what was ``found`` out: by default, what it says. Raises FmuError.
+
+    ``times`` are when its first step begins and when its last one ends [s].
+    """
+    fmu = Fmu(None, Path(spec.fmu), spec.parameters, *times)
     found = found or Findings(_promised(spec, fmu.says))
-    abilities = found.abilities
-    keys = dict.fromkeys(spec.INPUTS, "input") | dict.fromkeys((*spec.MOTION, *spec.ENERGIES), "output")
     try:
-        for key, wanted in keys.items():
-            if (name := getattr(spec, key)) is not None:
-                _check(fmu, name, key, wanted)
-        outputs, impulse = tuple(_told(spec, found).values()), () if spec.impulse is None else (spec.impulse,)
-        # Derivatives of one step may act in the next if they are not set again.
-        always = {"always": True, "repeats": abilities.state}
-        return Port(fmu, (spec.force,), impulse, outputs, abilities.slopes, **always), found
+        for key, name in spec.named.items():
+            _check(fmu, name, key, "input" if key in spec.INPUTS else "output")
+        units = {"time": fmu.time_unit, **{key: fmu.unit(name, key) for key, name in spec.named.items()}}
+        found = replace(found, units=units)
+        return ForeignPort(fmu, spec, found), found
     except BaseException:
         fmu.close()
         raise
+
+
+class ForeignPort(Port):
+    """A `Port` of a foreign FMU, through which all goes in SI units."""
+
+    def __init__(self, fmu: Fmu, spec: ForeignFmu, found: Findings) -> None:
+        told, abilities = _told(spec, found), found.abilities
+        impulse = () if spec.impulse is None else (spec.impulse,)
+        # Derivatives of one step may act in the next if they are not set again.
+        always = {"always": True, "repeats": abilities.state}
+        factors = {key: unit.factor for key, unit in found.units.items()}
+        second, force = factors["time"], factors["force"]
+        slopes = [force / second**order for order in range(1, abilities.slopes + 1)]
+        #: SI units by which what a step is given is divided, and those in which the FMU tells its outputs.
+        self._of_given = (second, second, force, *(factors["impulse"] for _ in impulse), *slopes)
+        self._of_told = tuple(factors[key] for key in told)
+        super().__init__(fmu, (spec.force,), impulse, tuple(told.values()), abilities.slopes, **always)
+
+    def read(self) -> tuple[float, ...]:
+        return self._in_si(super().read())
+
+    def step(self, *given: float) -> tuple[float, ...]:
+        return self._in_si(super().step(*map(truediv, given, self._of_given)))
+
+    def _in_si(self, told: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(map(mul, told, self._of_told))
 
 
 def _check(fmu: Fmu, name: str, key: str, wanted: str) -> None:
@@ -83,7 +112,7 @@ def _check(fmu: Fmu, name: str, key: str, wanted: str) -> None:
 def _told(spec: ForeignFmu, found: Findings) -> dict[str, str]:
     """Return the names of what an FMU tells after a step by their keys: first of its motion, then of its energies."""
     keys = (*spec.MOTION, *(spec.ENERGIES if found.abilities.energies else ()))
-    return {key: name for key in keys if (name := getattr(spec, key)) is not None}
+    return {key: name for key, name in spec.named.items() if key in keys}
 
 
 class ForeignState(NamedTuple):
@@ -106,8 +135,8 @@ class ForeignBody(FmuBody, EndLoaded):
     ----------
     spec, upper
         Its table, and whether it is the upper body.
-    start_time
-        [s].
+    times
+        When its first step begins and when its last one ends [s].
     found
         What was found out about it; by default that it can do what it says.
     """
@@ -117,15 +146,15 @@ class ForeignBody(FmuBody, EndLoaded):
     state: ForeignState
     _port: RemotePort
 
-    def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings | None) -> None:
-        self._port = RemotePort(spec.fmu, self.PATIENCE, self.OCCASION, opened, spec, start_time, found)
-        self._found: Findings = self._port.found
-        self.abilities, self._spec, self._upward = self._found.abilities, spec, 1.0 if upper else -1.0
-        self._keys = tuple(_told(spec, self._found))
+    def __init__(self, spec: ForeignFmu, upper: bool, times: tuple[float, float], found: Findings | None) -> None:
+        self._port = RemotePort(spec.fmu, self.PATIENCE, self.OCCASION, opened, spec, times, found)
+        self.found: Findings = self._port.found
+        self.abilities, self._spec, self._upward = self.found.abilities, spec, 1.0 if upper else -1.0
+        self._keys = tuple(_told(spec, self.found))
         self._n_motion = len({*self._keys} & {*spec.MOTION})
-        self.state = ForeignState(Motion(0.0, 0.0, 0.0, 0.0), time=start_time)
+        self.state = ForeignState(Motion(0.0, 0.0, 0.0, 0.0), time=times[0])
         try:
-            self._begin(spec.mass or self._found.mass)
+            self._begin(spec.mass or self.found.mass)
             self.mark()
         except BaseException:
             self.close()
@@ -176,7 +205,7 @@ class ForeignBody(FmuBody, EndLoaded):
         by_key, (w0, v0, *_) = dict(zip(self._keys, told, strict=True)), self.state.motion
         w = by_key["displacement"]
         if "velocity" not in by_key:
-            v0 = by_key["velocity"] = (w - w0) / size if size > 0.0 else self._found.velocity
+            v0 = by_key["velocity"] = (w - w0) / size if size > 0.0 else self.found.velocity
         first, second = moments(w0, v0, w, by_key["velocity"], size)
         motion = Motion(w, by_key["velocity"], by_key.get("integral", first), by_key.get("integral_2", second))
         self.state = self.state._replace(motion=motion, told=told, pending=0.0)
@@ -198,7 +227,7 @@ class ForeignBody(FmuBody, EndLoaded):
             return self.state.held[1]
         from scipy.optimize import newton  # takes a tenth of a second to load: only for who rests on a foundation
 
-        size = self.state.size or self._found.H
+        size = self.state.size or self.found.H
         load, self._on_end = self._on_end, NO_FORCE
 
         def pushed(upward: float) -> Motion:

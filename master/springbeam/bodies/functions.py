@@ -8,19 +8,23 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from copy import copy
-from ctypes import CDLL, POINTER, Structure, c_double, c_int, c_size_t, c_uint, c_void_p
+from ctypes import CDLL, POINTER, Structure, byref, c_double, c_int, c_size_t, c_uint, c_void_p
 from enum import IntEnum
 from functools import cache
+from itertools import count
 from pathlib import Path
 from typing import Any, ClassVar
 
-from fmpy import fmi2, fmi3
+from fmpy import fmi2, fmi3, platform, platform_tuple
+from fmpy.logging import addLoggerProxy
 from typing_extensions import Self
 
 #: Values of fmi2Status and fmi3Status.
 OK, WARNING, DISCARD, ERROR, FATAL = 0, 1, 2, 3, 4
 #: Takes the status and the text of a message of an FMU.
 Log = Callable[[int, bytes | None], None]
+#: Folders of the binaries that can be loaded here, by FMI 2.0 and 3.0.
+PLATFORMS = (platform, platform_tuple)
 
 
 #: What went wrong in an advance: `advance.cpp` returns 16 of these + the status of the call that did. The last three
@@ -106,6 +110,28 @@ class Slave:
         return isinstance(held, float) or held == value
 
 
+#: Numbers of the instances of FMI 2.0, by which each of their messages finds who takes it.
+_NUMBERS, _LOGS = count(1), dict[int, Log]()
+
+
+@cache
+def _logger() -> Any:
+    """Return callbacks whose logger expands messages as printf does.
+
+    FMPy has one such function in a process, so it is also one that takes what it has expanded.
+    """
+
+    def take(environment: int | None, _name: bytes, status: int, _category: bytes, text: bytes | None) -> None:
+        # An FMU may forget its environment: then it is the one that was made last.
+        if log := _LOGS.get(environment or max(_LOGS, default=0)):
+            log(status, text)
+
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.taking = callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(take)  # kept, for the proxy takes its place
+    addLoggerProxy(byref(callbacks))
+    return callbacks
+
+
 class FMU2(Slave, fmi2.FMU2Slave):  # type: ignore[misc]
     """An FMU of FMI 2.0."""
 
@@ -116,15 +142,22 @@ class FMU2(Slave, fmi2.FMU2Slave):  # type: ignore[misc]
 
     def make(self, log: Log) -> None:
         """Instantiate the FMU."""
+        self._number = next(_NUMBERS)
+        _LOGS[self._number] = log
         callbacks = fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(lambda _1, _2, status, _3, text: log(status, text))
+        callbacks.logger = _logger().logger
         callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
         callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
+        callbacks.componentEnvironment = self._number
         self.instantiate(callbacks=callbacks)
 
-    def initialise(self, time: float, parameters: Callable[[], None]) -> None:
-        """Bring a new instance to its first step at ``time`` [s]; ``parameters`` sets them."""
-        self.setupExperiment(startTime=time)
+    def freeInstance(self) -> None:
+        super().freeInstance()
+        del _LOGS[self._number]
+
+    def initialise(self, time: float, end: float | None, parameters: Callable[[], None]) -> None:
+        """Bring a new instance to its first step at ``time``; ``parameters`` sets them, ``end`` is its stop time."""
+        self.setupExperiment(startTime=time, stopTime=end)
         parameters()
         self.enterInitializationMode()
         self.exitInitializationMode()
@@ -142,9 +175,9 @@ class FMU3(Slave, fmi3.FMU3Slave):  # type: ignore[misc]
     def make(self, log: Log) -> None:
         self.instantiate(logMessage=lambda _environment, status, _category, text: log(status, text))
 
-    def initialise(self, time: float, parameters: Callable[[], None]) -> None:
+    def initialise(self, time: float, end: float | None, parameters: Callable[[], None]) -> None:
         parameters()
-        self.enterInitializationMode(startTime=time)
+        self.enterInitializationMode(startTime=time, stopTime=end)
         self.exitInitializationMode()
 
 

@@ -57,6 +57,8 @@ class FmuProcess:
             )
         #: Whether it has answered all that it was asked.
         self.idle = True
+        #: How much of what its FMUs print belongs to bodies before the present one [bytes].
+        self._read = 0
         self.ask([], "its start", None)  # which is not the FMU's time
 
     @classmethod
@@ -65,6 +67,7 @@ class FmuProcess:
         for process in cls._idle:
             if (process._path, process._master) == (path, os.getpid()):
                 cls._idle.remove(process)
+                process._read = process._errors.stat().st_size
                 return process
         return cls(path)
 
@@ -92,6 +95,8 @@ class FmuProcess:
             said = f"interrupted, for it has not returned within {waited:.3g} s from {doing}"
             raise FmuError(f"{self._path}: {said}") from None
         self.idle = True
+        if isinstance(value, FmuError):
+            raise FmuError(": ".join([str(value), *self._printed()]))
         if isinstance(value, Exception):
             raise value
         return value
@@ -99,12 +104,19 @@ class FmuProcess:
     def _last_words(self) -> str:
         code = self._process.wait()
         cause = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-        lines = self._errors.read_text("utf-8", "replace").strip().splitlines()
-        return ": ".join([cause, *(line.strip() for line in lines[-1:])])
+        return ": ".join([cause, *self._printed()])
 
-    def give_back(self) -> None:
-        """Keep the process for another body, if it answers, in place of the one that has waited longest."""
-        if not self.idle:
+    def _printed(self) -> list[str]:
+        """Return the last line that the FMU of the present body has printed, if any."""
+        lines = self._errors.read_bytes()[self._read :].decode("utf-8", "replace").strip().splitlines()
+        return [line.strip() for line in lines[-1:]]
+
+    def give_back(self, again: bool) -> None:
+        """Keep the process for another body in place of the one that has waited longest, or end it.
+
+        It ends if it does not answer, or if its FMU cannot be instantiated ``again``.
+        """
+        if not (again and self.idle):
             self._end()
             return
         self._idle.append(self)
@@ -123,6 +135,10 @@ def answer() -> None:
     """Do in the process of an FMU what `FmuProcess.ask` asks for, until nobody is there to ask."""
     tempfile.tempdir, *ends = sys.argv[1:]
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the master's
+    try:
+        os.getcwd()
+    except FileNotFoundError:  # has been removed, and an FMU may ask for it
+        os.chdir(tempfile.tempdir)
     requests, answers = (Connection(int(end)) for end in ends)
     threading.Thread(target=_end_with_the_master, daemon=True).start()
     port: Any = None
@@ -200,11 +216,13 @@ class RemotePort(Port):
     def restore(self, content: bytes) -> None:
         self._ask("restoring its state", "restore", content)
 
-    def close(self) -> None:
+    def close(self) -> bool:
         process, self._process = self._process, None
+        again = False
         if process is None:
-            return
+            return again
         if process.idle:
             with suppress(FmuError):
-                process.ask([("close",)], "closing", _FAREWELL)
-        process.give_back()
+                again = process.ask([("close",)], "closing", _FAREWELL)
+        process.give_back(again)
+        return again

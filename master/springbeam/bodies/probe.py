@@ -7,11 +7,12 @@ instance.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
+from operator import mul
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -27,6 +28,7 @@ _TOLERANCE, _ROUNDING = 0.04, 1e-9
 _RESPONSE, _AGREE = 0.1, 0.01
 #: Forces tried [N]; a change is seen if it is so large a part of the value.
 _FORCES, _SEEN = (1.0, 1e3, 1e6, 1e9, 1e12, 1e15), 1e-6
+_T = TypeVar("_T")
 
 
 class _TriedBody(ForeignBody):
@@ -40,13 +42,16 @@ class Bench:
     ----------
     spec, upper
         The table, and whether it is that of the upper body.
-    start_time, H
-        Of the run, and a macro step [s].
+    times
+        When the run starts and ends [s].
+    H
+        A macro step [s].
     """
 
-    def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, H: float) -> None:
-        self.spec, self._start, self.faults = spec, start_time, list[str]()
-        self._made = partial(_TriedBody, spec, upper, start_time)
+    def __init__(self, spec: ForeignFmu, upper: bool, times: tuple[float, float], H: float) -> None:
+        start, end = times
+        self.spec, self._start, self.faults = spec, start, list[str]()
+        self._made = partial(_TriedBody, spec, upper, (start, max(end, start + _RECORD * H)))
         #: The present instance; its ``abilities`` are those that are known.
         self.body = self._made(None)
         self.sizes = [H * share for share in _SIZES] if self.body.abilities.any_size else [H]
@@ -82,27 +87,52 @@ class Bench:
 
     def extrapolated(self, inertia: Callable[[float], float | None]) -> float | None:
         """Return ``inertia`` of a step's size [s] as that goes to 0, from the shortest steps that tell it."""
+        shares = (1.0, 0.5, 0.25) if self.body.abilities.any_size else (1.0,)
+
+        def column_of(size: float) -> list[float | None]:
+            return list(self.taken(inertia, [size * share for share in shares]))
+
         found = None
-        for size in reversed(self.sizes):
-            told = [inertia(size * share) for share in ((1.0, 0.5, 0.25) if self.body.abilities.any_size else (1.0,))]
+        for told in self.taken(column_of, reversed(self.sizes)):
             column = [value for value in told if value is not None]
             if len(column) < len(told):
                 continue
-            # The parabola through three sizes.
-            found = column[0] if len(column) == 1 else (column[0] - 6.0 * column[1] + 8.0 * column[2]) / 3.0
+            # The polynomial through the sizes.
+            weights = {1: (1.0,), 2: (-1.0, 2.0), 3: (1.0 / 3.0, -2.0, 8.0 / 3.0)}[len(column)]
+            found = sum(map(mul, weights, column))
             if abs(column[-1] - column[0]) <= _AGREE * abs(column[0]):
                 break
         return found
 
     def wrong(self, check: Callable[[float], set[str]]) -> set[str]:
-        """Return what ``check`` of a step's size [s] finds wrong at every size."""
-        found = check(self.sizes[0])
-        for size in self.sizes[1:]:
-            found = found and found & check(size)
-        return found
+        """Return what ``check`` of a step's size [s] finds wrong at every size that the FMU takes."""
+        found: set[str] | None = None
+        for wrong in self.taken(check, self.sizes):
+            found = wrong if found is None else found & wrong
+            if not found:
+                break
+        return found or set()
+
+    def taken(self, tried: Callable[[float], _T], sizes: Iterable[float]) -> Iterator[_T]:
+        """Yield what is ``tried`` of a step's size [s] for the ``sizes`` at which the FMU steps.
+
+        Raises the StepRefused of the longest if it steps at none.
+        """
+        refused, stepped = dict[float, StepRefused](), False
+        for size in sizes:
+            try:
+                value = tried(size)
+            except StepRefused as failure:
+                refused[size] = failure
+                self.renew()  # what has failed may not be used on
+            else:
+                stepped = True
+                yield value
+        if refused and not stepped:
+            raise refused[max(refused)]
 
 
-def examined(spec: ForeignFmu, upper: bool, start_time: float, H: float) -> Findings:
+def examined(spec: ForeignFmu, upper: bool, times: tuple[float, float], H: float) -> Findings:
     """Examine an FMU, once; parameters as of `Bench`.
 
     Raises
@@ -112,12 +142,12 @@ def examined(spec: ForeignFmu, upper: bool, start_time: float, H: float) -> Find
     """
     path = Path(spec.fmu)
     changed = path.stat().st_mtime_ns if path.is_file() else None
-    return _examined(changed, spec.model_dump_json(), upper, start_time, H)
+    return _examined(changed, spec.model_dump_json(), upper, times, H)
 
 
 @lru_cache(maxsize=64)
-def _examined(_changed: int | None, spec: str, upper: bool, start_time: float, H: float) -> Findings:
-    bench = Bench(ForeignFmu.model_validate_json(spec), upper, start_time, H)
+def _examined(_changed: int | None, spec: str, upper: bool, times: tuple[float, float], H: float) -> Findings:
+    bench = Bench(ForeignFmu.model_validate_json(spec), upper, times, H)
     try:
         return _examine(bench, 1.0 if upper else -1.0)
     except StepRefused as refused:
@@ -149,15 +179,23 @@ def _examine(bench: Bench, upward: float) -> Findings:
     if bench.body.abilities.impulse and bench.body.abilities.velocity:
         mass = _struck_mass(bench, spec.mass or mass, length / H)
     if not bench.body.abilities.velocity:
-        h = bench.sizes[min(2, len(bench.sizes) - 1)]
-        start, middle, end = bench.run(h, [NO_FORCE, NO_FORCE])[:, 0].tolist()
-        v = (4.0 * middle - end - 3.0 * start) / (2.0 * h)
-    return Findings(bench.body.abilities, mass, v, H, tuple(f"{spec.fmu}: {fault}" for fault in bench.faults))
+        v = next(bench.taken(partial(_velocity, bench), [*bench.sizes[2:], *bench.sizes[1::-1]]))
+    faults = tuple(f"{spec.fmu}: {fault}" for fault in bench.faults)
+    return Findings(bench.body.abilities, mass, v, H, faults, bench.body.found.units)
+
+
+def _velocity(bench: Bench, size: float) -> float:
+    """Return the velocity at the start by the displacements after two steps of ``size`` [s]."""
+    start, middle, end = bench.run(size, [NO_FORCE, NO_FORCE])[:, 0].tolist()
+    return float((4.0 * middle - end - 3.0 * start) / (2.0 * size))
 
 
 def _check_state(bench: Bench) -> None:
-    first, _, second = (bench.run(bench.sizes[0], [(force, 0.0, 0.0)] * 2) for force in (1.0, -1.0, 1.0))
-    if (first != second).any():
+    def differs(size: float) -> bool:
+        first, _, second = (bench.run(size, [(force, 0.0, 0.0)] * 2) for force in (1.0, -1.0, 1.0))
+        return bool((first != second).any())
+
+    if next(bench.taken(differs, bench.sizes)):
         bench.faults.append("canGetAndSetFMUstate = true, but equal steps from one restored state differ in their bits")
         bench.renew(state=False, serialized=False)  # what follows starts from new instances
 

@@ -97,6 +97,7 @@ def _examine(scene: Scene) -> Findings:
     """Return what the bodies of ``scene`` can do; it is an error if the scene cannot be run with them."""
     from ..bodies.factory import findings
     from ..bodies.gate import OFFERED, refusals
+    from ..bodies.units import described
 
     found, shown = findings(scene), list[Any]()
     for name, body in {"beam": scene.upper, "spring": scene.lower}.items():
@@ -108,6 +109,7 @@ def _examine(scene: Scene) -> Findings:
         mass = "(measured)" if given.mass is None else f"measured, {given.mass:.9g} kg given"
         shown.append(Text(f"[{name}] {given.fmu}", style="bold"))
         shown.append(f"mass that a force or an impulse meets: {finding.mass:.9g} kg {mass}")
+        shown += described(given.named, finding.units)
         names, told = ("", "capability", "shown by", "what is offered"), asdict(finding.abilities)
         rows = [
             ("yes", key, shown_by, having) if told[key] > 0 else ("no", key, shown_by, lacking)

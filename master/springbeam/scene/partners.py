@@ -39,7 +39,15 @@ class ForeignFmu(Table):
     potential_energy: str | None = key("J", "output", None)
     dissipated_energy: str | None = key("J", "output, since the start", None)
     load_potential: str | None = key("J", "output: −(work of loads inside)", None)
-    parameters: dict[str, float | int | bool | str] = key("–", "values of the FMU's parameters, by name", {})
+    parameters: dict[str, float | int | bool | str] = key(
+        "–", "values of the FMU's parameters, start values and guesses, by name, in the units of the FMU", {}
+    )
+
+    @property
+    def named(self) -> dict[str, str]:
+        """The variables that have names, by key."""
+        keys = (*self.INPUTS, *self.MOTION, *self.ENERGIES)
+        return {key: name for key in keys if (name := getattr(self, key)) is not None}
 
 
 class PointMass(Table):
