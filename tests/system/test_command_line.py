@@ -32,6 +32,7 @@ TABLES = {
     "new": "my_scene",
     "run": "soft --no-plots",
     "resume": "cut --no-plots",
+    "paper": "2 --no-plots --set beam.n_elements=10 --set beam.n_modes=0 --set time.t_end=0.55",
     "sweep": "duffing --vary spring.mass=0.5,1 --set time.t_end=1 --scheduler {scheduler} --out varied",
     "compare": "done done --out compared.png",
     "spectrum": "done --out spectra",
@@ -53,7 +54,10 @@ WITHOUT_JSON = ("new", "compare", "spectrum", "fit", "report", "animate", "expor
 
 #: What holds for the document of a command; of others, that their table is in their directory.
 DOCUMENTS = {
-    "run": lambda found: {**load_summary(Path(found["directory"])), "directory": found["directory"]} == found,
+    **dict.fromkeys(
+        ("run", "paper"),
+        lambda found: {**load_summary(Path(found["directory"])), "directory": found["directory"]} == found,
+    ),
     "sweep": lambda found: (
         found["runs"] == {"done": 2, "stopped": 0, "refused": 0, "lost": 0}
         and all(Path(file).exists() for file in found["files"])
