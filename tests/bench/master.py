@@ -2,18 +2,18 @@
 
 import statistics
 from ctypes import c_size_t
+from functools import partial
 from time import process_time, thread_time
 
 import printed
 from against_scipy import UNTIL
-from fmus import program
 from measure import Row, Times, below, compare, median_and_spread, ratio_row, shown, timed
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.fmu import Fmu, release
 from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
-from springbeam.paper import monolithic
+from springbeam.paper import co_simulation, monolithic
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
 
@@ -165,36 +165,24 @@ def profile(effort):
 
 
 def paper(effort):
-    scene = with_changes(load_scene("paper-fig2"), beam={"integrator": "midpoint"})
+    scene = load_scene("paper-fig2")
     if effort.quick:
         scene = with_changes(scene, time={"t_end": 0.54})
-    steps = 0
+    steps = scene.equal_steps[0]
 
-    def ours():
-        nonlocal steps
-        summary = simulate(scene).summary
-        steps = int(summary["macro_steps"])
-        return float(summary["wall_time"])
+    def seconds(program):
+        return float(program.simulate(scene).summary["wall_time"])
 
-    def theirs(run):
-        return float(run.summary["wall_time"])
-
-    as_printed = compare(ours, lambda: theirs(printed.simulate(scene)), min(effort.rounds, 3))
-    yield ratio_row(
-        f"`paper-fig2` by the midpoint rule, {steps} steps, 1000 elements",
-        as_printed,
-        10.0,
-        "Algorithm 1 as printed in scipy.sparse, `spsolve` for each of its linear systems, three a step",
-        faster=True,
-    )
-    times = compare(ours, lambda: theirs(monolithic.simulate(scene)), min(effort.rounds, 5))
-    ratios = median_and_spread([1.0 / ratio for ratio in times.ratios])
-    seconds = f"{shown(statistics.median(times.ours))} against {shown(statistics.median(times.rival))}"
-    condensed = "the same numbers from one solution a step, factorised once before the clock runs (SuperLU)"
-    yield Row("the same", "", f"{ratios} × faster; {seconds}", None, condensed)
-    bare = statistics.median(program("beam_bench", effort)["midpoint"]["rival"])
-    of_solves = Times(times.ours, [bare * steps] * len(times.ours))
-    yield ratio_row("the same", of_solves, 5.0, f"{steps} bare solves and products, one a step, by Eigen")
+    for what, program, rounds, beside in (
+        (f"`springbeam paper 2`, {steps} steps, 1000 elements", printed, 3,
+         "Algorithm 1 as printed in scipy.sparse, `spsolve` for each of its linear systems, three a step"),
+        ("the same", monolithic, 5,
+         "the same numbers from one solution a step, factorised once before the clock runs (SuperLU)"),
+    ):  # fmt: skip
+        times = compare(lambda: seconds(co_simulation), partial(seconds, program), min(effort.rounds, rounds))
+        ratios = median_and_spread([1.0 / ratio for ratio in times.ratios])
+        medians = f"{shown(statistics.median(times.ours))} against {shown(statistics.median(times.rival))}"
+        yield Row(what, "", f"{ratios} × faster; {medians}", None, beside)
     resolved = with_changes(
         load_scene("paper-fig2"),
         beam={"n_modes": 64},

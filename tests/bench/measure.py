@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from time import process_time
 
 from springbeam.monolithic import event_driven
-from springbeam.paper import monolithic
+from springbeam.paper import co_simulation, monolithic
 from springbeam.run import runner
 from springbeam.studies import rivals
 
@@ -18,7 +18,7 @@ class _Clock:
 
 
 # What runs report as their wall time.
-runner.perf_counter = rivals.perf_counter = process_time
+runner.perf_counter = rivals.perf_counter = co_simulation.perf_counter = process_time
 monolithic.clock = event_driven.clock = _Clock
 
 

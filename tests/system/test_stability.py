@@ -108,7 +108,15 @@ def test_a_dip_at_an_end_of_the_step_to_rounding_is_looked_at_once():
 
 def test_a_spring_that_escapes_is_stopped_and_has_kept_its_energy():
     """Its potential and its kinetic energy are 1e31 J and cancel to 1e23: beside that IDA's tolerance was 6e-5."""
-    outcome = run_cell(sampled_cells(100, 1)[53])
+    escaping = {
+        "coupling": ("link", "energy", 1), "stiffness": 229.85757334370717, "shear_ratio": 60.83595059106236,
+        "macro_step": 0.00026851253255446124, "mass": 0.025363373452556716, "k1": 86799.56285241657,
+        "escape": 0.44743293444026977, "contact_stiffness": 967954.5427546863, "alpha_b": 0.000775345425815984,
+        "alpha_s": 1.7144216084494206, "speed": 305.78137045624226, "restitution": 1.0,
+        "stop_depth": 0.00017574006589487633, "equilibrium": -0.04086146603312506, "approach": "elastic",
+        "n_elements": 10, "element_degree": 12, "n_modes": 1, "reduced_integration": True, "steps": 225,
+    }  # fmt: skip
+    outcome = run_cell(AT_REST | escaping)
     assert outcome["kind"] == "stopped"
     assert "past its hilltop" in outcome["reason"]
     assert outcome["residual"] < EXACT
@@ -296,7 +304,7 @@ def test_command(tmp_path, monkeypatch, unpainted, kinds, code):
     assert all((out / f"stability-{name}.png").is_file() for name in ("classes", "residuals"))
     scenes = sorted(out.glob("stability-garbage-*.toml"))
     assert len(scenes) == (0 if code == 0 else (30 + 4 * len(SLICES)) // len(CLASSES))
-    for path in scenes[:3]:
+    for path in scenes[-3:]:  # of slices, which all can be run
         assert load_scene(path).time.t_end > 0.0
 
 
