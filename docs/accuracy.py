@@ -18,7 +18,6 @@ from springbeam.run import runner
 from springbeam.scene import Scene
 from springbeam.scene.resolution import choice
 from springbeam.studies import rivals, tradeoff
-from springbeam.studies.metrics import worst
 from springbeam.studies.study import record_all, troubles
 from springbeam.studies.tables import Row, in_words
 from springbeam.studies.tradeoff import Tradeoff, cheapest
@@ -69,7 +68,7 @@ def side_by_side(rows: list[Row], scene: Scene) -> list[str]:
 def compared(row: Row) -> str:
     if row["status"] != "done":
         return "stopped"
-    return f"{worst(row):.0e}, {row['error_event_time']:.0e}"
+    return f"{row['error_motion']:.0e}, {row['error_event_time']:.0e}"
 
 
 def taken(scene: Scene, H: float) -> str:

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from .results.files import load_trajectory as load
-from .studies.accuracy import simulate
+from .run.accuracy import simulate
 
 __all__ = ["load", "simulate"]

@@ -53,8 +53,8 @@ def lines(verdicts):
 def worst(verdicts):
     silent = sorted((v for v in verdicts if v.silent), key=lambda v: -v.factor)
     return [
-        f"{v.seed}/{v.number} {v.kind}, {v.way}: {v.factor:.1f} times (u_tip {v.u_tip:.1e}, y {v.y:.1e}, times "
-        f"{v.time:.1e}, impulses {v.impulse:.1e}), condition {v.condition:.1f}"
+        f"{v.seed}/{v.number} {v.kind}, {v.way}: {v.factor:.1f} times (motion {v.motion:.1e}, times {v.time:.1e}, "
+        f"impulses {v.impulse:.1e}), condition {v.condition:.1f}"
         for v in silent
     ]
 

@@ -7,10 +7,9 @@ from draw import KINDS, drawn
 
 from springbeam import RunStopped, SceneError, Trajectory, simulate, with_changes
 from springbeam.monolithic import event_driven
-from springbeam.results.contact_times import contact_time_difference
+from springbeam.results.distance import distance
 from springbeam.scene.resolution import peak_force_doubt
 from springbeam.scene.suspicions import suspicions
-from springbeam.studies.metrics import errors
 
 #: Ways to run a scene: an accuracy, or [coupling] at the scene's own macro step, or that over ``finer``.
 WAYS = {
@@ -44,8 +43,7 @@ class Verdict:
     outcome: str  #: "done", "stopped", "refused", "no reference"
     condition: float = 0.0  #: change of the motion or of a time over that of a stiffness
     told: bool = False  #: not resolved, or a warning that the scene alone does not give
-    u_tip: float = 0.0
-    y: float = 0.0
+    motion: float = 0.0
     time: float = 0.0  #: of contact
     impulse: float = 0.0  #: of all impacts
     calls: int = 0  #: doStep calls of both FMUs, of all pilot runs
@@ -62,8 +60,8 @@ class Verdict:
     @property
     def factor(self):
         """Error over what it may be."""
-        motion = max(self.u_tip, self.y)
-        return max(motion, self.time, self.impulse) / self.bound if "accuracy" in self.way else motion / self.bound
+        off = max(self.motion, self.time, self.impulse) if "accuracy" in self.way else self.motion
+        return off / self.bound
 
     @property
     def judged(self):
@@ -89,7 +87,7 @@ def judge(seed, number, ways):
     times = np.unique(np.concatenate([_times(way, run) for way, run in done.items()]))
     try:
         reference = event_driven.simulate(scene, sample_times=times, time_limit=TIME_LIMIT)
-        condition = _condition(scene, float(reference.time[-1] - reference.time[0]))
+        condition = _condition(scene)
     except (event_driven.ReferenceFailure, RunStopped, ValueError) as failed:
         return [*found, *(Verdict(seed, number, way, "no reference", why=str(failed)) for way in done)]
     return [*found, *(_verdict(seed, number, way, run, reference, condition) for way, run in done.items())]
@@ -123,17 +121,16 @@ def _verdict(seed, number, way, run, reference, condition):
         times, window = _times(way, run), promised * span
     rows = np.isin(reference.time, times)
     exact = replace(reference, columns={name: values[rows] for name, values in reference.columns.items()})
-    found = errors(run, exact, window)
-    wrong = (found["error_u_tip"], found["error_y"], found["error_event_time"] / span, found["error_impulse"])
+    found = distance(run, exact, window)
     said = set(run.summary["warnings"]) - {*suspicions(run.scene), peak_force_doubt(run.scene)}
     return Verdict(
         seed, number, way, "done", condition, bool(said) or not run.summary["resolved"],
-        *(float(value or 0.0) for value in wrong),
+        found.motion, found.times, found.impulses,
         calls=run.do_steps + (picked["pilot_steps"] if picked else 0), why="; ".join(said),
     )  # fmt: skip
 
 
-def _condition(scene, span):
+def _condition(scene):
     """Return how many times larger than that of a stiffness the change of the motion or of a time is.
 
     By runs with short steps, since it need not be exact.
@@ -147,14 +144,6 @@ def _condition(scene, span):
 
     exact = run(0.0)
     for share in PERTURBATIONS:
-        moved = run(share)
-        rows = np.searchsorted(moved.time, exact.time * (1.0 - 1e-12)).clip(max=len(moved) - 1)
-        same = np.abs(moved.time[rows] - exact.time) <= 1e-9 * span
-        for name in ("u_tip", "y"):
-            if name in exact.columns:
-                scale = np.abs(exact[name] - exact[name][0]).max() or 1.0
-                change = np.abs(moved[name][rows[same]] - exact[name][same]).max(initial=0.0)
-                worst = max(worst, float(change / (abs(share) * scale)))
-        late = contact_time_difference(moved, exact, 2.0 * scene.coupling.H)
-        worst = max(worst, late / (abs(share) * span))
+        found = distance(run(share), exact, 2.0 * scene.coupling.H)
+        worst = max(worst, found.motion / abs(share), found.times / abs(share))
     return worst

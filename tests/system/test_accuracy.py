@@ -10,13 +10,13 @@ from scenes import scene_from_dict
 
 from springbeam import RunStopped, SceneError, load_scene, with_changes
 from springbeam.monolithic import event_driven
+from springbeam.results.distance import Distance, distance
 from springbeam.results.files import load_trajectory
 from springbeam.results.recording import MemoryRecorder
+from springbeam.run import accuracy as search
+from springbeam.run.accuracy import simulate
 from springbeam.run.runner import run
 from springbeam.scene.reading import tomllib
-from springbeam.studies import accuracy as search
-from springbeam.studies import metrics
-from springbeam.studies.accuracy import simulate
 from springbeam.studies.crosscheck import Orders
 
 sys.path.append(str(Path(__file__).parents[1] / "campaign"))
@@ -29,9 +29,8 @@ SCENES = tomllib.loads(Path(__file__).with_name("accuracy.toml").read_text(encod
 def errors(found, reference):
     """Errors by name; of the peak force beside shorter steps."""
     span = found.time[-1] - found.time[0]
-    wrong = metrics.errors(found, reference, found.summary["accuracy"]["asked"] * span)
-    wrong["error_event_time"] /= span
-    wrong = {name: np.nan_to_num(error or 0.0) for name, error in wrong.items() if name != "error_energy"}
+    wrong = distance(found, reference, found.summary["accuracy"]["asked"] * span)._asdict()
+    del wrong["force"]
     if not found.scene.contact.rigid:
         sharp = {"macro_step": found.scene.coupling.H / 8.0, "tolerance": 1e-12}
         exact = simulate(with_changes(found.scene, coupling=sharp)).summary["contact_force_max"]
@@ -52,6 +51,7 @@ def test_the_promise_is_kept_on_the_whole_curve(name):
         assert max(found.summary["accuracy"]["estimated_errors"].values()) <= asked / 1.5
 
 
+SAME = {"motion": 0.0, "times": 0.0, "impulses": 0.0, "force": None}
 FAR, NEAR = {"motion": 8e-3, "force": 1e-5}, {"motion": 1e-5, "force": 1.9e-3}
 
 
@@ -84,7 +84,7 @@ def test_steps_are_halved_until_the_estimate_of_each_error_does(apart, runs, mon
         return run
 
     monkeypatch.setattr(search.runner, "simulate", made)
-    monkeypatch.setattr(search, "differences", lambda *_: next(given))
+    monkeypatch.setattr(search, "distance", lambda *_: Distance(**{**SAME, **next(given)}))
     found = search.pick(scene)
     assert len(sizes) == runs
     assert found.summary["accuracy"]["pilot_runs"] == runs - 1
@@ -95,7 +95,7 @@ def test_runs_differ_by_the_largest_of_their_motion_and_by_their_peak_force():
     contact = {"law": "compliance", "stiffness": 1e4, "exponent": 1.0}
     scene = with_changes(load_scene("soft"), contact=contact, beam={"n_elements": 4}, time={"t_end": 0.05})
     coarse, fine = (simulate(with_changes(scene, coupling={"macro_step": size})) for size in (2e-3, 1e-3))
-    found = search.differences(coarse, fine, 1e-3)
+    found = distance(coarse, fine, 5e-5)._asdict()
     peaks = [run.summary["contact_force_max"] for run in (coarse, fine)]
     assert found["force"] == pytest.approx(1.0 - min(peaks) / max(peaks), rel=1e-12)
     ends = [run.at(np.linspace(0.0, 0.05, 2001)) for run in (coarse, fine)]
@@ -109,7 +109,7 @@ def test_a_spring_alone_is_right_with_an_accuracy_and_says_so(number):
     """A scene of the campaign."""
     (verdict,) = judge.judge(1, number, ["--accuracy 1e-3"])
     assert (verdict.outcome, verdict.told, verdict.judged, verdict.silent) == ("done", False, True, False)
-    assert np.nanmax([verdict.y, verdict.time, verdict.impulse]) <= 1e-5
+    assert max(verdict.motion, verdict.time, verdict.impulse) <= 1e-5
     assert verdict.calls <= 150
 
 
@@ -160,7 +160,7 @@ def test_ends_that_close_a_little_before_they_part_are_let_go():
     scene = judge.drawn(62, 0)
     run = simulate(with_changes(scene, coupling={"degree": 0}))
     finer = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": scene.coupling.H / 8.0}))
-    assert metrics.worst(metrics.errors(run, finer, np.inf)) <= 5e-3
+    assert distance(run, finer, np.inf).motion <= 5e-3
 
 
 def test_what_a_scheme_changes_of_the_energy_is_settled_by_runs_that_agree():

@@ -121,8 +121,8 @@ def picked(scene: Scene) -> Trajectory | None:
     """Return the run that keeps the accuracy asked for; ``None`` if none is."""
     if scene.accuracy is None:
         return None
+    from ..run.accuracy import pick
     from ..run.outcome import RunStopped
-    from ..studies.accuracy import pick
 
     try:
         return pick(scene)

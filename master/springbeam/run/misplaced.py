@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..contact.laws import SoftLaw
+from ..results.distance import HELD
 from ..results.paths import Path
 from ..results.steps import force as applied
 from ..results.steps import joined
@@ -30,8 +31,6 @@ _POINTS, _SHARES = np.polynomial.legendre.leggauss(4)
 _INSIDE = 0.5 * (_POINTS + 1.0), 0.5 * _SHARES
 #: Elements of a mesh that has the lowest modes of any finer one.
 _ELEMENTS = 50
-#: A tip that moves less, relative to the beam, is held.
-HELD = 1e-9
 #: Ways that an end is off from which on nothing more is to be learnt.
 _LOST = 1e3
 

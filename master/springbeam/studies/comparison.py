@@ -27,6 +27,7 @@ import numpy as np
 from ..monolithic import event_driven
 from ..pictures.drawing import present
 from ..results.contact_times import ContactChange, contact_changes
+from ..results.distance import apart
 from ..results.trajectory import TOLD, Trajectory, columns_of
 from ..run.runner import simulate
 from ..scene import Scene, SceneError, with_changes
@@ -150,8 +151,7 @@ def _same_story_until(coarse: Trajectory, fine: Trajectory) -> float:
     away = away_from(times, (event.time for run in (coarse, fine) for event in run.events), size)
     for name in present(coarse, _RESOLVED):
         values, finer = (run.at(times)[name] for run in (coarse, fine))
-        allowed = _RESOLVED[name] * np.abs(values - values[0]).max()
-        differ = away & (np.abs(values - finer) > allowed)
+        differ = away & (apart(finer, values) > _RESOLVED[name])
         if differ[1:].any():
             horizon = min(horizon, float(times[1:][differ[1:]][0]) - size)
     return horizon
@@ -244,7 +244,7 @@ def comparable_until(scene: Scene) -> float:
     changes = [contact_changes(run, SHORT_SHARE * float(np.ptp(times))) for run in (exact, moved)]
     end = _agree_until(changes[0], changes[1], float(times[0]), scene.time.t_end)
     name = "u_tip" if scene.beam is not None else "y"
-    off = np.abs(moved[name] - exact[name]) > _GROWTH * PERTURBATION * np.abs(exact[name] - exact[name][0]).max()
+    off = apart(moved[name], exact[name]) > _GROWTH * PERTURBATION
     return min(end, *times[off].tolist()) if off.any() else end
 
 

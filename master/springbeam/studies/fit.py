@@ -18,12 +18,12 @@ from rich.text import Text
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from ..run.accuracy import simulate
 from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, key_kind
 from ..scene.scene import split_key
 from ..signals.curves import signal
 from ..signals.measured import Measured, read_measured, time_shifts
-from .accuracy import simulate
 from .design import design, parse_axis
 from .study import Study
 from .tables import Findings, Row, table

@@ -1,18 +1,17 @@
-"""Metrics: numbers that studies keep of a run, with its cost and its errors beside a reference.
+"""Metrics: numbers that studies keep of a run, and its cost.
 
 A metric is named: one of `METRICS`, or one's own, ``NAME=module:function``, a Python function of the run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
-from ..results.contact_times import contact_time_difference, impulse_difference
 from ..results.dense import MOTION, Extremes, extremes
 from ..results.totals import LOSS_NAMES, TOTALS
 from ..results.trajectory import COLUMNS, TOLD, EventKind, Trajectory
@@ -201,40 +200,3 @@ def costs(run: Trajectory) -> dict[str, int]:
     """Return the doStep calls of both FMUs, those that were rolled back included, and the rollbacks."""
     rollbacks = sum(int(run.summary.get(f"{body}_rollbacks", 0)) for body in ("beam", "spring"))
     return {"cost_do_steps": run.do_steps, "cost_rollbacks": rollbacks}
-
-
-def motion_errors(
-    columns: Mapping[str, np.ndarray], reference: Trajectory, held: float = 0.0
-) -> dict[str, float | None]:
-    """Return the largest errors of u_tip and y, over the largest change of the reference from its start.
-
-    ``columns`` are at the times of the rows of ``reference``; an error is ``None`` where there is no such body. A tip
-    that moves less than ``held`` [m] does not move: its error is over that.
-    """
-    found: dict[str, float | None] = {}
-    for name in ("u_tip", "y"):
-        found[f"error_{name}"] = None
-        if name in columns and name in reference.columns:
-            exact = reference[name]
-            scale = max(float(np.abs(exact - exact[0]).max()), held * (name == "u_tip")) or 1.0
-            found[f"error_{name}"] = float(np.abs(columns[name] - exact).max()) / scale
-    return found
-
-
-def errors(run: Trajectory, reference: Trajectory, window: float) -> dict[str, Any]:
-    """Return the errors of ``run`` at all times of ``reference``, between the rows of the run too.
-
-    Those of the motion as `motion_errors` has them; the largest one of a change of contact [s], without contacts and
-    flights shorter than ``window`` [s]; that of all impulses over their sum; and the energy residual.
-    """
-    return {
-        **motion_errors(run.at(reference.time).columns, reference),
-        "error_event_time": contact_time_difference(run, reference, window),
-        "error_impulse": impulse_difference(run, reference),
-        "error_energy": float(run.summary["max_energy_residual"]),
-    }
-
-
-def worst(row: Mapping[str, Any]) -> float:
-    """Return the larger of the errors of u_tip and y, ∞ without any."""
-    return max((row[name] for name in ("error_u_tip", "error_y") if row.get(name) is not None), default=np.inf)

@@ -36,10 +36,10 @@ from pydantic_core import from_json, to_json
 from ..bodies.factory import fingerprints
 from ..results.directory import ResultsExist, ResultsUnreadable, RunDirectory, lock
 from ..results.trajectory import Trajectory
+from ..run.accuracy import simulate
 from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, load_scene, with_changes
 from ..scene.scene import split_key
-from .accuracy import simulate
 from .metrics import Metric, costs
 from .tables import Findings, Row
 

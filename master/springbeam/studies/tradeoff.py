@@ -18,6 +18,7 @@ import numpy as np
 
 from ..monolithic import event_driven
 from ..pictures.diagrams import Diagram, draw_diagrams
+from ..results.distance import distance, motion
 from ..results.trajectory import Trajectory
 from ..run.outcome import RunStopped
 from ..run.runner import simulate
@@ -25,7 +26,7 @@ from ..scene import Scene, SceneError, with_changes
 from ..scene.resolution import slowest_frequency
 from .comparison import SHORT_SHARE, comparable_until
 from .design import RIGID, SOFT
-from .metrics import costs, errors, motion_errors, worst
+from .metrics import costs
 from .rivals import TOLERANCES, Rival
 from .study import Study
 from .tables import Findings, Row, table
@@ -125,7 +126,7 @@ class Tradeoff(Study):
             "cost_setup": float(run.summary["setup_time"]),
             **costs(run),
             "cost_macro_steps": int(run.summary.get("macro_steps", 0)),
-            **errors(run, self.reference, SHORT_SHARE * float(np.ptp(self.times))),
+            **_errors(run, self.reference),
         }
 
     def _by_scipy(self, case: Row) -> Row:
@@ -135,7 +136,7 @@ class Tradeoff(Study):
         reach = max((float(np.abs(exact[k]).max()) for k in ("u_tip", "y") if k in exact.columns), default=1.0) or 1.0
         solved = rival.solve(case["method"], case["rtol"], 1e-3 * case["rtol"] * reach, self.times, _LIMIT)
         cost = {"cost_wall_time": solved.seconds, "cost_setup": ready - began, "cost_evaluations": solved.evaluations}
-        return cost | motion_errors(solved.columns, exact)
+        return cost | {"error_motion": motion(solved.columns, exact.columns)}
 
     @cached_property
     def times(self) -> np.ndarray:
@@ -154,10 +155,16 @@ class Tradeoff(Study):
         cells = [(c["error"], *_shown(c["co_simulation"]), *_shown(c["scipy"]), c["ratio"]) for c in best]
         names = ("error:.0e", "co-simulation", "[ms]:.3g", "scipy", "[ms]:.3g", "ratio:.1f")
         on_front = [
-            (_label(row), worst(row), row.get("error_event_time"), 1e3 * row["cost_wall_time"], 1e3 * row["cost_setup"],
-             row.get("cost_do_steps"))
+            (
+                _label(row),
+                row["error_motion"],
+                row.get("error_event_time"),
+                1e3 * row["cost_wall_time"],
+                1e3 * row["cost_setup"],
+                row.get("cost_do_steps"),
+            )
             for row in front
-        ]  # fmt: skip
+        ]
         columns = ("configuration", "error:.1e", "event [s]:.1e", "solve [ms]:.3g", "set-up [ms]:.3g", "doSteps:")
         shown = [
             f"{self.scene.title}: up to t = {until:.6g} s, {len(rows)} configurations",
@@ -174,21 +181,33 @@ class Tradeoff(Study):
         for cost, label in labels.items():
             curves: dict[str, list[Any]] = {row["family"]: [] for row in rows}
             for row in rows:
-                if cost in row and np.isfinite(worst(row)):
-                    curves[row["family"]].append((row[cost], min(worst(row), 1.0)))
+                if cost in row and "error_motion" in row:
+                    curves[row["family"]].append((row[cost], min(row["error_motion"], 1.0)))
             if cost == "cost_wall_time":
-                curves["Pareto front"] = [(row[cost], worst(row)) for row in front]
+                curves["Pareto front"] = [(row[cost], row["error_motion"]) for row in front]
             diagrams.append(Diagram(label, "largest relative error of u_tip and y", curves))
         title = f"{self.scene.title}: errors up to t = {self.scene.time.t_end:.6g} s"
         return partial(draw_diagrams, diagrams, title, (6.0, 6.5))
+
+
+def _errors(run: Trajectory, exact: Trajectory) -> Row:
+    """Return the `distance` of a run from the exact one, that of the times in seconds, and the energy residual."""
+    span = float(np.ptp(exact.time))
+    found = distance(run, exact, SHORT_SHARE * span)
+    return {
+        "error_motion": found.motion,
+        "error_event_time": found.times * span,
+        "error_impulse": found.impulses,
+        "error_energy": float(run.summary["max_energy_residual"]),
+    }
 
 
 def pareto(rows: Iterable[Row]) -> list[Row]:
     """Return the Pareto front, the cheapest first: no other row is both quicker and more accurate."""
     best, front = _NO_RESULT, []
     for row in sorted((row for row in rows if row["status"] == "done"), key=lambda row: row["cost_wall_time"]):
-        if worst(row) < best:
-            best = worst(row)
+        if row["error_motion"] < best:
+            best = row["error_motion"]
             front.append(row)
     return front
 
@@ -212,7 +231,7 @@ def cheapest(rows: Sequence[Row]) -> list[Row]:
 
 
 def _kept(rows: Iterable[Row], family: str, target: float) -> bool:
-    return all(worst(row) <= target for row in rows if row["family"] == family and row["status"] == "done")
+    return all(row["error_motion"] <= target for row in rows if row["family"] == family and row["status"] == "done")
 
 
 def _label(case: Row) -> str:

@@ -30,6 +30,7 @@ from ...bodies.protocol import FmuError
 from ...monolithic import event_driven
 from ...pictures.diagrams import figure_with
 from ...pictures.drawing import BLACK, BLUE, GREEN, ORANGE, SKY, STONE
+from ...results.distance import motion
 from ...results.trajectory import Trajectory
 from ...run.ledger import EXACT, bounds
 from ...run.outcome import RunStopped
@@ -37,7 +38,6 @@ from ...run.runner import Simulation
 from ...scene import SceneError, scene_from_dict
 from ...scene.resolution import with_scheme_chosen
 from ..comparison import PERTURBATION, perturbed
-from ..metrics import motion_errors, worst
 from ..picture import Scale, cells, column
 from ..study import Study
 from ..tables import Findings, Row, table
@@ -208,11 +208,11 @@ def _error(run: Trajectory) -> float | None:
     options: dict[str, Any] = {"sample_times": times, "t_end": end, "time_limit": _PATIENCE}
     try:
         exact = event_driven.simulate(scene, **options)
-        error = worst(motion_errors(run.at(exact.time).columns, exact))
+        error = motion(run.at(exact.time).columns, exact.columns)
         if error <= _RESOLVED:
             return error
         few = _WELL_CONDITIONED * PERTURBATION
-        if any(worst(motion_errors(moved.columns, exact)) > few for moved in perturbed(scene, **options)):
+        if any(motion(moved.columns, exact.columns) > few for moved in perturbed(scene, **options)):
             return None
     except (ValueError, event_driven.ReferenceFailure):
         return None

@@ -184,14 +184,6 @@ def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
     return LinearPair(beam, low, law.slope(depth_reached), law.resistance(depth_reached, 0.0)[2] if law.damped else 0.0)
 
 
-def contact_frequency(scene: Scene) -> float:
-    """Return √(k (1/m_tip + 1/m)) of beam and spring on a soft law [rad/s], where it is stiffest."""
-    assert scene.beam is not None
-    pair = linear_pair(scene, modal_beam(_reduced(scene.beam)))
-    assert pair is not None
-    return pair.contact_frequency
-
-
 # -- critical steps -------------------------------------------------------------------------------------------------
 
 

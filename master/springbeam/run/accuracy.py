@@ -11,18 +11,17 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
+from ..bodies.factory import load_bodies
 from ..bodies.protocol import Body
-from ..results.contact_times import contact_time_difference, impulse_difference
+from ..contact.laws import depth, law_of
+from ..results.distance import distance
 from ..results.trajectory import Trajectory
-from ..run import runner
-from ..run.ledger import CHANGED
-from ..run.misplaced import HELD
-from ..run.outcome import Progress, RunStopped
 from ..scene import Scene, SceneError, with_changes
+from ..scene.linearised import contact_energy
 from ..scene.resolution import STABLE, TURN, choice, joined_frequency, lasting_frequency, slow_oscillations
-from .metrics import motion_errors, worst
+from . import runner
+from .ledger import CHANGED
+from .outcome import Progress, RunStopped
 
 #: Fewest and most macro steps of a run.
 _FEWEST, _MOST = 8.0, 50_000
@@ -32,8 +31,6 @@ _CONTACT_TURN = 2.0
 _SAFETY = 1.5
 #: The coupling's and IDA's relative tolerance over the accuracy.
 _TOLERANCE = 1e-3
-#: Shares of the time from one row to the next, of either run, at which two runs are compared.
-_BETWEEN = np.arange(4.0) / 4.0
 
 
 def simulate(
@@ -69,7 +66,7 @@ def simulate(
 def pick(scene: Scene) -> Trajectory:
     """Return a run of ``scene`` that keeps its ``accuracy``; its scene has the settings that were picked.
 
-    ``accuracy`` of its summary says what was asked and picked, with an estimate of each error of `differences`; that of
+    ``accuracy`` of its summary says what was asked and picked, with an estimate of each part of the `distance`; that of
     the motion is at least how far the run misplaces its ends (`springbeam.run.misplaced`).
 
     Raises
@@ -110,37 +107,17 @@ def pick(scene: Scene) -> Trajectory:
     )
 
 
-def differences(coarse: Trajectory, fine: Trajectory, short: float) -> dict[str, float]:
-    """Return how far two runs of a scene are apart, relatively.
-
-    ``motion``: u_tip or y at any time, over its largest change; ``times``: of contacts, over the time that is run;
-    ``impulses``: of all impacts, over their sum; ``force``: the peak of a soft contact force, a mean over its window.
-    Contacts and flights shorter than the share ``short`` of that time are no evidence.
-    """
-    span = float(fine.time[-1] - fine.time[0])
-    rows = np.union1d(coarse.time, fine.time)
-    times = np.append((rows[:-1, None] + _BETWEEN * np.diff(rows)[:, None]).ravel(), rows[-1])
-    held = 0.0 if fine.shapes is None else HELD * float(np.abs(fine.shapes[1]).max(initial=0.0))
-    impulses = [impulse_difference(coarse, fine), impulse_difference(fine, coarse)]
-    found = {
-        "motion": worst(motion_errors(coarse.at(times).columns, fine.at(times), held)),
-        "times": contact_time_difference(coarse, fine, short * span) / span,
-        "impulses": max(np.nan_to_num(impulses).tolist()),
-    }
-    if not fine.scene.contact.rigid and "contact_force_max" in fine.summary:
-        peak, other = (float(run.summary["contact_force_max"]) for run in (fine, coarse))
-        found["force"] = abs(peak - other) / (max(peak, other) or 1.0)
-    return found
-
-
 def _estimated(
     coarse: Trajectory, fine: Trajectory, short: float, before: dict[str, float]
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the `differences` of two runs, and with them the error of the finer one: D/(2ᵖ − 1).
+    """Return the `distance` of two runs by its parts, and with it the error of the finer one: D/(2ᵖ − 1).
 
-    The order p is what these differences and those ``before`` show, 1 … 2; 1 where there are none.
+    The order p is what this distance and that ``before`` show, 1 … 2; 1 where there is none. Contacts shorter than the
+    share ``short`` of the run are no evidence.
     """
-    apart, errors = differences(coarse, fine, short), {}
+    found = distance(coarse, fine, short * float(fine.time[-1] - fine.time[0]))
+    apart = {name: part for name, part in found._asdict().items() if part is not None}
+    errors = {}
     for name, now in apart.items():
         then = before.get(name)
         order = min(max(math.log2(then / now), 1.0), 2.0) if then and now else 1.0
@@ -152,15 +129,26 @@ def _first(scene: Scene) -> float:
     """Return the number of macro steps of the first run: half as many as one needs that calls itself resolved."""
     rates = [omega / TURN for _, omega, _ in slow_oscillations(scene)]
     if scene.beam is not None and not scene.partners:
-        if scene.coupled and not scene.contact.rigid:
-            from .stability.predict import contact_frequency  # takes a second to load: only for who has a soft contact
-
-            rates.append(contact_frequency(scene) / _CONTACT_TURN)
-        elif scene.massless:
+        if scene.massless:
             rates.append(joined_frequency(scene) / _CONTACT_TURN)
+        elif scene.coupled and not scene.contact.rigid:
+            rates.append(_contact_frequency(scene) / _CONTACT_TURN)
         elif scene.coupled or scene.stop is not None:
             rates.append(lasting_frequency(scene.beam) / STABLE)
     return max(_FEWEST, math.ceil(0.5 * max(rates, default=0.0) * scene.duration))
+
+
+def _contact_frequency(scene: Scene) -> float:
+    """Return √(k (1/m_tip + 1/m)) of beam and spring on a soft law [rad/s], where it is stiffest."""
+    law = law_of(scene)
+    assert law is not None
+    stiffness = law.slope(depth(law, contact_energy(scene)) if law.one_sided else 0.0)
+    bodies = [body for body in load_bodies(scene, scene.contact_time or 0.0) if body is not None]
+    try:
+        return math.sqrt(stiffness * sum(1.0 / body.mass for body in bodies))
+    finally:
+        for body in bodies:
+            body.close()
 
 
 def _prepared(scene: Scene, macro_step: float) -> Scene:

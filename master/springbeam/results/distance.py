@@ -1,0 +1,89 @@
+"""How far a run is from an exact one, or from a finer one: one measure for all that compares two runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from .contact_times import contact_time_difference, impulse_difference
+from .trajectory import Trajectory
+
+#: A tip that moves less than this share of the beam's largest deflection does not move: it is held, or loads balance.
+HELD = 1e-9
+#: Shares of the time from one row to the next, of either run, at which two runs are compared.
+_BETWEEN = np.arange(4.0) / 4.0
+
+
+class Distance(NamedTuple):
+    """How far two runs are apart. All are relative; see `distance`."""
+
+    motion: float
+    times: float
+    impulses: float
+    force: float | None
+
+
+def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
+    """Return how far ``run`` is from ``exact``, a finer run or a reference.
+
+    Parameters
+    ----------
+    run, exact
+        Two runs of one scene; a reference has values at its rows only.
+    window
+        Contacts and flights shorter than this [s] are no evidence, those that pass on hardly any impulse.
+
+    Returns
+    -------
+    Distance
+        ``motion``: the largest difference of u_tip or of y, over the largest change of the exact one from its start
+        (`apart`), taken at all rows of both and at three times between each two; with a reference at its rows. ∞ where
+        the two have no body in common. ``times``: the largest difference of a beginning or an end of a contact, over
+        the time that is run. ``impulses``: the difference of the sums of all impacts' impulses on the tip and on the
+        foundation, over the smaller sum that is not 0; 0 where both are. ``force``: the difference of the peaks of a
+        soft contact force, each a mean over its window, over the larger; ``None`` of a rigid law and where a peak is
+        not known.
+    """
+    times = exact.time if exact.steps is None else _all_times(run, exact)
+    columns = exact.columns if exact.steps is None else exact.at(times).columns
+    shapes = exact.shapes or run.shapes
+    held = 0.0 if shapes is None else HELD * float(np.abs(shapes[1]).max(initial=0.0))
+    span = float(exact.time[-1] - exact.time[0])
+    impulses = [impulse_difference(run, exact), impulse_difference(exact, run)]
+    return Distance(
+        motion(run.at(times).columns, columns, held),
+        contact_time_difference(run, exact, window) / span,
+        max(np.nan_to_num(impulses).tolist()),
+        None if exact.scene.contact.rigid else _peaks_apart(run, exact),
+    )
+
+
+def motion(columns: Mapping[str, np.ndarray], exact: Mapping[str, np.ndarray], held: float = 0.0) -> float:
+    """Return the larger of the largest differences of u_tip and of y, `apart`, at equal times; ∞ without any."""
+    names = [name for name in ("u_tip", "y") if name in columns and name in exact]
+    found = (apart(columns[name], exact[name], held * (name == "u_tip")) for name in names)
+    return max((float(off.max(initial=0.0)) for off in found), default=inf)
+
+
+def apart(values: np.ndarray, exact: np.ndarray, least: float = 0.0) -> np.ndarray:
+    """Return the differences over the largest change of ``exact`` from its start, or over ``least`` if it is more.
+
+    Where nothing changes and ``least`` is 0 they stay absolute.
+    """
+    scale = max(float(np.abs(exact - exact[0]).max(initial=0.0)), least) or 1.0
+    return np.asarray(np.abs(values - exact) / scale)
+
+
+def _all_times(run: Trajectory, exact: Trajectory) -> np.ndarray:
+    rows = np.union1d(run.time, exact.time)
+    return np.append((rows[:-1, None] + _BETWEEN * np.diff(rows)[:, None]).ravel(), rows[-1])
+
+
+def _peaks_apart(run: Trajectory, exact: Trajectory) -> float | None:
+    if not all("contact_force_max" in of.summary for of in (run, exact)):
+        return None
+    peak, other = (float(of.summary["contact_force_max"]) for of in (run, exact))
+    return abs(peak - other) / (max(peak, other) or 1.0)

@@ -1,0 +1,79 @@
+"""How far two runs are apart: each part on runs whose difference is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from springbeam import load_scene, simulate, with_changes
+from springbeam.results.distance import HELD, apart, distance, motion
+
+TIMES = np.linspace(0.0, 1.0, 11)
+
+
+@pytest.mark.parametrize(("y_off", "u_off", "found"), [(0.02, 0.0, 0.01), (0.0, 0.02, 0.02), (0.02, 0.02, 0.02)])
+def test_the_motion_is_that_of_the_worse_end_over_its_largest_change(y_off, u_off, found):
+    """The ends begin at 5 m; the top moves 2 m, the tip 1 m."""
+    exact = {"y": 5.0 + 2.0 * TIMES, "u_tip": 5.0 - TIMES}
+    bump = np.eye(11)[5]
+    assert motion({"y": exact["y"] + y_off * bump, "u_tip": exact["u_tip"] - u_off * bump}, exact) == pytest.approx(
+        found
+    )
+
+
+def test_what_is_not_in_both_is_not_compared():
+    exact = {"y": TIMES, "u_tip": TIMES}
+    assert motion({"y": TIMES + 0.5}, exact) == pytest.approx(0.5)
+    assert motion({}, exact) == np.inf
+
+
+def test_an_end_that_does_not_move_is_judged_by_what_is_given_or_absolutely():
+    still = np.zeros(3)
+    assert apart(still + 1e-12, still, 1e-9) == pytest.approx(1e-3)
+    assert apart(still + 1e-12, still) == pytest.approx(1e-12)
+
+
+def test_the_parts_of_a_distance_are_those_of_runs_made_different():
+    """All times of the contact are 1 ms later, all impulses a tenth smaller, both peaks 83 and 100 N."""
+    run = simulate(with_changes(load_scene("soft"), beam={"n_elements": 4}, time={"t_end": 0.1}))
+    later = replace(
+        run,
+        events=[
+            replace(
+                event,
+                time=event.time + 1e-3,
+                impulse_contact=0.9 * event.impulse_contact,
+                impulse_foundation=0.9 * event.impulse_foundation,
+            )
+            for event in run.events
+        ],
+    )
+    first = run.events[0].time
+    assert distance(run, run, 1e-4) == (0.0, 0.0, 0.0, None)
+    found = distance(later, run, 1e-4)
+    assert found.motion == 0.0
+    assert found.times == pytest.approx(1e-3 / (0.1 - run.time[0]), rel=1e-9)
+    assert found.impulses == pytest.approx(0.1 / 0.9, rel=1e-9)  # over the smaller of both
+    assert first < 0.1
+    none = replace(run, events=[replace(event, impulse_contact=0.0, impulse_foundation=0.0) for event in run.events])
+    assert distance(none, run, 1e-4).impulses == distance(run, none, 1e-4).impulses == 1.0
+
+
+def test_peaks_of_a_soft_force_are_compared_over_the_larger():
+    contact = {"law": "compliance", "stiffness": 1e4, "exponent": 1.0}
+    scene = with_changes(load_scene("soft"), contact=contact, beam={"n_elements": 4}, time={"t_end": 0.05})
+    run = simulate(scene)
+    summary = {**run.summary, "contact_force_max": 0.8 * run.summary["contact_force_max"]}
+    smaller = replace(run, summary=summary)
+    assert distance(smaller, run, 0.0).force == distance(run, smaller, 0.0).force == pytest.approx(0.2)
+
+
+def test_a_tip_that_loads_hold_is_judged_by_the_deflection_of_its_beam():
+    """Its row is made 0: 1e-13 m is the whole of what it moves, and next to nothing of what the beam does."""
+    run = simulate(load_scene("soft", ["time.t_end=0.02", "beam.n_elements=4"]))
+    largest = np.abs(run.shapes[1]).max()
+    columns = {"time": run.time, "phase": run.phase, "u_tip": np.zeros(len(run))}
+    still = replace(run, columns=columns, steps=None)
+    columns["u_tip"][-1] = -1e-13
+    off = np.abs(run.u_tip - columns["u_tip"]).max()
+    assert distance(run, still, 0.0).motion == pytest.approx(off / (HELD * largest))
