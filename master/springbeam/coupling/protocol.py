@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Memory, Motion, Stateful, StepRefused
 
@@ -86,10 +86,6 @@ class Coupling(Stateful):
 
     def accept(self, step: Step) -> None:
         """Count from now on what ``step``, which is made, has dissipated."""
-
-    def report(self) -> tuple[dict[str, Any], list[str]]:
-        """Return what the summary of a run says of the coupling, and warnings."""
-        return {"iterations": self.state.iterations}, []
 
     def booking(self, ends: Ends) -> Booking:
         """Return the energies at the ``ends``."""

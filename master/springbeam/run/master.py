@@ -342,10 +342,9 @@ class Master(Stateful):
         events = self._recorder.events()[:known]
         made = int(np.count_nonzero(np.diff(steps["time"])))
         energies, warnings, changed = self._balance.report(steps)
-        of_coupling, warned = self._pair.joined.report()
         off = misplaced(scene, self._pair, steps, events)
         unresolved = why_not_resolved(scene, self._pair, self._steps.size, steps, events, off)
-        warnings += filter(None, [*warned, unresolved or peak_force_doubt(scene), not_shown(scene, self._pair, steps)])
+        warnings += filter(None, [unresolved or peak_force_doubt(scene), not_shown(scene, self._pair, steps)])
         neglect = {}
         if scene.driver_stiffness is not None and len(steps):
             motion, share = Neglect(scene.coupling, scene.driver_stiffness).by(steps)
@@ -361,7 +360,7 @@ class Master(Stateful):
             "macro_steps": made,
             "events": len(events),
             "halved_steps": self.state.halvings,
-            **of_coupling,
+            "iterations": self._pair.joined.state.iterations,
             **energies,
             "resolved": unresolved is None and not changed and not ruled_out,
             "misplaced_ends": off,
