@@ -2,8 +2,11 @@
 
 from types import SimpleNamespace
 
+import exact
 import numpy as np
 import pytest
+from exact import coupled, laws
+from exact.alone import clamped_free_frequencies
 from references import dips, integrated_anew
 from scenes import kinds, soft
 from scipy.integrate import quad
@@ -15,9 +18,6 @@ from springbeam.monolithic.laws import Phase, Watch
 from springbeam.monolithic.oscillators import GAUSS
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.scene import Beam, load_scene, with_changes
-from springbeam.studies import verify
-from springbeam.studies.verify import laws
-from springbeam.studies.verify.alone import clamped_free_frequencies
 
 
 def linear(**tables):
@@ -42,25 +42,25 @@ def test_soft_agrees_with_extended_precision():
         assert (event.z, event.v_tip) == pytest.approx((velocity, velocity), abs=2e-13)
 
 
-LAWS = [verify.compliant_impact, verify.hunt_crossley, verify.link, verify.damped_link, verify.tie]
+LAWS = [exact.compliant_impact, exact.hunt_crossley, exact.link, exact.damped_link, exact.tie]
 
 
 @pytest.mark.parametrize(
     ("section", "share"),
-    [*((law, 1e-3) for law in LAWS), (verify.moving_base, 1.0)],
+    [*((law, 1e-3) for law in LAWS), (exact.moving_base, 1.0)],
     ids=lambda given: getattr(given, "solution", float).__name__,
 )
 def test_the_reference_meets_the_exact_solutions_of_a_run(section, share, monkeypatch):
     """The bounds of laws are errors of a coupling and of IDA, of which the reference has neither."""
-    for module in (verify.laws, verify.coupled):
+    for module in (laws, coupled):
         monkeypatch.setattr(module, "simulate", event_driven.simulate)
     for check in section():
         assert abs(check.error or 0.0) <= share * check.bound, check
 
 
 def test_the_reference_of_a_bar_on_a_stop_approaches_the_exact_impact(monkeypatch):
-    monkeypatch.setattr(verify.coupled, "simulate", event_driven.simulate)
-    assert [check.quantity for check in verify.bar_impact.solution(10) if not check.passed] == []
+    monkeypatch.setattr(coupled, "simulate", event_driven.simulate)
+    assert [check.quantity for check in exact.bar_impact.solution(10) if not check.passed] == []
 
 
 def test_the_closed_forms_are_those_of_the_oscillator_and_of_the_quadrature():

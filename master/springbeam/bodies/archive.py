@@ -18,7 +18,7 @@ _PLAIN = re.compile(r"(?:(?!\.{1,2}(?:/|$))[^/\\:\x00-\x1f]+(?:/|$))+")
 _USED = ("modelDescription.xml", "resources/")
 _BINARIES, _EXECUTABLE = "binaries/", 0o111
 #: What the names of our FMUs end with, by version of FMI.
-_ENDINGS = {"2.0": "", "3.0": "3"}
+ENDINGS = {"2.0": "", "3.0": "3"}
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -31,15 +31,17 @@ def fmu_directory() -> Path:
     return installed if installed.is_dir() else _PACKAGE.parents[1] / "fmus"
 
 
-def own_fmu(name: str) -> Path:
-    """Return the file of our FMU ``name`` for the version of FMI that $SPRINGBEAM_FMI names, 2.0 (default) or 3.0.
-
-    Raises FmuError for another version.
-    """
+def fmi_version() -> str:
+    """Return the version of FMI that $SPRINGBEAM_FMI names, 2.0 (default) or 3.0. Raises FmuError for another one."""
     version = os.environ.get("SPRINGBEAM_FMI") or "2.0"
-    if version not in _ENDINGS:
-        raise FmuError(f"SPRINGBEAM_FMI = {version!r}: must be {' or '.join(_ENDINGS)}")
-    return fmu_directory() / f"{name}{_ENDINGS[version]}.fmu"
+    if version not in ENDINGS:
+        raise FmuError(f"SPRINGBEAM_FMI = {version!r}: must be {' or '.join(ENDINGS)}")
+    return version
+
+
+def own_fmu(name: str, version: str | None = None) -> Path:
+    """Return the file of our FMU ``name`` for a version of FMI, that of `fmi_version` if none is given."""
+    return fmu_directory() / f"{name}{ENDINGS[version or fmi_version()]}.fmu"
 
 
 class UnsafeArchive(ValueError):

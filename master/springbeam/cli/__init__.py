@@ -79,7 +79,7 @@ _COMMANDS: dict[str, tuple[Callable[..., Findings], ...]] = {
     "Run": (run.run, studies.resume, studies.sweep, paper.paper),
     "Look": (look.report, look.animate, look.export, look.compare, look.spectrum, studies.fit),
     "Choose scheme and accuracy": (scenes.predict, studies.tradeoff, studies.converge),
-    "Check": (studies.crosscheck, checks.verify, studies.stability, checks.doctor),
+    "Check": (studies.crosscheck, studies.stability, checks.doctor),
 }
 for title, commands in _COMMANDS.items():
     for command in commands:

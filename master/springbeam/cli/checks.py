@@ -1,4 +1,4 @@
-"""``springbeam doctor`` and ``springbeam verify``."""
+"""``springbeam doctor``."""
 
 from __future__ import annotations
 
@@ -6,25 +6,20 @@ import platform
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterable
-from contextlib import closing
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
-from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
-from ..bodies.archive import own_fmu
-from ..bodies.protocol import FmuError
-from ..scene import Beam, Scene, Spring, load_scene
+from ..bodies.archive import ENDINGS, fmi_version, fmu_directory, own_fmu
+from ..bodies.protocol import FmuError, StepRefused
+from ..scene import Scene, load_scene
 from ..scene.partners import kind_of
 from ..studies.tables import Findings, table
-from .common import BAD_INPUT, DISAGREES, JsonOption, SettingsOption, console_for
+from .common import BAD_INPUT, DISAGREES, JsonOption, SettingsOption
 
 _PACKAGES = (
     *("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "plotly", "pebble", "pyarrow"),
@@ -39,23 +34,18 @@ def doctor(
     settings: SettingsOption = None,
     as_json: JsonOption = False,
 ) -> Findings:
-    """Show versions, and whether the FMUs are found and can be loaded here. Exit code 1 if they cannot.
+    """Show versions, and whether the FMUs load here and give an answer that is known exactly. Exit code 1 if not.
 
     With a scene, examine the FMUs of others that it names, and show what they can do and what that allows. Exit code 2
     if one is not what the scene or itself says, or cannot do what the scene asks for.
 
     Example: springbeam doctor my-scene.toml
     """
-    from ..bodies.fmu_bodies import FmuBeam, FmuSpring
-
     if scene is not None:
         return _examine(load_scene(scene, settings or ()))
     installed = {package.name.lower(): package.version for package in metadata.distributions()}
     versions = {name: installed.get(name) for name in _PACKAGES}
-    fmus = {
-        "beam": _loaded("beam", lambda: FmuBeam(Beam.with_ones(), 0.0, 0.0)),
-        "spring": _loaded("spring", lambda: FmuSpring(Spring.with_ones(), 0.0)),
-    }
+    fmus = [_asked(name, version) for version in ENDINGS for name in ("beam", "spring")]
     document = {
         "version": metadata.version("springbeam"),
         "path": Path(__file__).parents[1],
@@ -73,24 +63,25 @@ def doctor(
         ("packages", textwrap.fill(there, 66, break_on_hyphens=False, subsequent_indent=" " * 12)),
         *(("missing", f"{name}: pip install --upgrade {name}") for name, number in versions.items() if number is None),
         ("ffmpeg", document["ffmpeg"] or "not found: springbeam animate then writes GIFs only, no MP4"),
-        *((fmu["file"], f"{fmu['state']}\n{'':<12}{fmu['error'] or fmu['path']}") for fmu in fmus.values()),
+        ("FMUs", f"of {fmu_directory()}; a run takes those for FMI {fmi_version()}"),
+        *((fmu["path"].name, f"{'FAILED: ' * (not fmu['passed'])}{fmu['state']}") for fmu in fmus),
     ]
-    failed = any(fmu["error"] is not None for fmu in fmus.values())
+    failed = not all(fmu["passed"] for fmu in fmus)
     return Findings(document, (), [(f"{name:<12}", text) for name, text in lines], code=DISAGREES if failed else 0)
 
 
-def _loaded(name: str, make: Callable[[], OwnBody]) -> dict[str, Any]:
-    """Return how our FMU of ``name`` is found and loaded."""
-    found: dict[str, Any] = {"path": None, "file": f"{name}.fmu", "fmi": None, "state": "FAILED", "error": None}
+def _asked(name: str, version: str) -> dict[str, Any]:
+    """Return how far our FMU is off an exact answer, or why it gives none."""
+    from ..bodies.known_answers import QUESTIONS
+
+    question, path = QUESTIONS[name], own_fmu(name, version)
+    found = {"path": path, "fmi": version, "answer": question.words, "exact": question.exact, "bound": question.bound}
     try:
-        found["path"] = path = own_fmu(name)
-        found["file"] = path.name
-        with closing(make()) as body:
-            found["fmi"] = body.fmu.version
-        found["state"] = f"FMI {found['fmi']}, loads"
-    except FmuError as failure:
-        found["error"] = str(failure)
-    return found
+        error = question.ask(name, version)
+    except (FmuError, StepRefused) as failure:
+        return {**found, "error": None, "passed": False, "state": str(failure)}
+    state = f"off by {abs(error):.1e} of {question.exact:.6g} m (at most {question.bound:.1e}): {question.words}"
+    return {**found, "error": error, "passed": abs(error) <= question.bound, "state": state}
 
 
 def _examine(scene: Scene) -> Findings:
@@ -121,50 +112,3 @@ def _examine(scene: Scene) -> Findings:
     if faults := [*(fault for finding in found.values() for fault in finding.faults), *refused]:
         return Findings(document, shown, code=BAD_INPUT, error="\n".join(faults))
     return Findings(document, [*shown, "The checks found nothing wrong, and the scene can be run."])
-
-
-if TYPE_CHECKING:
-    from ..bodies.fmu_bodies import OwnBody
-    from ..studies.verify.alone import Check, Section
-
-
-_COLUMNS = ("quantity", "exact:.6g", "computed:.6g", "error:.1e", "bound:.1e", "")
-
-
-def verify(as_json: JsonOption = False) -> Findings:
-    """Check the FMUs against exact solutions. Exit code 1 if a check fails.
-
-    Example: springbeam verify
-    """
-    from ..studies.verify import SECTIONS
-
-    found = report(SECTIONS, console_for(silent=as_json))
-    passed = all(check.passed for checks in found.values() for check in checks)
-    described = [
-        {"title": title, "checks": [{**asdict(c), "error": c.error, "passed": c.passed} for c in checks]}
-        for title, checks in found.items()
-    ]
-    return Findings({"passed": passed, "sections": described}, code=0 if passed else DISAGREES)
-
-
-def report(sections: Iterable[Section], console: Console) -> dict[str, list[Check]]:
-    """Print each section's table as it comes and a last line that counts; return the checks by title."""
-    began = perf_counter()
-    found: dict[str, list[Check]] = {}
-    for section in sections:
-        checks = found[section.title] = list(section())
-        reasons = dict.fromkeys(check.reason for check in checks)
-        marks = dict(zip(reasons, "abcdefghijklmnopqrstuvwxyz", strict=False))
-        rows = [
-            (c.quantity, c.exact, c.computed, c.error, c.bound, f"{'pass' if c.passed else 'FAIL'} {marks[c.reason]}")
-            for c in checks
-        ]
-        console.print(table(_COLUMNS, rows, section.title))
-        notes = Table.grid(padding=(0, 1))
-        for reason, mark in marks.items():
-            notes.add_row(Text(mark), Text(reason))
-        console.print(notes, "")
-    verdicts = [check.passed for checks in found.values() for check in checks]
-    counts = f"{verdicts.count(True)} passed, {verdicts.count(False)} failed"
-    console.print(f"{counts}; {perf_counter() - began:.0f} s")
-    return found

@@ -36,6 +36,7 @@ STOPPED = 3
 #: Commands and options that there are no more, with what to do instead.
 GONE = {
     "--mesh": "springbeam converge SCENE shows how far the mesh is from the continuous beam",
+    "verify": "springbeam doctor asks the FMUs for what is known exactly, springbeam crosscheck judges a scene",
 }
 #: How long a signal waits for Python to act on it [s].
 PATIENCE = 5.0

@@ -18,12 +18,12 @@ from scipy.linalg import expm, hankel, svd
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from ...bodies.fmu_bodies import FmuBeam
-from ...bodies.protocol import NO_FORCE, StepRefused
-from ...run.outcome import RunStopped
-from ...run.runner import simulate
-from ...scene import Beam, Scene, Spring, scene_from_dict
-from ..tables import difference
+from springbeam.bodies.fmu_bodies import FmuBeam
+from springbeam.bodies.protocol import NO_FORCE, StepRefused
+from springbeam.run.outcome import RunStopped
+from springbeam.run.runner import simulate
+from springbeam.scene import Beam, Scene, Spring, scene_from_dict
+from springbeam.studies.tables import difference
 
 EPS = float(np.finfo(float).eps)
 

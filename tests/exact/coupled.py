@@ -12,9 +12,10 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.special import ai_zeros, itairy, spherical_jn
 
-from ...bodies.fmu_bodies import FmuSpring
-from ...run.runner import simulate
-from ...scene import Beam, Coupling, Scene, Spring, Time, load_scene, with_changes
+from springbeam.bodies.fmu_bodies import FmuSpring
+from springbeam.run.runner import simulate
+from springbeam.scene import Beam, Coupling, Scene, Spring, Time, load_scene, with_changes
+
 from .alone import (
     EPS,
     IDA,

@@ -20,9 +20,10 @@ import numpy as np
 from scipy.linalg import block_diag, expm
 from scipy.special import beta, lambertw, spherical_jn
 
-from ...results.trajectory import Trajectory
-from ...run.runner import simulate
-from ...scene import Beam, Scene, scene_from_dict
+from springbeam.results.trajectory import Trajectory
+from springbeam.run.runner import simulate
+from springbeam.scene import Beam, Scene, scene_from_dict
+
 from .alone import IDA, Check, ida_error, section
 
 #: Stiffness [N, N·m²] that leaves the tip of a beam a free mass for a second, and rotary inertia that keeps θ at rest.

@@ -1,4 +1,4 @@
-"""Compare the FMUs with exact solutions: ``springbeam verify``.
+"""Compare the FMUs with exact solutions (test_exact.py), and the references too (test_references.py).
 
 Every `Section` computes one exact solution from its formula, has ``beam.fmu`` and ``spring.fmu`` (alone, or in a scene)
 compute the same, and yields the comparison, a `Check` at a time. A bound follows from what the method leaves out, the

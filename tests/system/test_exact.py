@@ -1,0 +1,132 @@
+"""The FMUs beside exact solutions (tests/exact): each is met, and a wrong parameter is found out."""
+
+from dataclasses import replace
+from functools import partialmethod
+
+import exact
+import pytest
+from exact.coupled import _airy_overshoot
+from scipy.integrate import quad
+from scipy.special import airy
+
+from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
+from springbeam.contact.laws import Compliance
+from springbeam.coupling.solver import SCHEMES
+
+
+@pytest.mark.parametrize("section", exact.SECTIONS, ids=lambda section: section.solution.__name__)
+def test_the_fmus_meet_the_exact_solution(section):
+    checks = list(section())
+    assert checks
+    assert [check for check in checks if not check.passed] == []
+
+
+# -- a wrong parameter fails ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def changed(monkeypatch):
+    """Let every body of a kind get ``key`` times ``change``, or another name, instead of what it was asked to have."""
+
+    def change(body, key, change):
+        right = body.__init__
+
+        def wrong(self, parameters, *rest):
+            value = change if isinstance(change, str) else change * getattr(parameters, key)
+            right(self, parameters.model_copy(update={key: value}), *rest)
+
+        monkeypatch.setattr(body, "__init__", wrong)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("section", "body", "key", "change"),
+    [
+        (exact.static_deflection, FmuBeam, "young_modulus", 1.01),
+        (exact.static_deflection, FmuBeam, "shear_modulus", 1.01),
+        (exact.frequencies, FmuBeam, "density", 1.01),
+        (exact.frequencies, FmuBeam, "second_moment_of_area", 0.99),
+        (exact.frequencies, FmuBeam, "shear_modulus", 1.01),
+        (exact.frequencies, FmuBeam, "mass_matrix", "consistent"),  # its sixth frequency is 0.5 % higher
+        (exact.duffing, FmuSpring, "mass", 1.01),
+        (exact.duffing, FmuSpring, "cubic_stiffness", 1.01),
+        (exact.bar_impact, FmuBeam, "density", 1.01),
+        (exact.two_masses, FmuSpring, "linear_stiffness", 1.01),
+        (exact.compliant_impact, FmuSpring, "mass", 1.01),
+        (exact.compliant_impact, FmuBeam, "density", 1.01),
+        (exact.link, FmuBeam, "shear_modulus", 1.01),
+        (exact.link, FmuSpring, "linear_stiffness", 1.01),
+        (exact.tie, FmuSpring, "mass", 1.01),
+        (exact.resonance, FmuBeam, "alpha_b", 1.01),
+        (exact.pulse, FmuSpring, "linear_stiffness", 1.01),
+        (exact.slow_ramp, FmuBeam, "shear_modulus", 1.01),
+    ],
+    ids=lambda given: getattr(given, "solution", given).__name__ if callable(given) else str(given),
+)
+def test_a_body_that_is_off_by_one_percent_fails(section, body, key, change, changed, none_kept):
+    changed(body, key, change)
+    assert any(not check.passed for check in section())
+
+
+RIGHT = {method: getattr(FmuBeam, method) for method in ("advance", "energies")}
+RESISTANCE = Compliance.resistance
+
+
+def pushed(self, time, size, force, *rest):
+    """The beam gets 1.01 C."""
+    return RIGHT["advance"](self, time, size, (1.01 * force[0], *force[1:]), *rest)
+
+
+def energies(self, part):
+    """The beam tells 1.01 of one of its energies."""
+    told = RIGHT["energies"](self)
+    return told._replace(**{part: 1.01 * getattr(told, part)})
+
+
+def hardly_damped(law, p, rate):
+    """The contact takes 1 % less than χ would."""
+    return RESISTANCE(replace(law, damping=0.99 * law.damping), p, rate)
+
+
+def base_as_force(self, load):
+    """The spring takes the acceleration of its base for a force."""
+    return [("external_force", 1.0)]
+
+
+@pytest.mark.parametrize(
+    ("section", "owner", "method", "wrong"),
+    [
+        (exact.energy_scheme, FmuBeam, "advance", pushed),
+        (exact.energy_scheme, FmuBeam, "energies", partialmethod(energies, "kinetic")),
+        (exact.energy_scheme, FmuBeam, "energies", partialmethod(energies, "potential")),
+        (exact.energy_scheme, FmuBeam, "energies", partialmethod(energies, "dissipated")),
+        (exact.hunt_crossley, Compliance, "resistance", hardly_damped),
+        (exact.moving_base, FmuSpring, "_inputs_of", base_as_force),
+    ],
+    ids=["force", "kinetic", "potential", "dissipated", "damping", "base"],
+)
+def test_a_part_that_is_wrong_fails(section, owner, method, wrong, monkeypatch, none_kept):
+    monkeypatch.setattr(owner, method, wrong)
+    assert any(not check.passed for check in section())
+
+
+def test_a_scheme_whose_conditions_are_met_late_fails(monkeypatch, none_kept):
+    """By 1e-4 H."""
+    for degree, right in SCHEMES["energy"].items():
+
+        def wrong(m, size, right=right):
+            return tuple(r + 1e-4 * size * m.velocity for r in right(m, size))
+
+        monkeypatch.setitem(SCHEMES["energy"], degree, wrong)
+    assert any(not check.passed for check in exact.energy_scheme())
+
+
+# -- the exact values themselves ------------------------------------------------------------------------------------
+
+
+def test_the_overshoot_of_a_dispersed_step_is_the_integral_of_airy():
+    """The integral from the first zero on: Ai is negative below it. `itairy` is good for single precision, 1e-7."""
+    first_zero = -2.338107410459767
+    value, _ = quad(lambda x: airy(x)[0], first_zero, 20.0, epsabs=1e-12)
+    assert _airy_overshoot() == pytest.approx(value, abs=1e-7)
