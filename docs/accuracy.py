@@ -1,6 +1,7 @@
 """Pictures and tables of docs/accuracy.md:  .venv/bin/python docs/accuracy.py [STUDY]…   (all: some ten minutes)
 
-The studies are those of `springbeam tradeoff`, one after the other, timed in processor time, of which what else runs on
+The studies are those of `springbeam tradeoff`, and scipy's solvers on the same problem (tests/bench/rivals.py), one
+after the other, timed in processor time, of which what else runs on
 the machine takes none (with OMP_NUM_THREADS=1). Pictures go to docs/images/tradeoff-STUDY.png,
 tables into docs/accuracy.md, between the lines that name the study.
 """
@@ -11,16 +12,19 @@ import sys
 from time import process_time
 from typing import Any, NamedTuple
 
-from pages import IMAGES, shrink, table, write_section  # beside this script
+from pages import DOCS, IMAGES, shrink, table, write_section  # beside this script
 
 from springbeam import load_scene, with_changes
 from springbeam.run import runner
 from springbeam.scene import Scene
 from springbeam.scene.resolution import choice
-from springbeam.studies import rivals, tradeoff
+from springbeam.studies import tradeoff
 from springbeam.studies.study import record_all, troubles
 from springbeam.studies.tables import Row, in_words
-from springbeam.studies.tradeoff import Tradeoff, cheapest
+from springbeam.studies.tradeoff import TARGETS, Tradeoff, cheapest
+
+sys.path.insert(0, str(DOCS.parent / "tests" / "bench"))
+import rivals
 
 
 class Window(NamedTuple):
@@ -46,11 +50,11 @@ def cell(row: Row | None) -> str:
     return "none" if row is None else f"{row['family']}, {row['setting']}: {1e3 * row['cost_wall_time']:.3g}"
 
 
-def choices(rows: list[Row]) -> list[str]:
-    cells = [
-        [f"{best['error']:.0e}", cell(best["co_simulation"]), cell(best["scipy"]), in_words(best["ratio"], ".2g")]
-        for best in cheapest(rows)
-    ]
+def choices(rows: list[Row], theirs: list[Row]) -> list[str]:
+    cells = []
+    for target, here, there in zip(TARGETS, cheapest(rows), cheapest(theirs), strict=True):
+        ratio = there["cost_wall_time"] / here["cost_wall_time"] if here and there else None
+        cells.append([f"{target:.0e}", cell(here), cell(there), in_words(ratio, ".2g")])
     return table(["error", "cheapest here: solve [ms]", "cheapest of scipy: solve [ms]", "ratio"], cells)
 
 
@@ -88,7 +92,8 @@ def main(names: list[str]) -> None:
         study.findings(records).pictures["tradeoff"]().savefig(IMAGES / f"tradeoff-{name}.png", dpi=110)
         shrink(IMAGES / f"tradeoff-{name}.png")
         notes = [f"* {note}" for note in remarks]
-        lines = [*choices(rows), "", *side_by_side(rows, study.scene), *([""] if notes else []), *notes]
+        theirs = list(rivals.rows(study.scene, study.reference, study.times))
+        lines = [*choices(rows, theirs), "", *side_by_side(rows, study.scene), *([""] if notes else []), *notes]
         write_section("accuracy.md", name, lines)
         print(f"{name}, up to t = {study.scene.time.t_end:.6g} s", *lines, "", sep="\n", flush=True)
 

@@ -1,4 +1,4 @@
-"""What an accuracy costs, beside what a good user of scipy would write (`springbeam.studies.rivals`).
+"""What an accuracy costs, beside what a good user of scipy would write (`rivals`).
 
 Both give y at the same 401 times, and are judged at all of them: ours between its macro points too. Set-up is not
 counted, on either side: FMUs that are loaded, modes that are known.
@@ -9,10 +9,10 @@ from functools import partial
 
 import numpy as np
 from measure import compare, ratio_row, timed
+from rivals import Rival
 
 from springbeam import Scene, load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
-from springbeam.studies.rivals import Rival
 
 #: Ours: macro steps, and tolerances of the coupling and of IDA; the force is quadratic.
 STEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192)

@@ -7,10 +7,11 @@ import statistics
 from dataclasses import dataclass
 from time import process_time
 
+import rivals
+
 from springbeam.monolithic import event_driven
 from springbeam.paper import co_simulation, monolithic
 from springbeam.run import runner
-from springbeam.studies import rivals
 
 
 class _Clock:

@@ -266,7 +266,7 @@ def tradeoff(
         ),
     ] = False,
 ) -> Study:
-    """Measure error against cost over schemes, macro steps and tolerances, beside scipy's solvers.
+    """Measure error against cost over schemes, macro steps and tolerances.
 
     Example: springbeam tradeoff soft --until 0.0712
     """

@@ -2,7 +2,7 @@
 
 All are judged on the same times, between the macro points too, beside the event-driven monolithic solution of the same
 semi-discrete model, so that what is measured is the coupling and the time integration (what the model itself leaves
-out, `converge` shows). scipy solves the same model as a good user would have it do (`rivals`).
+out, `converge` shows).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 
 from ..monolithic import event_driven
 from ..pictures.diagrams import Diagram, draw_diagrams
-from ..results.distance import distance, motion
+from ..results.distance import distance
 from ..results.trajectory import Trajectory
 from ..run.outcome import RunStopped
 from ..run.runner import simulate
@@ -27,7 +27,6 @@ from ..scene.resolution import slowest_frequency
 from .comparison import SHORT_SHARE, comparable_until
 from .design import RIGID, SOFT
 from .metrics import costs
-from .rivals import TOLERANCES, Rival
 from .study import Study
 from .tables import Findings, Row, table
 
@@ -73,22 +72,18 @@ class Tradeoff(Study):
         if scene.accuracy is not None:
             left_out = f"accuracy = {scene.accuracy:g} is left out: each configuration has its own scheme and steps"
             remarks.append(left_out)
-        if scene.massless:
-            remarks.append(
-                "scipy's solvers are left out: a quasi-static beam has no equation of motion to hand to them"
-            )
         scene = with_changes(scene, accuracy=None, time={"t_end": window})
         return cls(scene=scene, remarks=tuple(remarks), **settings)
 
     def cases(self) -> dict[str, Row]:
         """Return the axes of all configurations that the scene can have, by label; if quick, every third of each.
 
-        They are family, setting, and keys or scipy's method and tolerance.
+        They are family, setting, and keys.
         """
         families: dict[str, list[Row]] = {}
         for case in _configurations(self.scene):
             with suppress(SceneError):  # what the scene cannot have
-                _ = "rtol" in case or self.at(case)
+                self.at(case)
                 families.setdefault(case["family"], []).append(case)
         return {_label(case): case for cases in families.values() for case in cases[:: 3 if self.quick else 1]}
 
@@ -105,13 +100,13 @@ class Tradeoff(Study):
         began, times, found = perf_counter(), list[float](), Row()
         try:
             while not times or (len(times) < self.repeats and not self.quick and times[-1] <= _TIMED_ONCE):
-                found = self._by_scipy(case) if "rtol" in case else self._by_us(case)
+                found = self._measured(case)
                 times.append(found["cost_wall_time"])
         except (event_driven.ReferenceFailure, RunStopped) as failed:
             return {"status": "stopped", "error": str(failed), "cost_wall_time": perf_counter() - began}
         return {"status": "done", "error": "", **found, "cost_wall_time": statistics.median(times), "times": times}
 
-    def _by_us(self, case: Row) -> Row:
+    def _measured(self, case: Row) -> Row:
         limit, began = _LIMIT, perf_counter()
 
         def limited(time: float, phase: str, macro_steps: int) -> None:
@@ -129,15 +124,6 @@ class Tradeoff(Study):
             **_errors(run, self.reference),
         }
 
-    def _by_scipy(self, case: Row) -> Row:
-        exact, began = self.reference, perf_counter()
-        rival = Rival(self.scene)
-        ready = perf_counter()
-        reach = max((float(np.abs(exact[k]).max()) for k in ("u_tip", "y") if k in exact.columns), default=1.0) or 1.0
-        solved = rival.solve(case["method"], case["rtol"], 1e-3 * case["rtol"] * reach, self.times, _LIMIT)
-        cost = {"cost_wall_time": solved.seconds, "cost_setup": ready - began, "cost_evaluations": solved.evaluations}
-        return cost | {"error_motion": motion(solved.columns, exact.columns)}
-
     @cached_property
     def times(self) -> np.ndarray:
         """When all are judged [s]."""
@@ -152,8 +138,7 @@ class Tradeoff(Study):
         """Name the cheapest configurations, and those that nothing beats."""
         rows, until = self.rows(records), self.scene.time.t_end
         best, front = cheapest(rows), pareto(rows)
-        cells = [(c["error"], *_shown(c["co_simulation"]), *_shown(c["scipy"]), c["ratio"]) for c in best]
-        names = ("error:.0e", "co-simulation", "[ms]:.3g", "scipy", "[ms]:.3g", "ratio:.1f")
+        cells = [(target, *_shown(row)) for target, row in zip(TARGETS, best, strict=True)]
         on_front = [
             (
                 _label(row),
@@ -168,10 +153,10 @@ class Tradeoff(Study):
         columns = ("configuration", "error:.1e", "event [s]:.1e", "solve [ms]:.3g", "set-up [ms]:.3g", "doSteps:")
         shown = [
             f"{self.scene.title}: up to t = {until:.6g} s, {len(rows)} configurations",
-            table(names, cells, "cheapest for an error (solve time)"),
+            table(("error:.0e", "configuration", "solve [ms]:.3g"), cells, "cheapest for an error"),
             table(columns, on_front, "Pareto front"),
         ]
-        told = {"until": until, "cheapest": best, "front": front}
+        told = {"until": until, "cheapest": dict(zip(map(str, TARGETS), best, strict=True)), "front": front}
         return Findings(told, shown, tables={self.kind: rows}, pictures={self.kind: self._picture(rows, front)})
 
     def _picture(self, rows: Sequence[Row], front: Sequence[Row]) -> Callable[[], Any]:
@@ -212,21 +197,15 @@ def pareto(rows: Iterable[Row]) -> list[Row]:
     return front
 
 
-def cheapest(rows: Sequence[Row]) -> list[Row]:
-    """Return for each of `TARGETS` the cheapest configuration here and of scipy's, and how much longer scipy takes.
+def cheapest(rows: Sequence[Row]) -> list[Row | None]:
+    """Return for each of `TARGETS` the cheapest configuration.
 
     A configuration counts if all finer ones of its family keep the error too: not by luck.
     """
-    found = []
+    found: list[Row | None] = []
     for target in TARGETS:
-        best: Row = {"co_simulation": None, "scipy": None}
         kept = [row for k, row in enumerate(rows) if row["status"] == "done" and _kept(rows[k:], row["family"], target)]
-        for row in sorted(kept, key=lambda row: row["cost_wall_time"], reverse=True):
-            best["scipy" if "rtol" in row else "co_simulation"] = row
-        ratio = (
-            best["scipy"]["cost_wall_time"] / best["co_simulation"]["cost_wall_time"] if all(best.values()) else None
-        )
-        found.append({"error": target, **best, "ratio": ratio})
+        found.append(min(kept, key=lambda row: row["cost_wall_time"], default=None))
     return found
 
 
@@ -260,6 +239,3 @@ def _configurations(scene: Scene) -> Iterator[Row]:
         for tolerance in _ADAPTIVE_TOLERANCES if turns <= _MOST_RESOLVED else ():
             axes = {"family": f"{family} adaptive", "setting": f"{tolerance:.0e}"}
             yield axes | keys | {"coupling.relative_tolerance": tolerance}
-    for method, tolerances in TOLERANCES.items() if not scene.massless else ():
-        for rtol in tolerances:
-            yield {"family": method, "setting": f"rtol {rtol:.0e}", "method": method, "rtol": rtol}

@@ -8,18 +8,22 @@ reference's (`HybridState`), so that both solve one problem; its time is not cou
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from statistics import median
 from time import perf_counter
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..monolithic.event_driven import initial
-from ..monolithic.hybrid_system import HybridSystem, ReferenceFailure
-from ..monolithic.laws import Link, Phase, Watch
-from ..monolithic.transitions import HybridState
-from ..scene import Scene
+from springbeam.monolithic.event_driven import initial
+from springbeam.monolithic.hybrid_system import HybridSystem, ReferenceFailure
+from springbeam.monolithic.laws import Link, Phase, Watch
+from springbeam.monolithic.transitions import HybridState
+from springbeam.results.distance import motion
+from springbeam.results.trajectory import Trajectory
+from springbeam.scene import Scene
+from springbeam.studies.tables import Row
 
 #: Relative tolerances of scipy's solvers; they are stable from loose ones on, at the step that they take themselves.
 TOLERANCES = {
@@ -27,6 +31,8 @@ TOLERANCES = {
     "LSODA": (1e-3, 1e-5, 1e-7, 1e-9),
     "Radau": (1e-2, 1e-4, 1e-6, 1e-8),
 }
+#: A solution that takes longer is given up [s].
+_LIMIT = 10.0
 
 
 class Solved(NamedTuple):
@@ -90,6 +96,31 @@ class Rival:
             found[wanted == state.time] = state.X
         columns = {"u_tip": found[:, s.A] @ s.tip} if self._scene.beam is not None else {}
         return Solved(columns | ({"y": found[:, s.A] @ s.top} if s.has_spring else {}), seconds, evaluations)
+
+
+def rows(scene: Scene, exact: Trajectory, times: np.ndarray, repeats: int = 3) -> Iterator[Row]:
+    """Yield what `springbeam.studies.tradeoff` records of its own configurations: error and median time [s] of each.
+
+    ``exact`` has rows at ``times`` [s]. Finer tolerances of a method that has taken too long are left out.
+    """
+    if scene.massless:  # a quasi-static beam has no equation of motion
+        return
+    reach = max(float(np.abs(exact[k]).max()) for k in ("u_tip", "y") if k in exact.columns) or 1.0
+    rival = Rival(scene)
+    for method, tolerances in TOLERANCES.items():
+        for rtol in tolerances:
+            row: Row = {"family": method, "setting": f"rtol {rtol:.0e}"}
+            try:
+                solved = [rival.solve(method, rtol, 1e-3 * rtol * reach, times, _LIMIT) for _ in range(repeats)]
+            except ReferenceFailure as failed:
+                yield row | {"status": "stopped", "error": str(failed)}
+                break
+            seconds = median(one.seconds for one in solved)
+            yield (
+                row
+                | {"status": "done", "cost_wall_time": seconds}
+                | {"error_motion": motion(solved[0].columns, exact.columns)}
+            )
 
 
 def _limited(rhs: Callable[..., np.ndarray], deadline: float, limit: float) -> Callable[..., np.ndarray]:
