@@ -11,7 +11,7 @@ from scenes import SOFT, kinds, soft
 
 from springbeam import SceneError, load, load_scene, with_changes
 from springbeam.bodies import fmu_bodies
-from springbeam.bodies.protocol import StepRefused
+from springbeam.bodies.protocol import BodyFailed, StepRefused
 from springbeam.paper import co_simulation, monolithic
 from springbeam.paper.problem import AlgorithmFailure
 from springbeam.scene.reading import tomllib
@@ -195,6 +195,16 @@ def test_a_body_that_refuses_a_step_stops_the_command_and_what_was_computed_stay
     assert "error: the run stopped early: the spring breaks at t = 0.6" in result.stderr
     run = load(tmp_path)
     assert (run.summary["status"], len(run) > 10) == ("stopped", True)
+
+
+def test_a_body_that_fails_at_the_start_leaves_nothing(tmp_path, monkeypatch):
+    def failing(self):
+        raise BodyFailed("the beam has no shape")
+
+    monkeypatch.setattr(fmu_bodies.FmuBeam, "shape", failing)
+    result = command("paper", 2, "--set=beam.n_elements=4", "--set=beam.n_modes=0", "-o", tmp_path / "none")
+    assert (result.exit_code, result.stdout, (tmp_path / "none").exists()) == (3, "", False)
+    assert "error: the run stopped early: the beam has no shape at t = 0.5 s" in result.stderr
 
 
 # -- the command

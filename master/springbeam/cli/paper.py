@@ -12,7 +12,7 @@ from ..results.directory import RunDirectory
 from ..results.recording import FileRecorder
 from ..scene import load_scene
 from ..studies.tables import Findings
-from .common import STOPPED, ForceOption, JsonOption, NoPlotsOption, QuietOption, SettingsOption
+from .common import STOPPED, ForceOption, JsonOption, NoPlotsOption, QuietOption, SettingsOption, fail
 from .run import carry_out
 
 
@@ -48,7 +48,7 @@ def paper(
     except AlgorithmFailure as failure:
         failed = f"the run stopped early: {failure}"
         if failure.trajectory is None:
-            raise
+            fail(STOPPED, failed)
         made = failure.trajectory
         made.summary |= {"status": "stopped", "cause": str(failure)}
     directory = _directory(Path("results") / f"paper-fig{figure}", out, force=force)

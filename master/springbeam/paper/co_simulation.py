@@ -87,7 +87,7 @@ def simulate(scene: Scene, *, at_contact: AtContact = "rest") -> Trajectory:
             algorithm.run()
         except (StepRefused, BodyFailed, OverflowError) as failed:
             failure = AlgorithmFailure(f"{failed} at t = {algorithm.time:.6g} s")
-            failure.trajectory = algorithm.trajectory()
+            failure.trajectory = algorithm.trajectory() if algorithm.begun else None
             raise failure from failed
         return algorithm.trajectory()
 
@@ -117,6 +117,11 @@ class _Algorithm:
         self._rows: list[Row] = []
         self._shapes: list[np.ndarray] = []
         self._began = perf_counter()
+
+    @property
+    def begun(self) -> bool:
+        """Whether the row of the start is made."""
+        return bool(self._rows)
 
     def close(self) -> None:
         self._beam.close()

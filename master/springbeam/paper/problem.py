@@ -24,7 +24,7 @@ EXTRA = ("case", "e_injected_beam", "e_injected_spring")
 class AlgorithmFailure(RuntimeError):
     """Newton's method did not converge, a body refused a step, or the solution overflows.
 
-    ``trajectory`` holds the steps before.
+    ``trajectory`` holds the steps before, if the run has begun.
     """
 
     trajectory: Trajectory | None = None
