@@ -92,16 +92,12 @@ def scene(**tables):
     return scene_from_dict({table: {**data.get(table, {}), **tables.get(table, {})} for table in {**data, **tables}})
 
 
-@pytest.mark.parametrize(("coupling", "velocity"), [({}, -1.0), ({"feedback": "beam_drives"}, -0.25)])
-def test_it_arrives_where_the_spring_is_as_it_was_thrown_and_a_soft_contact_lets_it_go(coupling, velocity):
-    """From 0.2 m to 5 cm above where it is straight, without loads, by 1 m/s; or back from there within 0.2 s."""
+def test_it_arrives_where_the_spring_is_as_it_was_thrown():
+    """From 0.2 m to 5 cm above where it is straight, without loads, by 1 m/s."""
     thrown = {"initial_deflection_slope": 0.2, "distributed_load": 0.0, "alpha_b": 0.2}
-    contact = {"law": "compliance"} if coupling else {}
-    above = scene(
-        beam=thrown, spring={"equilibrium": 0.05, "initial_velocity": 0.0}, coupling=coupling, contact=contact
-    )
+    above = scene(beam=thrown, spring={"equilibrium": 0.05, "initial_velocity": 0.0})
     beam, _ = load_bodies(above.model_copy(update={"lower": None}), above.contact_time)
-    assert beam.motion()[:2] == pytest.approx((0.05, velocity), rel=1e-12)
+    assert beam.motion()[:2] == pytest.approx((0.05, -1.0), rel=1e-12)
 
 
 @pytest.mark.parametrize(

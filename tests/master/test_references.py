@@ -165,15 +165,6 @@ def test_each_phase_is_integrated_as_scipy_does(name, monkeypatch):
 @pytest.mark.parametrize(
     ("changes", "arguments", "message"),
     [
-        (
-            {
-                "beam": {"fidelity": "quasi_static"},
-                "contact": {"law": "compliance"},
-                "coupling": {"feedback": "beam_drives"},
-            },
-            {},
-            "no reference has it with law",
-        ),
         ({"beam": {"initial_deflection_slope": -0.1}}, {}, "below"),
         ({"beam": {"initial_deflection_slope": 0.1, "initial_velocity_slope": 0.0}}, {}, "never"),
         ({}, {"sample_times": []}, "no row lies between the start of the run, 0 s, and its end, 0.6 s"),

@@ -288,12 +288,6 @@ SCENES = {
     "too stiff for its degree": with_changes(
         SOFT, contact={**COMPLIANCE, "stiffness": 1e18}, coupling={"degree": 2, "macro_step": 4e-3}, stop=None
     ),
-    "one-way": with_changes(
-        SOFT,
-        beam={"young_modulus": 1e6, "shear_modulus": 1e6},
-        contact={**COMPLIANCE, "stiffness": 100.0},
-        coupling={"feedback": "beam_drives", "feedback_tolerance": 0.1},
-    ),
     "gauss_seidel": with_changes(
         SOFT,
         contact={**COMPLIANCE, "stiffness": 100.0},

@@ -46,8 +46,6 @@ FLIGHTS = {
             SOFT,
             beam={"fidelity": "quasi_static", "approach": "elastic", "initial_velocity_slope": 0.0},
             spring={"equilibrium": -0.01, "initial_velocity": -0.001},
-            contact={"law": "compliance"},
-            coupling={"feedback": "beam_drives"},
             time={"t_end": 0.04},
         ),
         40,

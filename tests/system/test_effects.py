@@ -48,7 +48,6 @@ VALUES = {
     "contact.force_window": 3e-3,
     "coupling.degree": 1,
     "coupling.tolerance": 1e-3,
-    "coupling.feedback_tolerance": 1e-2,
 }
 _RUNS = {}
 

@@ -39,9 +39,6 @@ OPTIONS = {
     "damped": "contact.law=compliance contact.damping=0.5",
     "tie": "contact.law=tie",
     "link": "contact.law=link",
-    "beam drives": "contact.law=compliance coupling.feedback=beam_drives coupling.feedback_tolerance=0.1",
-    "spring drives": "contact.law=compliance coupling.feedback=spring_drives contact.stiffness=0.05"
-    " coupling.feedback_tolerance=0.1",
     "quasi-static": "beam.fidelity=quasi_static",
     "midpoint": "beam.integrator=midpoint",
     "elastic": "beam.approach=elastic",

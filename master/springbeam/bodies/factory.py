@@ -70,7 +70,7 @@ def _massless_beam(scene: Scene, spec: Beam, start_time: float, contact: float) 
     rate = spec.initial_velocity_slope
     tip, velocity = start.value + start_time * rate * spec.length, rate * spec.length
     beam = QuasiStaticBeam(spec, scene.coupling.degree, tip, velocity)
-    if spec.approach == "elastic" or scene.contact.soft:
+    if spec.approach == "elastic":
         beam.release()
     return beam
 

@@ -3,8 +3,8 @@
 On a step of size H the force is a polynomial of degree d; a *coupling* (``protocol``; start there) finds its d + 1
 coefficients and advances both bodies. ``tie`` holds ends together by the conditions of a scheme (``energy`` creates no
 energy at any H, with ``hermite`` velocities agree, too), ``soft`` applies a contact law that is a function of the
-penetration, ``projection`` says what that is over a step; both are ``solver`` with another aim. ``one_way`` leaves one
-end unmoved, ``exchange`` is what ordinary masters do. Imports `contact`, `bodies` and `scene`.
+penetration, ``projection`` says what that is over a step; both are ``solver`` with another aim. ``exchange`` is what
+ordinary masters do. Imports `contact`, `bodies` and `scene`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from ..scene import Scene
 from ..scene.statics import tip_reach
 from ..scene.tables import ORDINARY_SCHEMES
 from .exchange import Exchange
-from .one_way import OneWay
 from .protocol import Coupling
 from .soft import SoftSolver
 from .tie import Tie
@@ -30,6 +29,4 @@ def coupling_of(scene: Scene, law: SoftLaw | None) -> Coupling:
         return Tie(scheme, asked.degree, asked.tolerance, expected)
     if asked.scheme in ORDINARY_SCHEMES:
         return Exchange(law, asked.scheme == "gauss_seidel", asked.degree)
-    if asked.feedback == "two_way":
-        return SoftSolver(law, asked.degree, asked.tolerance)
-    return OneWay(law, asked.degree, asked.tolerance, upper_drives=asked.feedback == "beam_drives")
+    return SoftSolver(law, asked.degree, asked.tolerance)

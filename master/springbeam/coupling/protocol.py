@@ -30,7 +30,6 @@ class Booking(NamedTuple):
     law_force: float = 0.0
     stored: float = 0.0  #: in the contact law
     dissipated: float = 0.0  #: by the contact law since the start
-    unfelt: float = 0.0  #: work of the contact force on an end that does not feel it
 
 
 NOTHING_BOOKED = Booking()

@@ -39,7 +39,6 @@ class SoftState(Responses):
 
     #: Size of the last step [s], and (E + A′)⁻¹ [m/N] where its crossing was found.
     last_crossing: tuple[float, Matrix] = (0.0, [])
-    unfelt: float = 0.0  #: work of the contact force on a driving end, which does not feel it [J]
 
 
 class SoftSolver(Booked, StepSolver):

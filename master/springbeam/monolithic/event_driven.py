@@ -89,10 +89,6 @@ def refuse(scene: Scene) -> None:
             f"[{table}] {'fmu' if table in scene.foreign else 'element'}: no reference knows this body, a "
             f"{type(body).__name__}; springbeam run --accuracy compares runs of smaller and smaller steps instead"
         )
-    if scene.massless and not law.rigid:
-        raise SceneError(
-            f"beam.fidelity = 'quasi_static': no reference has it with law '{scene.contact.law}'; use 'dynamic'"
-        )
 
 
 class _Run:

@@ -141,6 +141,6 @@ def ledger(scene: Scene, steps: np.ndarray, *, of_interface: bool = False) -> di
         "e_contact": steps["law_stored"],
         "e_dissipated": lost_beam + lost_spring + steps["law_dissipated"],
         "e_impact_loss": steps["impact_loss"],
-        "e_load": load_beam + steps["unfelt"] + load_spring,
+        "e_load": load_beam + load_spring,
     }
     return {**found, "e_total": np.sum(list(found.values()), axis=0)}

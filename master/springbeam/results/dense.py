@@ -35,7 +35,7 @@ from .trajectory import Event, Trajectory
 
 #: Fields that are linear between rows, and do not change with an event.
 _LINEAR = (
-    *("law_force", "law_stored", "law_dissipated", "unfelt", "beam_received", "spring_received"),
+    *("law_force", "law_stored", "law_dissipated", "beam_received", "spring_received"),
     *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress"),
     *(f"{body}_{what}" for body in ("beam", "spring") for what in ("potential", "dissipated", "load")),
 )

@@ -26,8 +26,8 @@ STEP_COLUMNS = (
     # Energies of the bodies after the event [J], as of `springbeam.bodies.protocol.Energies`.
     *("beam_kinetic", "beam_potential", "beam_dissipated", "beam_load"),
     *("spring_kinetic", "spring_potential", "spring_dissipated", "spring_load"),
-    # In the contact law: stored, dissipated since the start, and the work on an end that does not feel it [J].
-    *("law_stored", "law_dissipated", "unfelt"),
+    # In the contact law: stored, and dissipated since the start [J].
+    *("law_stored", "law_dissipated"),
     # Taken by events since the start, and the work that foreign bodies have received [J].
     *("impact_loss", "beam_received", "spring_received"),
     # All energies when the run began, before an impact at its start [J].

@@ -28,7 +28,7 @@ from ..results.trajectory import Event, EventKind
 from ..scene import SAME, Scene
 from ..scene.resolution import force_window, peak_force_doubt, with_scheme_chosen
 from .detection import Detector
-from .ledger import Balance, Neglect
+from .ledger import Balance
 from .log import TOGETHER, Log
 from .macro_steps import AdaptiveSteps, MacroGrid
 from .misplaced import misplaced
@@ -93,10 +93,7 @@ class Master(Stateful):
             self._pair.equilibrium,
         )
         self._balance = Balance(scene, self._pair)
-        checks = [self._balance.check]
-        if scene.driver_stiffness is not None:
-            checks.append(Neglect(scene.coupling, scene.driver_stiffness).check)
-        self._log = Log(scene, recorder, *checks)
+        self._log = Log(scene, recorder, self._balance.check)
         self._told = BEAM_TELLS * self._pair.upper.tells + SPRING_TELLS * self._pair.lower.tells
         self._pictured = beam if isinstance(beam, BeamBody) else None
         self.state.shapes_left, self.state.next_shape = _SHAPES_AFTER_CONTACT, start_time
@@ -345,16 +342,11 @@ class Master(Stateful):
         off = misplaced(scene, self._pair, steps, events)
         unresolved = why_not_resolved(scene, self._pair, self._steps.size, steps, events, off)
         warnings += filter(None, [unresolved or peak_force_doubt(scene), not_shown(scene, self._pair, steps)])
-        neglect = {}
-        if scene.driver_stiffness is not None and len(steps):
-            motion, share = Neglect(scene.coupling, scene.driver_stiffness).by(steps)
-            neglect = {"neglected_motion": float(motion[-1]), "neglected_share": float(share[-1])}
         window = force_window(scene, stiffest(scene) if scene.contact.facts.opens else 0.0)
         amounts = totals(scene, steps, events, window) if len(steps) else {}
         ruled_out = contradictions(scene, steps, events, amounts.get("contact_duration_total", 0.0))
         warnings += [f"not resolved: {what}: an event was missed; {_SHORTER}" for what in ruled_out]
         return {
-            **neglect,
             **({} if self._choice is None else {"coupling": self._choice._asdict()}),
             "time": float(steps["time"][-1]) if len(steps) else self.state.time,
             "macro_steps": made,

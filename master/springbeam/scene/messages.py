@@ -142,6 +142,8 @@ GONE: dict[str, str] = {
     '[contact] law = "paper"': "is no law of a run; springbeam paper 2, 3, 4 or 5 runs Algorithm 1",
     "[contact] impact": "is gone; leave it out: ends that a rigid law joins meet inelastically (docs/paper.md has what "
     "Algorithm 1 does)",
+    "[coupling] feedback": "is gone; leave it out: the contact force always acts on both bodies",
+    "[coupling] feedback_tolerance": "is gone with feedback; leave it out",
 }
 #: Types of values by those of the JSON Schema; others are given as texts.
 _KINDS: dict[str, type] = {"integer": int, "boolean": bool, "number": float}

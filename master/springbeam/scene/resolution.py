@@ -141,7 +141,7 @@ def _lags(scene: Scene, seen: _Seen) -> dict[str, Any]:
     lag = omega * scene.duration * lateness(scene, omega * H)
     return (
         {}
-        if lag <= LAG or not (scene.massless and scene.contact.rigid)
+        if lag <= LAG or not scene.massless
         else {
             "turn": omega * H,
             "lag": lag,

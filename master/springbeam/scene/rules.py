@@ -62,11 +62,6 @@ def _most_extreme(scene: Scene) -> str:
     return at(scene, max(values, key=lambda place: abs(math.log10(abs(values[place])))))
 
 
-def _one_way(scene: Scene) -> bool:
-    """Return whether one of our own bodies drives the other."""
-    return scene.coupling.feedback != "two_way" and scene.beam is not None and scene.spring is not None
-
-
 def _wall_below(scene: Scene) -> bool:
     return isinstance(scene.lower, RigidWall)
 
@@ -114,14 +109,6 @@ def _alone_in_a_well(scene: Scene) -> bool:
 def _waits(scene: Scene) -> bool:
     """Return whether an undeformed tip arrives after the start; until then nothing is integrated."""
     return 0.0 < (scene.contact_time or 0.0) < math.inf
-
-
-def _neglected(scene: Scene) -> float:
-    """Return the share of the penetration that a one-way coupling neglects at most.
-
-    A contact of depth p has V = 2 λ p, whatever p.
-    """
-    return 4.0 * scene.contact.stiffness / (scene.driver_stiffness or math.inf)
 
 
 def _given_step(scene: Scene) -> bool:
@@ -272,15 +259,14 @@ FORBIDDEN: tuple[Rule, ...] = (
         '{beam.fidelity}: a beam without inertia needs a [spring]; use fidelity = "dynamic"',
     ),
     Rule(
-        lambda s: s.massless and s.contact.soft and s.contact.lasting and s.coupling.feedback != "beam_drives",
+        lambda s: s.massless and s.contact.soft and s.contact.lasting,
         "{beam.fidelity}: the tip between the beam and {contact.law} would have no inertia; use "
         'law = "tie" or fidelity = "dynamic"',
     ),
     Rule(
-        lambda s: s.massless and s.contact.facts.opens and s.coupling.feedback != "beam_drives",
+        lambda s: s.massless and s.contact.facts.opens,
         "{beam.fidelity}: the tip between the beam and {contact.law} would have no inertia; use "
-        'law = "transmission", fidelity = "dynamic", or neglect the force on the beam: [coupling] '
-        'feedback = "beam_drives"',
+        'law = "transmission" or fidelity = "dynamic"',
     ),
     Rule(
         lambda s: s.massless and s.coupling.scheme == "hermite",
@@ -298,30 +284,6 @@ FORBIDDEN: tuple[Rule, ...] = (
         ),
         "{beam.initial_deflection_slope}: without inertia and damping the beam starts in its static deflection; "
         'use 0.0, approach = "undeformed", or alpha_b > 0',
-    ),
-    # One-way coupling
-    Rule(
-        lambda s: s.coupling.feedback != "two_way" and not s.joins,
-        '{coupling.feedback}: there is one body only; use "two_way"',
-    ),
-    Rule(
-        lambda s: _one_way(s) and (not s.contact.facts.opens or s.coupling.scheme not in ("energy", "auto")),
-        f"{{coupling.feedback}}: needs [contact] law = {laws_that(lambda law: law.opens)} and [coupling] "
-        'scheme = "energy"; use "two_way" otherwise',
-    ),
-    Rule(
-        lambda s: _one_way(s) and s.contact.damping > 0.0,
-        '{coupling.feedback}: its error is unknown for a damped contact; use [contact] damping = 0.0 or "two_way"',
-    ),
-    Rule(
-        lambda s: (
-            _one_way(s)
-            and s.coupling.feedback == "spring_drives"
-            and s.spring is not None
-            and (s.spring.cubic_stiffness != 0.0 or s.spring.linear_stiffness <= 0.0)
-        ),
-        "{coupling.feedback}: its error is known only for a linear spring; linear_stiffness must be greater than 0 "
-        'and cubic_stiffness 0.0, or use "two_way"',
     ),
     # The mesh
     Rule(
@@ -423,10 +385,6 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     # Bodies that are not our own
     *_of_others(
-        lambda s: s.coupling.feedback != "two_way",
-        '{body}: {coupling.feedback} bounds what it neglects for our own bodies only; use "two_way"',
-    ),
-    *_of_others(
         lambda s: s.massless and s.contact.facts.strikes,
         '{body}: {contact.law} needs our own spring below {beam.fidelity}; use law = "tie", or fidelity = "dynamic"',
     ),
@@ -447,16 +405,6 @@ FORBIDDEN: tuple[Rule, ...] = (
         "{coupling.macro_step}: {time.t_end} would take {steps:.1e} macro steps; at most "
         f"{MOST_MACRO_STEPS:.0e} are allowed",
         lambda s: {"steps": s.time.t_end / s.coupling.H},
-    ),
-    Rule(
-        lambda s: (
-            s.contact.exponent == 1.0
-            and "exponent" in s.contact.facts.takes
-            and _neglected(s) > s.coupling.feedback_tolerance
-        ),
-        "{coupling.feedback}: neglects up to 4·stiffness/(stiffness of the driving end) = {share:.2g} of the "
-        'penetration; allowed is {coupling.feedback_tolerance}. Use "two_way", or allow more',
-        lambda s: {"share": _neglected(s)},
     ),
     # Loads
     Rule(

@@ -114,15 +114,6 @@ class Scene(Table):
         """Whether a contact law acts at all: between the tip and the spring top, or an elastic stop."""
         return self.upper is not None and (self.lower is not None or self.elastic_stop)
 
-    @property
-    def driver_stiffness(self) -> float | None:
-        """Static force per displacement [N/m] of the end that drives a one-way coupling; ``None`` without one."""
-        if self.coupling.feedback == "beam_drives" and self.beam is not None:
-            return 1.0 / tip_compliance(self.beam)
-        if self.coupling.feedback == "spring_drives" and self.spring is not None:
-            return self.spring.linear_stiffness
-        return None
-
     def at_start(self, table: str) -> Height | None:
         """Return where the end of the body ``[table]``, or the stop, is at the start.
 

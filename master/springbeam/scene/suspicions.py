@@ -265,9 +265,4 @@ EFFECTS: tuple[Rule, ...] = (
         lambda s: s.coupling.scheme not in ORDINARY_SCHEMES,
         "it counts with schemes that solve for the force of a step",
     ),
-    *_counts(
-        "coupling.feedback_tolerance",
-        lambda s: s.coupling.feedback != "two_way",
-        'it counts with feedback = "beam_drives" or "spring_drives"',
-    ),
 )

@@ -355,13 +355,6 @@ class Coupling(Table):
     )
     absolute_tolerance: float | None = key("m", "largest error of a step", None, gt=0.0)
     tolerance: float = key("–", "relative tolerance of the contact force of a step", 1.0e-12, gt=0.0, le=1e-3)
-    feedback: Literal["two_way", "beam_drives", "spring_drives"] = key(
-        "–", "one-way coupling: the body that drives does not feel the contact force (compliance)", "two_way"
-    )
-    feedback_tolerance: float = key(
-        "–", "how far the neglected force may move the driving end at most, as a share of the largest penetration",
-        1.0e-6, gt=0.0, le=0.1,
-    )  # fmt: skip
 
     WAYS = (((STEP_KEY,), TOLERANCE_KEYS),)
 

@@ -6,8 +6,7 @@ The bound of a quantity at time t is
 
 what halving the macro step changes is an upper estimate of the discretisation error for any order ≥ 1 (twice the
 difference at order 1), doubled again because events mix orders; the second term is the tolerance of the spring's
-integrator in every step and the rounding of the beam's modes, grown as fast as the reference grows a perturbation; so
-is what a one-way coupling neglects, since the reference is two-way.
+integrator in every step and the rounding of the beam's modes, grown as fast as the reference grows a perturbation.
 Nothing in it knows the reference, so a wrong sign, mass or law, which converges to something else, fails.
 
 The verdict is about the run that was asked for. Nonsmooth trajectories separate: comparable is what comes before the
@@ -115,7 +114,6 @@ def _beside_event_driven(scene: Scene, found: Row) -> tuple[Trajectory, ...]:
     away = away_from(
         times, jumps + [kink for load in scene.loads if not load.is_finer_than(size) for kink in load.kinks], size
     )
-    neglected = coarse.summary.get("neglected_share", 0.0)
     for name in quantities(scene):
         ours, halved = (sample(run, times, name) for run in (coarse, fine))
         good = before & np.isfinite(ours) & np.isfinite(halved) & (away | (name in ("u_tip", "y")))
@@ -125,7 +123,7 @@ def _beside_event_driven(scene: Scene, found: Row) -> tuple[Trajectory, ...]:
         scale = float(np.abs(exact).max()) or 1.0
         growth = np.maximum(1.0, np.maximum.accumulate(np.abs(other - exact) / (PERTURBATION * scale)))
         found["growth"] = max(found["growth"], float(growth[-1]))
-        floor = _step_error(scene) * (np.flatnonzero(good) + 1.0) + _SAFETY * (_rounding(scene, name) + neglected)
+        floor = _step_error(scene) * (np.flatnonzero(good) + 1.0) + _SAFETY * _rounding(scene, name)
         judged = _judged(name, times[good], np.abs(ours - exact), np.abs(ours - halved), floor * growth * scale)
         found["quantities"].append(judged)
     if not found["quantities"]:
