@@ -4,12 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, Upper, couple, orders, simulate, solve, stopping, unit_beam
+from bodies import DuffingBody, Upper, couple, orders, solve, unit_beam
 from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.polynomial import legendre
 
-from springbeam import RunStopped, load_scene, with_changes
 from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Body, Motion
 from springbeam.contact.laws import Compliance, Link

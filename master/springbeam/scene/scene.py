@@ -10,7 +10,7 @@ from pydantic import Field
 
 from .loads import Load
 from .partners import ForeignFmu, LowerBody, Partner, UpperBody
-from .statics import tip_compliance, tip_load_deflection
+from .statics import tip_load_deflection
 from .tables import Beam, Contact, Coupling, Spring, Stop, Table, Time, key
 
 #: Times closer than the first of these fractions of H are one; a step shorter than the second would drown in rounding.
