@@ -20,7 +20,7 @@ from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError
 from .exponential import ExponentialPropagator, LinearForm, Segment
 from .hybrid_system import NOISE, HybridSystem, QuasiStaticSystem, ReferenceFailure
-from .laws import Phase, Watch, law_of
+from .laws import Phase, Watch
 from .oscillators import GAUSS, STAGES
 from .rows import Rows
 from .transitions import HybridState
@@ -83,7 +83,6 @@ def simulate(
 
 def refuse(scene: Scene) -> None:
     """Raise SceneError if this reference does not define the motion of ``scene``; the message names what it does."""
-    law = law_of(scene)
     for table, body in scene.partners.items():
         raise SceneError(
             f"[{table}] {'fmu' if table in scene.foreign else 'element'}: no reference knows this body, a "
