@@ -194,6 +194,8 @@ def test_a_table_ends_with_its_last_line_and_a_ramp_stays():
     assert ramp.value([-1e-9, 0.005, 0.01, 7.0]) == pytest.approx([0.0, 1.5, 3.0, 3.0])
 
 
+FILL_IN = 'missing = "drop" leaves such lines out, "interpolate" fills them'
+ONE_OF = 'repeats = "first" leaves such lines out, "mean" sorts them and takes means'
 AS_MANY = "there must be as many as the first line, and two at least, with , or ; or a tab between"
 
 
@@ -201,15 +203,18 @@ AS_MANY = "there must be as many as the first line, and two at least, with , or 
     ("text", "error"),
     [
         ("0,1\n1,two\n", f"line 2, column 2: 'two' is not a finite number; {LEAVE_OUT}"),
-        ("t,f\n0,1\n\n# a note\n0,nan\n", f"line 5, column f: 'nan' is not a finite number; {LEAVE_OUT}"),
-        ("0;1\n1;2,5\n", "line 2, column 2: '2,5' is not a finite number; decimals have a point"),
+        ("t,f\n0,1\n\n# a note\n0,nan\n", f"line 5, column f: the value is missing; {FILL_IN}"),
+        (
+            "0;1\n1;2,5\n",
+            "line 2, column 2: '2,5' is not a finite number; decimals have a point, or give decimal = \",\"",
+        ),
         ("0,1\n1,2,3\n", f"line 2: 3 columns; {AS_MANY}"),
         ("0,1,2\n1,2,3\n", "3 columns; a table has two, time and value"),
         ("0 1\n1 2\n", f"line 1: 1 columns; {AS_MANY}"),
-        ("0,1\n2,2\n1,3\n", "line 3: time 1 is not after that of the line before"),
-        ("0,1\n2,2\n2,3\n", "line 3: time 2 is not after that of the line before"),
+        ("0,1\n2,2\n1,3\n", f"line 3: time 1 is not after that of the line before; {ONE_OF}"),
+        ("0,1\n2,2\n2,3\n", f"line 3: time 2 is not after that of the line before; {ONE_OF}"),
         ("time,value\n0,1\n", "1 lines with numbers; there must be two at least"),
-        ("0,1\n1,\udcff\n", "'utf-8' codec can't decode byte 0xff in position 6: invalid start byte"),
+        ("0,1\n1,\udcff\n", 'line 2: it is no text in utf-8 (byte 0xff); give its encoding, as encoding = "latin-1"'),
         (
             "time,force [kg]\n0,1\n1,1",
             "column force: [kg] is no unit of what a run has in N: Cannot convert from "

@@ -78,6 +78,10 @@ MapOption = Annotated[
     list[str] | None,
     typer.Option("--map", metavar="NAME=COLUMN", help="Which column of a run, or module:function, a measured one is."),
 ]
+ReadOption = Annotated[
+    list[str] | None,
+    typer.Option("--read", metavar="KEY=VALUE", help="How the file is read, as missing=drop: keys of [[loads]]."),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document, and nothing else, on stdout.")]
 QuietOption = Annotated[
     bool, typer.Option("--quiet", "-q", help="No progress bar and no tables; print only the path of the results.")

@@ -26,6 +26,7 @@ from .common import (
     MapOption,
     NoPlotsOption,
     QuietOption,
+    ReadOption,
     RunArgument,
     fail,
     progress_bar,
@@ -120,6 +121,7 @@ def compare(
         typer.Argument(metavar="DIR…", help="Directories of two runs or more; or of one, and a file of measurements."),
     ],
     names: MapOption = None,
+    read: ReadOption = None,
     shift: Annotated[
         float | None,
         typer.Option("--shift", metavar="SECONDS", help="Move the measurement's clock. Default: by correlation."),
@@ -137,12 +139,16 @@ def compare(
 
     Example: springbeam compare results/soft results/light
     """
+    if len(runs) > 1 and not runs[-1].exists():
+        fail(BAD_INPUT, f"{runs[-1]}: no such file or directory; compare takes runs, or a run and a file")
     measured = runs[-1].is_file()
-    if len(runs) < 2 or (measured and len(runs) > 2) or (not measured and (names or shift is not None)):
-        fail(BAD_INPUT, "compare takes runs; or one run and a file of measurements, with --map and --shift of these")
+    of_files = names or read or shift is not None
+    if len(runs) < 2 or (measured and len(runs) > 2) or (not measured and of_files):
+        what = "compare takes runs; or one run and a file of measurements, with --map, --read and --shift of these"
+        fail(BAD_INPUT, what)
     trajectories = [load_trajectory(results_directory(run)) for run in runs[: 1 if measured else None]]
     if measured:
-        found = _beside_measured(trajectories[0], runs[1], names or [], shift)
+        found = _beside_measured(trajectories[0], runs[1], names or [], shift, read or [])
     else:
         found = _beside_one_another([str(run) for run in runs], trajectories)
     if no_plots:
@@ -167,13 +173,13 @@ def _beside_one_another(names: list[str], runs: list[Trajectory]) -> Findings:
     return Findings({"runs": names, "keys": keys, "results": results}, shown, pictures={"comparison": draw})
 
 
-def _beside_measured(run: Trajectory, file: Path, names: list[str], shift: float | None) -> Findings:
+def _beside_measured(run: Trajectory, file: Path, names: list[str], shift: float | None, read: list[str]) -> Findings:
     """Compare a run with measured curves."""
-    from ..signals.measured import model, read_measured, residuals, time_shift
+    from ..signals.measured import model, read_measured, reading_of, residuals, time_shift
     from ..signals.spectra import without_peak
     from ..studies.fit import mapping
 
-    measured = read_measured(file, run.scene, mapping(names))
+    measured = read_measured(file, run.scene, mapping(names), reading_of(read))
     moved = time_shift(run, measured) if shift is None else shift
     found = residuals(run, measured, moved)
 
@@ -188,9 +194,10 @@ def _beside_measured(run: Trajectory, file: Path, names: list[str], shift: float
     shown = [
         table(columns, found),
         f"shift     {moved:.6g} s{by_what}",
+        *(f"{'read':<10}{note}" for note in measured.notes),
         *filter(None, [without_peak(run, measured.values)]),
     ]
-    document = {"shift": moved, "residuals": [row._asdict() for row in found]}
+    document = {"shift": moved, "residuals": [row._asdict() for row in found], "read": measured.notes}
     draw = partial(draw_diagrams, diagrams, "", (8.2, 2.2), wide=1)
     return Findings(document, shown, pictures={"comparison": draw})
 

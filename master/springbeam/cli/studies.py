@@ -30,6 +30,7 @@ from .common import (
     MeasuredArgument,
     NoPlotsOption,
     QuietOption,
+    ReadOption,
     SceneArgument,
     SettingsOption,
     cause_of,
@@ -231,6 +232,7 @@ def fit(
         ),
     ] = None,
     names: MapOption = None,
+    read: ReadOption = None,
     shift: Annotated[
         float | None,
         typer.Option("--shift", metavar="SECONDS", help="Move the clock of the measurement by this. Default: found."),
@@ -244,7 +246,14 @@ def fit(
     """
     from ..studies.fit import Fit
 
-    return Fit.of(load_scene(scene, settings or ()), measured, vary or (), names=tuple(names or ()), shift=shift)
+    return Fit.of(
+        load_scene(scene, settings or ()),
+        measured,
+        vary or (),
+        names=tuple(names or ()),
+        shift=shift,
+        read=tuple(read or ()),
+    )
 
 
 @study_command()

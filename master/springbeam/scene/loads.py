@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field, model_validator
 
-from .recorded import Recorded
+from .recorded import Reading, Recorded
 from .tables import Table, key
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ SIGNALS: dict[str, Signal] = {
     ),
     "step": Signal((), ("start", "duration"), lambda load, t: 1.0),
     "ramp": Signal(("duration",), ("start",), lambda load, t: np.clip(t / load.duration, 0.0, 1.0)),
-    "table": Signal(("file",), ("interpolation", "start"), lambda load, t: load.record(t)),
+    "table": Signal(("file",), ("interpolation", "start", *Reading.model_fields), lambda load, t: load.record(t)),
 }
 #: So many lines of a table in a step are data, and no kinks that are worth the end of one.
 LINES_IN_STEP = 4
@@ -65,8 +65,8 @@ LINES_IN_STEP = 4
 MOST_POINTS = 4
 
 
-class Load(Table):
-    """A load that acts on the beam, on its tip, on the spring, or on all by the acceleration of the base."""
+class _Acting(Table):
+    """Where a load acts, and its signal."""
 
     on: Literal["beam", "tip", "spring", "base"] = key(
         "–", "what it acts on: a force on the beam (N/m, or N at a point), on tip or spring (N), or the base (m/s²)"
@@ -97,6 +97,10 @@ class Load(Table):
     )
     file: str | None = key("–", "file of a table, relative to that of the scene", None, otherwise="needed with table")
     interpolation: Literal["linear", "cubic"] = key("–", "between the lines of a table", "linear")
+
+
+class Load(Reading, _Acting):
+    """A load that acts on the beam, on its tip, on the spring, or on all by the acceleration of the base."""
 
     @model_validator(mode="after")
     def _has_its_table(self) -> Load:
@@ -160,10 +164,20 @@ class Load(Table):
     @property
     def record(self) -> PPoly:
         """The table, as the polynomials between its lines. Raises ValueError, which names its line and column."""
+        return self._read[0]
+
+    @property
+    def notes(self) -> list[str]:
+        """What reading the table did to its lines, for people."""
+        return self._read[1] if self.signal == "table" else []
+
+    @property
+    def _read(self) -> tuple[PPoly, list[str]]:
         assert self.file is not None
         path = Path(self.file)
+        reading = Reading(**{name: getattr(self, name) for name in Reading.model_fields})
         try:
-            return _record(path, path.stat().st_mtime_ns, self.interpolation, self.unit)
+            return _record(path, path.stat().st_mtime_ns, self.interpolation, self.unit, reading)
         except (OSError, ValueError) as error:
             why = error.strerror if isinstance(error, OSError) else error
             raise ValueError(f'file = "{path}": {why}') from error
@@ -177,14 +191,15 @@ class Load(Table):
 
 
 @lru_cache(maxsize=16)
-def _record(path: Path, modified: int, interpolation: str, unit: str) -> PPoly:
-    recorded = Recorded(path)
+def _record(path: Path, modified: int, interpolation: str, unit: str, reading: Reading) -> tuple[PPoly, list[str]]:
+    recorded = Recorded(path, reading)
     if len(recorded.units) != 2:
         raise ValueError(f"{len(recorded.units)} columns; a table has two, time and value")
-    values, times = recorded.column(1, unit), recorded.times()
+    times, columns = recorded.read({1: unit})
+    values, notes = columns[1], [note for note in recorded.notes if not note.endswith("is assumed")]
     from scipy.interpolate import CubicSpline, PPoly  # takes half a second to load: only for who has a table
 
     if interpolation == "cubic":
         spline = CubicSpline(times, values)
-        return PPoly(spline.c, spline.x)
-    return PPoly(np.array([np.diff(values) / np.diff(times), values[:-1]]), times)
+        return PPoly(spline.c, spline.x), notes
+    return PPoly(np.array([np.diff(values) / np.diff(times), values[:-1]]), times), notes

@@ -186,6 +186,11 @@ SUSPICIOUS_LOADS = (
         'errors fall slowly with the step; take a smaller macro_step, or interpolation = "cubic"',
     ),
     Rule(
+        lambda s, load: bool(load.notes),
+        "{load.file}: {notes}",
+        lambda s, load: {"notes": "; ".join(load.notes)},
+    ),
+    Rule(
         lambda s, load: load.begins >= s.time.t_end,
         "{load.start}: plays no part here; the run ends at {time.t_end}",
     ),

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from pydantic import ValidationError
 from scipy.optimize import minimize_scalar
 from scipy.signal import argrelextrema, correlate, correlation_lags
 
 from ..results.dense import rows_at
 from ..results.trajectory import Trajectory, columns_of
 from ..scene import Scene, SceneError
-from ..scene.recorded import Recorded
+from ..scene.recorded import Reading, Recorded
 from .curves import check, signal
 
 #: Most samples of a correlation.
@@ -25,6 +26,7 @@ class Measured(NamedTuple):
 
     time: np.ndarray  #: [s], shape (n,)
     values: dict[str, np.ndarray]  #: by column, in its unit, or function, shapes (n,)
+    notes: list[str]  #: what was done to the data as it was read
 
     def covered(self, run: Trajectory, shift: float = 0.0, margin: float = 0.0) -> np.ndarray:
         """Return which points lie in the run, shape (n,), if the clock is moved by ``shift`` [s].
@@ -47,7 +49,9 @@ class Residual(NamedTuple):
     at: float  #: [s], in the time of the run
 
 
-def read_measured(path: str | Path, scene: Scene, names: Mapping[str, str] | None = None) -> Measured:
+def read_measured(
+    path: str | Path, scene: Scene, names: Mapping[str, str] | None = None, reading: Reading | None = None
+) -> Measured:
     """Read a file of measurements.
 
     Parameters
@@ -59,12 +63,14 @@ def read_measured(path: str | Path, scene: Scene, names: Mapping[str, str] | Non
     names
         The column of a run, or ``module:function`` of it, by the column of the file, e.g. ``{"CH1": "a_tip"}``.
         Without any, columns that are called as those of a run belong to these. Others are left out.
+    reading
+        How the file is read.
 
     Raises SceneError, which names file, line and column, and what would be allowed.
     """
     path, units = Path(path), columns_of(scene)
     try:
-        return _read(Recorded(path), units, names or {})
+        return _read(Recorded(path, reading), units, names or {})
     except OSError as error:
         raise SceneError(f"{path}: {error.strerror}") from error
     except ValueError as error:
@@ -82,14 +88,28 @@ def _read(file: Recorded, units: Mapping[str, str], names: Mapping[str, str]) ->
         raise ValueError(
             f"no column is called as one of the run ({', '.join(units)}); --map NAME=COLUMN says which is which"
         )
-    values = {}
+    wanted_units = {}
     for name, what in wanted.items():
         check(what, units)
         k = 1 + there.index(name)
         if what not in units and file.units[k]:
             raise ValueError(f"{what}: a function has no unit; give the measured column without one")
-        values[what] = file.column(k, units.get(what, ""))
-    return Measured(file.times(), values)
+        wanted_units[k] = units.get(what, "")
+    times, values = file.read(wanted_units)
+    return Measured(times, dict(zip(wanted.values(), values.values(), strict=True)), file.notes)
+
+
+def reading_of(texts: Sequence[str]) -> Reading:
+    """Return how a file is read by what ``KEY=VALUE`` say, with the keys of a load. Raises SceneError."""
+    given = dict(text.partition("=")[::2] for text in texts)
+    try:
+        return Reading.model_validate(given, strict=False)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = str(first["loc"][0])
+        if key not in Reading.model_fields:
+            raise SceneError(f"--read {key}: must be one of {', '.join(Reading.model_fields)}") from None
+        raise SceneError(f"--read {key}={given[key]}: {first['msg'].lower()}") from None
 
 
 def time_shift(run: Trajectory, measured: Measured) -> float:

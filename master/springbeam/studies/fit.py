@@ -23,7 +23,7 @@ from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, key_kind
 from ..scene.scene import split_key
 from ..signals.curves import signal
-from ..signals.measured import Measured, read_measured, time_shifts
+from ..signals.measured import Measured, read_measured, reading_of, time_shifts
 from .design import design, parse_axis
 from .study import Study
 from .tables import Findings, Row, table
@@ -55,6 +55,7 @@ class Fit(Study):
     digest: str  #: of its content
     vary: tuple[str, ...]  #: KEY=GUESS
     names: tuple[str, ...] = ()  #: NAME=COLUMN
+    read: tuple[str, ...] = ()  #: KEY=VALUE of how the file is read
     shift: float | None = None  #: by which the clock of the measurement is moved [s]; found if it is left out
 
     @classmethod
@@ -86,7 +87,7 @@ class Fit(Study):
 
     def data(self) -> Measured:
         """Return the measured curves."""
-        return read_measured(self.file, self.scene, mapping(self.names))
+        return read_measured(self.file, self.scene, mapping(self.names), reading_of(self.read))
 
     def record(self, case: Row) -> Row:
         """Return the values found, their intervals, and every run on the way. Raises SceneError for too few points."""
