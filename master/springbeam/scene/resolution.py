@@ -208,7 +208,7 @@ def peak_force_doubt(scene: Scene) -> str | None:
     """Return in words why the run cannot vouch for its peak contact force, and what would; ``None`` if it can.
 
     At a rigid impact the force at an instant grows with the mesh. Its mean over a window settles where the window is
-    longer than `SETTLED` periods of the fastest wave kept (``docs/contact.md`` has the numbers).
+    longer than `SETTLED` periods of the fastest wave kept (``docs/choose.md`` has the numbers).
     """
     return next(told(scene, (_MESH_DECIDES,)), None)
 

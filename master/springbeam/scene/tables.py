@@ -286,7 +286,7 @@ class Stop(Table):
 class Contact(Table):
     """What force C belongs to the penetration p = y − u_tip (``docs/model.md``, "Interface laws")."""
 
-    law: str = key("–", "the interface law (docs/contact.md says which)", "transmission", one_of=tuple(LAWS))
+    law: str = key("–", "the interface law (docs/choose.md says which)", "transmission", one_of=tuple(LAWS))
     stiffness: float = key(
         "N/m^p", "stiffness λ_nc of normal compliance, or of a link (N/m)", 1.0e4, ge=0.0,
         otherwise="1e4; needed with compliance and link",
