@@ -66,10 +66,10 @@ def replace_run(monkeypatch, error):
 def test_a_run_leaves_results_and_pictures_and_says_where(here, unpainted):
     shown = printed("run", "soft")
     assert sorted(path.name for path in (here / "results" / "soft").iterdir()) == sorted(
-        ["trajectory.csv", "events.csv", "shapes.csv", "steps.bin", "summary.json", *PICTURES]
+        ["trajectory.csv", "events.csv", "shapes.csv", "steps.bin", "summary.json", "overview.png"]
     )
     assert "results   results/soft\n" in shown
-    assert f"pictures  results/soft/*.png ({len(PICTURES)})" in shown
+    assert "picture   results/soft/overview.png" in shown
     assert "largest relative residual 3.0e-14" in shown
     assert "31 macro steps" in shown
     (event,) = [line for line in shown.splitlines() if line.startswith("impact")]
@@ -92,7 +92,7 @@ def test_a_picture_that_cannot_be_written_ends_with_3_and_loses_nothing(here, mo
     assert result.exit_code == 3
     assert said == [result.stdout]
     assert result.stdout.endswith("results   results/soft\n")
-    assert "no pictures: " in result.stderr
+    assert "no picture: " in result.stderr
     assert "No space left on device; what was computed is in results/soft" in " ".join(result.stderr.split())
     assert len(load_trajectory(here / "results" / "soft")) == 31
 
@@ -145,7 +145,7 @@ def test_a_run_that_stops_early(here, unpainted, monkeypatch, error, fragments):
         assert fragment in result.stderr
     assert "Traceback" not in result.output
     assert len(load_trajectory(here / "results" / "soft")) == 31
-    assert (here / "results" / "soft" / PICTURES[2]).exists()
+    assert (here / "results" / "soft" / PICTURES["overview"]).exists()
 
 
 def test_an_unforeseen_error_is_not_hidden(here, monkeypatch):

@@ -30,34 +30,34 @@ from springbeam.pictures.plots import figure_of, plot_run
 from springbeam.pictures.report.charts import backdrop
 from springbeam.results.directory import PICTURES
 
-A, B, C, D, E, F, G = PICTURES
+OVERVIEW, A, B, C, D, E, F, G = PICTURES.values()
 DRAWN = {
-    "all": PICTURES, "no stop": PICTURES, "no spring": PICTURES, "beam": PICTURES, "no beam": (C, D, E, F),
-    "spring": (C, D, E, F),
+    **dict.fromkeys(("all", "no stop", "no spring", "beam"), (OVERVIEW, A, B, C, D, E, F, G)),
+    **dict.fromkeys(("no beam", "spring"), (OVERVIEW, C, D, E, F)),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("has", SCENES)
 def test_a_scene_gets_the_pictures_of_what_it_has(tmp_path, unpainted, has):
     style = dict(matplotlib.rcParams)
-    written = plot_run(a_trajectory(SCENES[has]), tmp_path)
+    written = plot_run(a_trajectory(SCENES[has]), tmp_path, PICTURES)
     assert dict(matplotlib.rcParams) == style  # none is left behind
     assert sorted(written) == sorted(tmp_path.iterdir())
     assert tuple(path.name for path in written) == DRAWN[has]
 
 
-@pytest.mark.parametrize(("rows", "drawn"), [(0, []), (1, []), (2, [A, C, D, E, F])])
+@pytest.mark.parametrize(("rows", "drawn"), [(0, []), (1, []), (2, [OVERVIEW, A, C, D, E, F])])
 def test_a_run_that_stopped_at_once_is_drawn_from_its_second_row_on(tmp_path, unpainted, rows, drawn):
     whole = a_trajectory()
     columns = {name: values[:rows] for name, values in whole.columns.items()}
     short = dataclasses.replace(whole, columns=columns, shape_table=whole.shape_table[:rows])
-    assert [path.name for path in plot_run(short, tmp_path)] == drawn
+    assert [path.name for path in plot_run(short, tmp_path, PICTURES)] == drawn
 
 
 @pytest.mark.parametrize("columns", ODD_COLUMNS.values(), ids=ODD_COLUMNS)
 def test_odd_columns_are_drawn_without_a_warning(tmp_path, recwarn, monkeypatch, columns):
     monkeypatch.setattr(plots, "DPI", 40)
-    for path in plot_run(a_trajectory(events=EVERY_EVENT, **columns), tmp_path):
+    for path in plot_run(a_trajectory(events=EVERY_EVENT, **columns), tmp_path, PICTURES):
         assert imread(path)[..., :3].std() > 0.02  # not blank
     assert [str(warning.message) for warning in recwarn] == []
 
@@ -69,7 +69,7 @@ def texts(figure):
     return [text.get_text() for text in figure.findobj(matplotlib.text.Text) if text.get_text()]
 
 
-@pytest.mark.parametrize("picture", plots._NAMES)
+@pytest.mark.parametrize("picture", PICTURES)
 def test_axes_have_quantities_and_units_and_the_key_names_phases_and_events(picture):
     run = a_trajectory(events=EVERY_EVENT)
     figure = figure_of(run, picture)
@@ -91,8 +91,48 @@ def test_axes_have_quantities_and_units_and_the_key_names_phases_and_events(pict
 
 def test_every_panel_is_in_one_picture():
     run = a_trajectory(events=EVERY_EVENT)
-    drawn = [ax.get_ylabel() for picture in plots._OVER_TIME for ax in figure_of(run, picture).axes]
+    drawn = [
+        ax.get_ylabel() for picture in plots._OVER_TIME if picture != "overview" for ax in figure_of(run, picture).axes
+    ]
     assert sorted(drawn) == sorted(panel.axis for panel in panels(run))
+
+
+def written(figure):
+    """What is written but numbers at axes: title, mark, keys and quantities."""
+    keys = [legend for legend in (*figure.legends, *(ax.get_legend() for ax in figure.axes)) if legend is not None]
+    quantities = [label for ax in figure.axes for label in (ax.xaxis.label, ax.yaxis.label)]
+    found = [*figure.texts, *(text for key in keys for text in key.get_texts()), *quantities]
+    return [text for text in found if text.get_text()]
+
+
+LONG = "A dropped package with a long name, which is wrapped where the picture ends, and goes on for more than a line"
+
+
+@pytest.mark.parametrize("picture", plots._OVER_TIME)
+@pytest.mark.parametrize("law", ["transmission", "compliance"])
+def test_nothing_written_over_time_is_cut_off_or_lies_on_anything_else(picture, law):
+    scene = with_changes(PAIR, contact={"law": law, "damping": 0.5 * (law == "compliance")})
+    events = [Event(0.3 + 1e-3 * k, kind, 0, 0, 0, 0, 1e-3, 0.6, 0.1) for k in range(40) for kind in EVENT_LOOKS]
+    run = a_trajectory(scene.model_copy(update={"title": LONG}), events=events)
+    run.summary |= {"resolved": False, "contact_force_max": 9.98, "contact_force_window": 3.28e-4}
+    run.summary |= {"contact_force_max_time": 0.3}
+    figure = figure_of(run, picture)
+    figure.canvas.draw()
+    frames = [ax.get_window_extent() for ax in figure.axes]
+    boxes = {text: text.get_window_extent() for text in written(figure)}
+    for text, box in boxes.items():
+        assert 0.0 <= box.x0 < box.x1 <= figure.bbox.width, text
+        assert 0.0 <= box.y0 < box.y1 <= figure.bbox.height, text
+        others = [*frames, *(other for other in boxes.values() if other is not box)]
+        assert not any(box.overlaps(other) for other in others), text
+
+
+def test_the_overview_is_one_page_of_positions_velocities_forces_and_energy():
+    figure = figure_of(a_trajectory(events=EVERY_EVENT), "overview")
+    assert [ax.get_ylabel().split(" [")[0] for ax in figure.axes] == [
+        "position", "velocity", "force", "impulse", "energy"
+    ]  # fmt: skip
+    assert figure.get_figheight() < 11.7  # A4
 
 
 def test_panels_are_painted_with_all_that_they_say():

@@ -400,7 +400,7 @@ def damaged(path, damage, message):
 
 
 WRITTEN = ["events.csv", "shapes.csv", "steps.bin", "summary.json", "trajectory.csv"]
-RESULT_FILES = [*WRITTEN, "run.checkpoint", PARQUET[0], PICTURES[2], REPORT, ANIMATIONS[0]]
+RESULT_FILES = [*WRITTEN, "run.checkpoint", PARQUET[0], PICTURES["positions"], REPORT, ANIMATIONS[0]]
 
 
 @pytest.mark.parametrize("name", RESULT_FILES)

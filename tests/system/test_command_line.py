@@ -38,6 +38,7 @@ TABLES = {
     "spectrum": "done --out spectra",
     "fit": "duffing curve.csv --vary spring.linear_stiffness=3.1 --set time.t_end=1 --out fitted",
     "report": "done --out page.html",
+    "plot": "done --picture positions",
     "animate": "done --seconds 0.2 --fps 10 --out moving.gif",
     "export": "done",
     "predict": "soft --set beam.n_elements=10",
@@ -49,7 +50,7 @@ TABLES = {
 }
 
 #: Those that print a name of a file alone, or whose documents are read in the tests of their own.
-WITHOUT_JSON = ("new", "compare", "spectrum", "fit", "report", "animate", "export", "resume")
+WITHOUT_JSON = ("new", "compare", "spectrum", "fit", "report", "plot", "animate", "export", "resume")
 
 
 #: What holds for the document of a command; of others, that their table is in their directory.

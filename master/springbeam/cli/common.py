@@ -87,7 +87,7 @@ QuietOption = Annotated[
     bool, typer.Option("--quiet", "-q", help="No progress bar and no tables; print only the path of the results.")
 ]
 ForceOption = Annotated[bool, typer.Option("--force", "-f", help="Replace what is already there.")]
-NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help="Draw no pictures.")]
+NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help="Draw no picture.")]
 
 
 class Commands(TyperGroup):

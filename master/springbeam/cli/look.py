@@ -1,4 +1,4 @@
-"""``springbeam report``, ``animate``, ``export``, ``compare`` and ``spectrum``: the results of runs."""
+"""``springbeam report``, ``plot``, ``animate``, ``export``, ``compare`` and ``spectrum``: the results of runs."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn
 
 from ..pictures.diagrams import Diagram, draw_diagrams
-from ..results.directory import ANIMATIONS, REPORT
+from ..results.directory import ANIMATIONS, OVERVIEW, PICTURES, REPORT
 from ..results.files import load_trajectory
 from ..results.totals import LOSS_NAMES, TOTALS, totals
 from ..results.trajectory import Trajectory
 from ..scene import Scene
+from ..scene.messages import nearest
 from ..studies.tables import Findings, table
 from .common import (
     BAD_INPUT,
@@ -56,6 +57,30 @@ def report(
 
     target.write_text(page(trajectory), encoding="utf-8")
     return Findings(files=[("", target)])
+
+
+def plot(
+    directory: RunArgument,
+    names: Annotated[
+        list[str] | None,
+        typer.Option("--picture", metavar="NAME", help=f"One of {', '.join(PICTURES)}; may be repeated."),
+    ] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Draw all of them.")] = False,
+) -> Findings:
+    """Draw pictures of a run into its directory, without options the overview that springbeam run draws.
+
+    Example: springbeam plot results/soft --picture moments --picture gap_and_energy
+    """
+    if unknown := [name for name in names or () if name not in PICTURES]:
+        allowed = f"{nearest(unknown[0], PICTURES)}allowed: {', '.join(PICTURES)}"
+        fail(BAD_INPUT, f"--picture {unknown[0]}: unknown; {allowed}")
+    trajectory = load_trajectory(results_directory(directory))
+    from ..pictures.plots import plot_run
+
+    written = plot_run(trajectory, directory, PICTURES if everything else names or (OVERVIEW,))
+    if not written:
+        fail(BAD_INPUT, f"{directory}: the run has nothing to show of {', '.join(names or PICTURES)}")
+    return Findings(files=[("", file) for file in written])
 
 
 def export(

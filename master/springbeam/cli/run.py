@@ -87,7 +87,7 @@ def run(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> Findings:
-    """Run a scene; write its results, events and pictures into a directory.
+    """Run a scene; write its results, events and an overview into a directory. springbeam plot draws more.
 
     Example: springbeam run soft --set coupling.macro_step=5e-4 --out results/fine
     """
@@ -174,15 +174,15 @@ def carry_out(
 
 
 def _drawn(directory: Path) -> Findings:
-    """Draw the run in ``directory``; an error is that there is no room for pictures, or no time."""
+    """Draw an overview of the run in ``directory``; an error is that there is no room for it, or no time."""
     from ..pictures.plots import plot_run  # matplotlib takes a second to load
 
     try:
         pictures = plot_run(load_trajectory(directory), directory)
     except (KeyboardInterrupt, OSError) as trouble:
-        lost = f"no pictures: {cause_of(trouble, directory)}; what was computed is in {directory}"
+        lost = f"no picture: {cause_of(trouble, directory)}; what was computed is in {directory}"
         return Findings(code=STOPPED, error=lost)
-    return Findings(files=[("pictures", f"{directory / '*.png'} ({len(pictures)})")] if pictures else ())
+    return Findings(files=[("picture", file) for file in pictures])
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Pictures of a run: the sub-figures (A)–(E) of Ahn & Tate's Figures 2–5; loads, accelerations and what the beam feels.
+"""Pictures of a run: an overview; the sub-figures (A)–(E) of Ahn & Tate's Figures 2–5; loads, and what the beam feels.
 
 Besides colours, lines differ in width or dashes and events in shape, so that the pictures survive a black-and-white
 printer.
@@ -6,7 +6,8 @@ printer.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -16,7 +17,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from ..results.directory import PICTURES
+from ..results.directory import OVERVIEW, PICTURES
 from ..results.trajectory import Trajectory
 from ..scene.statics import SHAPE_POINTS
 from .drawing import (
@@ -33,13 +34,15 @@ from .panels import panels
 from .timeline import DPI, REMARK, STYLE, figure_for, line_style, timeline
 
 _SHAPES_EARLY, _SHAPES_LATER = 20, 24
+#: Of the heights of panels, in the overview.
+_ON_ONE_PAGE = 0.75
 #: Early to late, dark to light, but not so light that a line is lost on paper.
 _CLOCK = ListedColormap(matplotlib.colormaps["cividis"](np.linspace(0.0, 0.9, 256)), "clock")
 
 
 @matplotlib.rc_context(STYLE)
-def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
-    """Draw the pictures `springbeam.results.directory.PICTURES` that the scene has something to show for.
+def plot_run(trajectory: Trajectory, directory: str | Path, names: Iterable[str] = (OVERVIEW,)) -> list[Path]:
+    """Draw pictures of `springbeam.results.directory.PICTURES`, those that the run has something to show for.
 
     Parameters
     ----------
@@ -47,6 +50,8 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
         Any run, also one that stopped early; with fewer than two rows there is nothing to draw.
     directory
         Where the PNG files go; it must exist.
+    names
+        Which pictures.
 
     Returns
     -------
@@ -54,9 +59,9 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
         The files written.
     """
     written = []
-    for name, file in zip(_NAMES, PICTURES, strict=True):
+    for name in names:
         if (figure := _drawn(trajectory, name)) is not None:
-            written.append(Path(directory) / file)
+            written.append(Path(directory) / PICTURES[name])
             figure.savefig(written[-1], dpi=DPI)
     return written
 
@@ -64,8 +69,8 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
 @matplotlib.rc_context(STYLE)
 def figure_of(trajectory: Trajectory, picture: str) -> Figure:
     """Return the picture of that name; see `springbeam.Trajectory.plot`."""
-    if picture not in _NAMES:
-        raise ValueError(f"no picture {picture!r}; there are {', '.join(_NAMES)}")
+    if picture not in PICTURES:
+        raise ValueError(f"no picture {picture!r}; there are {', '.join(PICTURES)}")
     figure = _drawn(trajectory, picture)
     if figure is None:
         raise ValueError(f"the run has nothing to show of {picture!r}")
@@ -77,6 +82,8 @@ def _drawn(trajectory: Trajectory, picture: str) -> Figure | None:
         return _ALONG[picture](trajectory) if drawable(trajectory) else None
     title, names = _OVER_TIME[picture]
     shown = [panel for panel in panels(trajectory) if panel.name.startswith(names)]
+    if picture == OVERVIEW:  # on one page
+        shown = [replace(panel, height=_ON_ONE_PAGE * panel.height) for panel in shown]
     return timeline(trajectory, title, shown) if shown else None
 
 
@@ -171,6 +178,7 @@ _ALONG: dict[str, Callable[[Trajectory], Figure | None]] = {
     "moments": _moments,
 }
 _OVER_TIME = {
+    "overview": ("", ("positions", "velocities", "forces", "impulses", "energies")),
     "positions": ("(C) Positions", ("positions",)),
     "velocities_and_forces": ("(D) Velocities and forces", ("velocities", "forces", "impulses")),
     "gap_and_energy": ("(E) Gap and energy", ("gap", "energies", "residual")),
@@ -178,5 +186,3 @@ _OVER_TIME = {
         "(F) Loads, accelerations, and the clamp", ("loads", "accelerations", "clamp", "bending")
     ),
 }  # fmt: skip
-#: The letters of `PICTURES` say which is which.
-_NAMES = [Path(file).stem[2:] for file in PICTURES]

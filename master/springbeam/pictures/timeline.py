@@ -20,6 +20,7 @@ from .drawing import (
     GREY,
     MANY_EVENTS,
     VERMILLION,
+    EventMark,
     Look,
     Unit,
     event_marks,
@@ -46,53 +47,76 @@ STYLE: dict[Any, Any] = {
 }
 REMARK: dict[str, Any] = {"fontsize": 7.0, "style": "italic", "color": GREY}
 DPI = 160
-_WIDTH = 8.2  # inches
-_TITLE_WIDTH = 110  # characters
-_MARK_HEIGHT, _MARK_ROW = 1.045, 0.04
+_TITLE_WIDTH, _BESIDE_MARK = 105, 60  # characters
 _KEY_COLUMNS = 4
+#: Of a figure, and of what surrounds its panels [inch]: labels to the left, keys to the right; between two panels; the
+#: labels of the time axis; a row of a title or of the key; a row of marks of events; free room.
+_WIDTH, _LEFT, _RIGHT, _GAP, _AXIS, _LINE, _MARK_ROW, _ROOM = 8.2, 0.75, 1.85, 0.12, 0.45, 0.19, 0.11, 0.12
+#: Most characters in a line of a key beside a panel.
+_KEY_WIDTH = 24
 
 
 def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Figure:
     """Return the figure of ``panels``, one below the other over a common time axis; phases shaded, events marked."""
-    figure = figure_for(trajectory, title, 1.0 + sum(panel.height for panel in panels))
-    axes = _painted(figure, panels, time_unit(trajectory))
+    phases = [look for look, _ in shaded_phases(trajectory)]
+    marks = event_marks(trajectory)
+    heading = _heading(title, trajectory)
+    above = _LINE * len(heading.splitlines()) + _MARK_ROW * len(marks) + 2.0 * _ROOM
+    below = _LINE * -(-(len(phases) + len(marks)) // _KEY_COLUMNS)
+    figure, axes = _painted(panels, time_unit(trajectory), above, below)
+    _title(figure, heading, trajectory)
     for ax in axes:
         shade(ax, trajectory)
-    phases = [look for look, _ in shaded_phases(trajectory)]
     shades = [Patch(facecolor=look.colour, edgecolor=GREY, linewidth=0.5, label=look.words) for look in phases]
-    keys = [*shades, *_mark_events(axes, trajectory)]
+    keys = [*shades, *_mark_events(axes, marks, trajectory)]
     # Legends fill column by column; these read row by row.
     keys = [key for column in range(_KEY_COLUMNS) for key in keys[column::_KEY_COLUMNS]]
     if keys:
-        figure.legend(handles=keys, loc="outside lower left", ncols=_KEY_COLUMNS, frameon=False, columnspacing=1.4)
+        figure.legend(handles=keys, loc="lower left", ncols=_KEY_COLUMNS, frameon=False, columnspacing=1.4)
     return figure
 
 
-def _painted(figure: Figure, panels: Sequence[Panel], clock: Unit) -> list[Axes]:
-    """Return the axes of ``panels``, one below the other over a common time axis in the unit ``clock``."""
-    heights = [panel.height for panel in panels]
-    axes: list[Axes] = list(figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
-    for ax, panel in zip(axes, panels, strict=True):
-        paint(ax, panel, clock)
-        ax.label_outer()
-    return axes
+def _painted(panels: Sequence[Panel], clock: Unit, above: float, below: float) -> tuple[Figure, list[Axes]]:
+    """Return a figure with ``panels`` one below the other over a common time axis in the unit ``clock``.
+
+    There is room [inch] ``above`` and ``below`` them. Every place is known before anything is drawn: a layout that
+    looks for room draws all texts several times.
+    """
+    height = above + sum(panel.height + _GAP for panel in panels) + _AXIS + below
+    figure = Figure(figsize=(_WIDTH, height))
+    FigureCanvasAgg(figure)
+    axes = list[Axes]()
+    top, across = height - above, _WIDTH - _LEFT - _RIGHT
+    for panel in panels:
+        top -= panel.height
+        place = (_LEFT / _WIDTH, top / height, across / _WIDTH, panel.height / height)
+        axes.append(figure.add_axes(place, sharex=axes[0] if axes else None))
+        paint(axes[-1], panel, clock)
+        axes[-1].yaxis.set_label_coords((0.15 - _LEFT) / across, 0.5)
+        top -= _GAP
+    for ax in axes[:-1]:
+        ax.set_xlabel("")
+        ax.tick_params(labelbottom=False)
+    return figure, axes
 
 
-def _mark_events(axes: list[Axes], trajectory: Trajectory) -> list[Line2D]:
+def _mark_events(axes: list[Axes], marks: Sequence[EventMark], trajectory: Trajectory) -> list[Line2D]:
     """Mark events above the first panel, in a row for each kind, and by lines through all unless they are many.
 
     Returns what the key shows.
     """
     factor = time_unit(trajectory).factor
+    inch = axes[0].figure.get_figheight() * axes[0].get_position().height
     handles: list[Line2D] = []
     through = axes if len(trajectory.events) <= MANY_EVENTS else []
-    for event in event_marks(trajectory):
-        times, height = factor * event.times, _MARK_HEIGHT + _MARK_ROW * len(handles)  # a row for each kind
+    across = axes[0].get_xaxis_transform()
+    for row, event in enumerate(marks):
+        times = factor * event.times
+        height = 1.0 + (row + 0.9) * _MARK_ROW / inch
         look: dict[str, Any] = {
             "color": event.look.colour, "marker": event.marker.matplotlib, "markersize": event.marker.size, "ls": "none"
         }  # fmt: skip
         handles.append(Line2D([], [], label=event.look.words, **look))
-        across = axes[0].get_xaxis_transform()
         axes[0].plot(times, np.full(len(times), height), transform=across, clip_on=False, **look)
         for ax in through:
             ax.vlines(times, 0.0, 1.0, transform=ax.get_xaxis_transform(), color=event.look.colour, lw=0.4, alpha=0.6)
@@ -135,7 +159,16 @@ def paint(ax: Axes, panel: Panel, clock: Unit) -> None:
     elif ax.get_ylim()[0] < 0.0 < ax.get_ylim()[1]:
         ax.axhline(0.0, color=GREY, lw=0.5, zorder=1)
     # The key stands beside the panel.
-    ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), frameon=False, borderaxespad=0.0, handlelength=1.6)
+    handles, words = ax.get_legend_handles_labels()
+    ax.legend(
+        handles,
+        [textwrap.fill(text, _KEY_WIDTH) for text in words],
+        loc="upper left",
+        bbox_to_anchor=(1.005, 1.0),
+        frameon=False,
+        borderaxespad=0.0,
+        handlelength=1.6,
+    )
 
 
 def line_style(look: Look) -> dict[str, Any]:
@@ -151,24 +184,26 @@ def line_style(look: Look) -> dict[str, Any]:
 
 def figure_for(trajectory: Trajectory, title: str, height: float) -> Figure:
     """Return an empty figure of ``height`` [inch] with title, scene and, where the motion is not resolved, its mark."""
-    figure = blank(f"{title}\n{trajectory.scene.title}", height)
-    figure.text(0.99, 0.985, mark(trajectory), fontsize=8.0, weight="bold", color=VERMILLION, ha="right", va="top")
-    return figure
-
-
-def blank(title: str, height: float) -> Figure:
-    """Return an empty figure of ``height`` [inch] with a title, whose long lines are wrapped."""
     figure = Figure(figsize=(_WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
-    wrapped = [textwrap.fill(line, _TITLE_WIDTH) for line in title.splitlines() if line]
-    figure.suptitle("\n".join(wrapped), fontsize=10.0, x=0.01, ha="left")
+    _title(figure, _heading(title, trajectory), trajectory)
     return figure
+
+
+def _title(figure: Figure, heading: str, trajectory: Trajectory) -> None:
+    height = figure.get_figheight()
+    figure.suptitle(heading, fontsize=10.0, x=0.01, y=1.0 - 0.5 * _ROOM / height, ha="left", va="top")
+    figure.text(0.99, 1.0 - 0.5 * _ROOM / height, mark(trajectory), fontsize=8.0, weight="bold", color=VERMILLION,
+                ha="right", va="top")  # fmt: skip
+
+
+def _heading(title: str, trajectory: Trajectory) -> str:
+    """Return title and scene, wrapped beside the mark if there is one."""
+    width = _BESIDE_MARK if mark(trajectory) else _TITLE_WIDTH
+    return "\n".join(textwrap.fill(line, width) for line in (title, trajectory.scene.title) if line)
 
 
 @matplotlib.rc_context(STYLE)
 def draw_compared(runs: Mapping[str, Trajectory]) -> Figure:
     """Return the figure of runs by their names, in the panels that any of them has something to show for."""
-    panels = compared(runs)
-    figure = blank("", 0.6 + sum(panel.height for panel in panels))
-    _painted(figure, panels, Unit(1.0, "s"))
-    return figure
+    return _painted(compared(runs), Unit(1.0, "s"), _ROOM, 0.0)[0]

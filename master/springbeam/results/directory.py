@@ -19,16 +19,18 @@ try:
 except ImportError:  # Windows: two processes in one directory are not noticed
     fcntl = None  # type: ignore[assignment]
 
-#: Pictures `springbeam.pictures.plots.plot_run` may leave in a run directory.
-PICTURES = (
-    "a_shapes_after_contact.png",
-    "b_shapes_later.png",
-    "c_positions.png",
-    "d_velocities_and_forces.png",
-    "e_gap_and_energy.png",
-    "f_loads_and_clamp.png",
-    "g_moments.png",
-)
+#: Pictures that `springbeam run` (the first) and `springbeam plot` may leave in a run directory, by name.
+PICTURES = {
+    "overview": "overview.png",
+    "shapes_after_contact": "a_shapes_after_contact.png",
+    "shapes_later": "b_shapes_later.png",
+    "positions": "c_positions.png",
+    "velocities_and_forces": "d_velocities_and_forces.png",
+    "gap_and_energy": "e_gap_and_energy.png",
+    "loads_and_clamp": "f_loads_and_clamp.png",
+    "moments": "g_moments.png",
+}
+OVERVIEW = "overview"
 #: What `springbeam export --format parquet` leaves there.
 PARQUET = ("trajectory.parquet", "events.parquet", "shapes.parquet")
 #: What `springbeam report` and `springbeam animate` may leave there.
@@ -65,7 +67,7 @@ class RunDirectory:
     def results(self) -> list[Path]:
         """Return the result files that exist, and the files made from them."""
         files = (self.summary, self.trajectory, self.events, self.shapes, self.steps, self.checkpoint)
-        made = (self.path / name for name in (*PARQUET, *PICTURES, REPORT, *ANIMATIONS))
+        made = (self.path / name for name in (*PARQUET, *PICTURES.values(), REPORT, *ANIMATIONS))
         return [file for file in (*files, *made) if file.exists()]
 
     def sizes(self) -> dict[str, int]:
