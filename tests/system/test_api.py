@@ -1,16 +1,20 @@
 """What Python programs call: results loaded, saved and handed on, and bodies of one's own."""
 
+import subprocess
+import sys
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
+import tomli_w
 from bodies import DuffingBody, beam_body
-from commands import printed
+from commands import printed, ran
 from runs import a_trajectory
 
 import springbeam
-from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
+from springbeam import RunStopped, SceneError, Simulation, load_scene, simulate, with_changes
+from springbeam.scene import ArgumentError, scene_from_dict
 from springbeam.scene.statics import SHAPE_POINTS
 
 SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2}, coupling={"macro_step": 1e-3, "degree": 2})
@@ -212,3 +216,61 @@ def test_an_error_in_a_body_of_ones_own_is_reported_at_once(monkeypatch, error, 
     assert stopped.value.cause == cause
     assert stopped.value.time == pytest.approx(0.03, abs=APART.coupling.macro_step)
     assert sum(time >= 0.03 for time in steps) == 1
+
+
+def test_a_scene_may_be_a_name_a_file_or_tables(tmp_path):
+    tables = {"time": {"t_end": 0.01}, "spring": {"mass": 1.0, "linear_stiffness": 3.0, "equilibrium": 0.1}}
+    (tmp_path / "my.toml").write_text(tomli_w.dumps(tables))
+    runs = [simulate(scene) for scene in (tables, tmp_path / "my.toml", scene_from_dict(tables))]
+    assert len({run.steps.tobytes() for run in runs}) == 1
+    with Simulation("duffing") as simulation:
+        assert simulation.scene == load_scene("duffing")
+    with pytest.raises(SceneError, match="sofft: no such file, and no shipped scene; did you mean soft"):
+        simulate("sofft")
+
+
+def test_numbers_of_numpy_are_numbers():
+    beam = {"element": "point_mass", "mass": np.float32(2.0), "velocity": np.int64(-1)}
+    load = {"on": "tip", "amplitude": np.arange(3)[2], "signal": "step"}
+    scene = scene_from_dict({"time": {"t_end": np.float64(0.1)}, "beam": beam, "loads": [load]})
+    assert (scene.upper.mass, scene.upper.velocity, scene.loads[0].amplitude) == (2.0, -1.0, 2.0)
+    changed = with_changes(load_scene("soft"), beam={"n_elements": np.int32(7)}, spring={"damping": np.array(0.5)})
+    assert changed.beam.n_elements == 7
+    assert type(changed.beam.n_elements) is int
+    shaped = {"on": "beam", "shape": np.array([1.0, -0.5])}
+    assert with_changes(load_scene("soft"), loads=[shaped]).loads[0].shape == (1.0, -0.5)
+    with pytest.raises(SceneError, match=r"n_elements = 7\.5: must be an integer"):
+        with_changes(load_scene("soft"), beam={"n_elements": np.float64(7.5)})
+
+
+def test_a_column_that_is_not_there_is_named_beside_those_that_are(run):
+    with pytest.raises(KeyError, match=r"yy: no column; did you mean y\? there are time, "):
+        run["yy"]
+
+
+def test_an_error_names_arguments_in_python_and_options_on_the_command_line():
+    error = ArgumentError("--vary spring.mass: takes --samples, not 1--2")
+    assert (str(error), error.typed) == (
+        "vary spring.mass: takes samples, not 1--2", "--vary spring.mass: takes --samples, not 1--2",
+    )  # fmt: skip
+    with pytest.raises(SceneError, match=r"^overrides beam: must be TABLE"):
+        load_scene("soft", ["beam"])
+
+
+def test_a_script_that_asks_for_processes_outside_of_its_guard_is_refused(tmp_path):
+    """Each process runs the script again up to there."""
+    lines = [
+        "from springbeam import load_scene",
+        "from springbeam.studies.study import record_all",
+        "from springbeam.studies.sweep import Sweep",
+        "sweep = Sweep(scene=load_scene('duffing', ['time.t_end=0.01']), vary=('spring.mass=1:2:2',))",
+        "{}print(len(record_all(sweep, workers=2)))",
+    ]
+    script = tmp_path / "script.py"
+    script.write_text("\n".join(lines).format(""))
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True)
+    assert done.returncode == 1
+    said = f'workers 2: {script}, line 5 must stand under if __name__ == "__main__":'
+    assert done.stderr.splitlines()[-1].endswith(said)
+    script.write_text("\n".join(lines).format('if __name__ == "__main__": '))
+    assert ran(sys.executable, script) == "2\n"

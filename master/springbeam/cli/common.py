@@ -27,7 +27,7 @@ from ..bodies.protocol import FmuError
 from ..results.directory import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory
 from ..results.files import as_json as json_of
 from ..run.checkpoint import CheckpointRefused
-from ..scene import SceneError, scene_keys, shipped_scenes
+from ..scene import ArgumentError, SceneError, scene_keys, shipped_scenes
 from ..studies.tables import Findings
 
 DISAGREES = 1
@@ -187,6 +187,8 @@ def bad_input_reported() -> Iterator[None]:
         yield
     except ResultsExist as error:
         fail(BAD_INPUT, f"{error}; --force replaces them, --out DIR puts the new ones elsewhere")
+    except ArgumentError as error:
+        fail(BAD_INPUT, error.typed)
     except (SceneError, FmuError, CheckpointRefused, ResultsInUse, ResultsUnreadable) as error:
         fail(BAD_INPUT, str(error))
     except FileExistsError as error:

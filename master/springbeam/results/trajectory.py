@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..scene import Scene
+from ..scene.messages import nearest
 from ..scene.statics import SHAPE_POINTS
 
 if TYPE_CHECKING:
@@ -161,6 +162,8 @@ class Trajectory:
     steps: np.ndarray | None = None
 
     def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self.columns:
+            raise KeyError(f"{name}: no column; {nearest(name, self.columns)}there are {', '.join(self.columns)}")
         return self.columns[name]
 
     def __getattr__(self, name: str) -> np.ndarray:

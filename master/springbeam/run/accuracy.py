@@ -8,7 +8,9 @@ What is compared, and what two runs that agree cannot know, is in ``docs/accurac
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from ..bodies.factory import load_bodies
@@ -16,7 +18,7 @@ from ..bodies.protocol import Body
 from ..contact.laws import depth, law_of
 from ..results.distance import distance
 from ..results.trajectory import Trajectory
-from ..scene import Scene, SceneError, with_changes
+from ..scene import Scene, SceneError, as_scene, with_changes
 from ..scene.linearised import contact_energy
 from ..scene.resolution import STABLE, TURN, choice, joined_frequency, lasting_frequency, slow_oscillations
 from . import runner
@@ -34,14 +36,18 @@ _TOLERANCE = 1e-3
 
 
 def simulate(
-    scene: Scene, progress: Progress | None = None, *, upper: Body | None = None, lower: Body | None = None
+    scene: Scene | Mapping[str, Any] | str | Path,
+    progress: Progress | None = None,
+    *,
+    upper: Body | None = None,
+    lower: Body | None = None,
 ) -> Trajectory:
     """Co-simulate ``scene``, with settings that keep its ``accuracy`` if it asks for one, and return the trajectory.
 
     Parameters
     ----------
     scene
-        What is simulated.
+        What is simulated: a scene, its tables as dictionaries, a file, or the name of a shipped scene.
     progress
         Called with time [s], phase and number of macro steps once per accepted step; not while settings are searched.
     upper, lower
@@ -58,6 +64,7 @@ def simulate(
     FmuError
         If an FMU cannot be found or loaded.
     """
+    scene = as_scene(scene)
     if scene.accuracy is None or upper is not None or lower is not None:
         return runner.simulate(scene, progress, upper=upper, lower=lower)
     return pick(scene)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from time import perf_counter
@@ -17,7 +17,7 @@ from ..results.directory import RunDirectory
 from ..results.files import load_summary, load_trajectory
 from ..results.recording import FileRecorder, MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
-from ..scene import Scene, SceneError, scene_from_dict, suspicions
+from ..scene import ArgumentError, Scene, SceneError, as_scene, scene_from_dict, suspicions
 from .checkpoint import Checkpoint, CheckpointRefused
 from .equilibrium import contact_at_rest
 from .master import Master
@@ -31,7 +31,7 @@ class Simulation(AbstractContextManager["Simulation"]):
     Parameters
     ----------
     scene
-        What is simulated; it asks for no accuracy.
+        What is simulated, as for `springbeam.simulate`; it asks for no accuracy.
     recorder
         Where the results go; default: kept in memory.
     start
@@ -52,7 +52,7 @@ class Simulation(AbstractContextManager["Simulation"]):
 
     def __init__(
         self,
-        scene: Scene,
+        scene: Scene | Mapping[str, Any] | str | Path,
         recorder: Recorder | None = None,
         *,
         start: Checkpoint | None = None,
@@ -60,6 +60,7 @@ class Simulation(AbstractContextManager["Simulation"]):
         lower: Body | None = None,
     ) -> None:
         began = perf_counter()
+        scene = as_scene(scene)
         _refuse_accuracy(scene)
         self.scene, self.recorder = scene, recorder or MemoryRecorder(scene)
         of_scene = _without_own(scene, upper=upper, lower=lower)
@@ -301,7 +302,7 @@ def _refuse_checkpoints(scene: Scene) -> None:
     """Raise SceneError if a foreign FMU of ``scene`` cannot write its state."""
     for table, found in findings(scene).items():
         if not found.abilities.serialized:
-            raise SceneError(
+            raise ArgumentError(
                 f"[{table}] fmu: its state cannot be written to a file (canSerializeFMUstate = false), which "
                 "--checkpoint needs; leave it out"
             )

@@ -9,13 +9,14 @@ come with the package.
 
 from .loads import Load
 from .messages import key_kind, scene_keys
-from .reading import load_scene, parse_value, scene_from_dict, shipped_scenes, with_changes
+from .reading import as_scene, load_scene, parse_value, scene_from_dict, shipped_scenes, with_changes
 from .scene import SAME, Scene
 from .suspicions import suspicions
-from .tables import Beam, Contact, Coupling, SceneError, Spring, Stop, Time
+from .tables import ArgumentError, Beam, Contact, Coupling, SceneError, Spring, Stop, Time
 
 __all__ = [
     "SAME",
+    "ArgumentError",
     "Beam",
     "Contact",
     "Coupling",
@@ -25,6 +26,7 @@ __all__ = [
     "Spring",
     "Stop",
     "Time",
+    "as_scene",
     "key_kind",
     "load_scene",
     "parse_value",

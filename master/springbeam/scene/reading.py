@@ -16,7 +16,7 @@ from .messages import explain, model_of, nearest, one_line
 from .partners import kind_of
 from .rules import impossible
 from .scene import TABLES, Scene, split_key
-from .tables import PICKED_BY_ACCURACY, SceneError
+from .tables import PICKED_BY_ACCURACY, ArgumentError, SceneError
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -70,6 +70,13 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy
     return scene_from_dict(data, source)
 
 
+def as_scene(scene: Scene | Mapping[str, Any] | str | Path) -> Scene:
+    """Return a scene: as it is, of nested dictionaries, or what `load_scene` reads. Raises SceneError."""
+    if isinstance(scene, Scene):
+        return scene
+    return scene_from_dict(dict(scene)) if isinstance(scene, Mapping) else load_scene(scene)
+
+
 def _scene_file(path_or_name: str | Path) -> Path:
     shipped = shipped_scenes()
     path = shipped.get(str(path_or_name), Path(path_or_name))
@@ -87,7 +94,7 @@ def _settings(overrides: Iterable[str]) -> dict[str, dict[str, Any]]:
         target, separator, value = override.partition("=")
         split = split_key(target)
         if not separator or split is None:
-            raise SceneError(f"--set {override}: must be TABLE.KEY=VALUE, as in coupling.macro_step=1e-3")
+            raise ArgumentError(f"--set {override}: must be TABLE.KEY=VALUE, as in coupling.macro_step=1e-3")
         settings.setdefault(split[0], {})[split[1]] = parse_value(value.strip())
     return settings
 

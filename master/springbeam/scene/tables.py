@@ -6,6 +6,7 @@ Field names are those of the FMU parameters; units are SI. `springbeam.scene.rul
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Callable
 from itertools import chain
@@ -13,6 +14,7 @@ from math import pi
 from sys import float_info
 from typing import Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import (
     BaseModel,
     ConfigDict,
@@ -38,8 +40,23 @@ MOST_MODE_VALUES = 25_000_000
 MOST_ELEMENTS = 1_000_000
 
 
+#: An option of the command, and what Python calls it where that is not its own name.
+_OPTION, _ARGUMENTS = re.compile(r"(?<!\S)--([a-z]+)"), {"set": "overrides", "map": "names"}
+
+
 class SceneError(ValueError):
     """A scene that cannot be run; the message names the file, the table, the key and what would be allowed."""
+
+
+class ArgumentError(SceneError):
+    """An argument that cannot be used.
+
+    ``typed`` names options of the command, as ``--vary``; the text of the error names the arguments of Python.
+    """
+
+    def __init__(self, typed: str) -> None:
+        self.typed = typed
+        super().__init__(_OPTION.sub(lambda option: _ARGUMENTS.get(option[1], option[1]), typed))
 
 
 def key(
@@ -64,6 +81,13 @@ def key(
 
 #: Groups of keys that give one thing, each another way; those of the first follow from the others.
 Ways = tuple[tuple[str, ...], ...]
+
+
+def _plain(value: Any) -> Any:
+    """Return ``value``, or a dictionary of values, with numbers and arrays of numpy as Python's."""
+    if isinstance(value, dict):
+        return {name: _plain(content) for name, content in value.items()}
+    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
 
 
 class Table(BaseModel):
@@ -101,6 +125,7 @@ class Table(BaseModel):
     def _completed(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         if not isinstance(data, dict):
             return handler(data)
+        data = _plain(data)
         given = {name for name, value in data.items() if value is not None}
         for name in data:
             if name in given and (others := given & cls.other_ways(name)):

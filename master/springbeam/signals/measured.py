@@ -13,7 +13,7 @@ from scipy.signal import argrelextrema, correlate, correlation_lags
 
 from ..results.dense import rows_at
 from ..results.trajectory import Trajectory, columns_of
-from ..scene import Scene, SceneError
+from ..scene import ArgumentError, Scene, SceneError
 from ..scene.recorded import Reading, Recorded
 from .curves import check, signal
 
@@ -74,7 +74,7 @@ def read_measured(
     except OSError as error:
         raise SceneError(f"{path}: {error.strerror}") from error
     except ValueError as error:
-        raise SceneError(f"{path}: {error}") from error
+        raise ArgumentError(f"{path}: {error}") from error
 
 
 def _read(file: Recorded, units: Mapping[str, str], names: Mapping[str, str]) -> Measured:
@@ -108,8 +108,8 @@ def reading_of(texts: Sequence[str]) -> Reading:
         first = error.errors()[0]
         key = str(first["loc"][0])
         if key not in Reading.model_fields:
-            raise SceneError(f"--read {key}: must be one of {', '.join(Reading.model_fields)}") from None
-        raise SceneError(f"--read {key}={given[key]}: {first['msg'].lower()}") from None
+            raise ArgumentError(f"--read {key}: must be one of {', '.join(Reading.model_fields)}") from None
+        raise ArgumentError(f"--read {key}={given[key]}: {first['msg'].lower()}") from None
 
 
 def time_shift(run: Trajectory, measured: Measured) -> float:

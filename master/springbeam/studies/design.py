@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..scene import SceneError, key_kind, parse_value
+from ..scene import ArgumentError, SceneError, key_kind, parse_value
 from ..scene.scene import split_key
 
 #: The couplings that studies run: scheme and degree, of rigid and of soft laws.
@@ -104,7 +104,7 @@ def _is(kind: type, value: Any) -> bool:
 
 
 def _wrong(text: str, why: str) -> SceneError:
-    return SceneError(f"--vary {text}: {why}")
+    return ArgumentError(f"--vary {text}: {why}")
 
 
 def design(axes: Sequence[Axis], samples: int, seed: int, sampling: Sampling) -> list[tuple[Any, ...]]:
@@ -114,13 +114,15 @@ def design(axes: Sequence[Axis], samples: int, seed: int, sampling: Sampling) ->
     axis is sampled: ranges and grids between their ends, lists by equal shares.
     """
     if not axes:
-        raise SceneError("--vary: nothing varies; give at least one TABLE.KEY=VALUES")
+        raise ArgumentError("--vary: nothing varies; give at least one TABLE.KEY=VALUES")
     names = [axis.name for axis in axes]
     if doubled := sorted({name for name in names if names.count(name) > 1}):
-        raise SceneError(f"--vary {doubled[0]}: given twice")
+        raise ArgumentError(f"--vary {doubled[0]}: given twice")
     if samples == 0:
         if open_ranges := [axis.name for axis in axes if not axis.values]:
-            raise SceneError(f"--vary {open_ranges[0]}: a range without a count is sampled; give --samples, or a count")
+            raise ArgumentError(
+                f"--vary {open_ranges[0]}: a range without a count is sampled; give --samples, or a count"
+            )
         return list(itertools.product(*(axis.values for axis in axes)))
     if sampling == "latin_hypercube":
         from scipy.stats import qmc  # takes a second to load: only for who samples

@@ -20,7 +20,7 @@ from scipy.stats import t as student
 
 from ..run.accuracy import simulate
 from ..run.outcome import RunStopped
-from ..scene import Scene, SceneError, key_kind
+from ..scene import ArgumentError, Scene, SceneError, key_kind
 from ..scene.scene import split_key
 from ..signals.curves import signal
 from ..signals.measured import Measured, read_measured, reading_of, time_shifts
@@ -77,9 +77,9 @@ class Fit(Study):
         for name, guess in zip(names, values, strict=True):
             key = split_key(name)
             if key is None or key_kind(*key) is not float:
-                raise SceneError(f"--vary {name}: takes no real numbers, and cannot be fitted")
+                raise ArgumentError(f"--vary {name}: takes no real numbers, and cannot be fitted")
             if more or guess == 0.0:
-                raise SceneError(
+                raise ArgumentError(
                     f"--vary {name}: a guess is one value that has the sign and roughly the size of what is sought, as "
                     "in spring.linear_stiffness=800; 0 has none"
                 )
@@ -99,7 +99,7 @@ class Fit(Study):
         parts = {shift: data.covered(run, shift, _MARGIN * free) for shift in starts}
         parts = {shift: part for shift, part in parts.items() if part.sum() > len(guesses) + free}
         if not parts:
-            raise SceneError(
+            raise ArgumentError(
                 f"{self.file}: fewer of its points lie in the run than are needed to find {', '.join(guesses)}"
                 f"{' and the shift of its clock' * free}; make time.t_end longer, give more points, or another --shift"
             )
@@ -137,7 +137,7 @@ def mapping(names: Sequence[str]) -> dict[str, str]:
     for text in names:
         name, _, column = (part.strip() for part in text.partition("="))
         if not name or not column:
-            raise SceneError(f"--map {text}: must be NAME=COLUMN, as in CH1=a_tip")
+            raise ArgumentError(f"--map {text}: must be NAME=COLUMN, as in CH1=a_tip")
         found[name] = column
     return found
 

@@ -15,7 +15,7 @@ import numpy as np
 from ..results.dense import MOTION, Extremes, extremes
 from ..results.totals import LOSS_NAMES, TOTALS
 from ..results.trajectory import COLUMNS, TOLD, EventKind, Trajectory
-from ..scene import SceneError
+from ..scene import ArgumentError
 from ..scene.messages import nearest
 from ..signals.driven import drive_of, poincare, settled
 from ..signals.spectra import without_peak
@@ -161,17 +161,17 @@ def metrics_of(texts: Sequence[str], *, several: bool = False) -> dict[str, Metr
     for text in texts:
         name, separator, what = (part.strip() for part in text.partition("="))
         if name in found:
-            raise SceneError(f"--metric {name}: given twice")
+            raise ArgumentError(f"--metric {name}: given twice")
         if separator and name in METRICS:
-            raise SceneError(f"--metric {text}: {name} is a metric already; give yours another name")
+            raise ArgumentError(f"--metric {text}: {name} is a metric already; give yours another name")
         if name not in METRICS and not (separator and name.isidentifier()):
-            raise SceneError(
+            raise ArgumentError(
                 f"--metric {text}: unknown; {nearest(text, METRICS)}allowed: {', '.join(METRICS)}, and your own, as in "
                 "shock=module:function"
             )
         found[name] = METRICS[name] if name in METRICS else _own(name, what)
         if found[name].several and not several:
-            raise SceneError(f"--metric {name}: is several numbers of a run; springbeam sweep keeps and draws them")
+            raise ArgumentError(f"--metric {name}: is several numbers of a run; springbeam sweep keeps and draws them")
     return found
 
 
@@ -180,7 +180,7 @@ def _own(name: str, what: str) -> Metric:
 
     function = function_of(what)
     if function is None:
-        raise SceneError(
+        raise ArgumentError(
             f"--metric {name}={what}: must be module:function, a Python function of the run that returns one number; "
             "formulas are not read"
         )
@@ -190,7 +190,7 @@ def _own(name: str, what: str) -> Metric:
         if found is None:
             return None
         if np.size(found) != 1 or not np.isrealobj(found):
-            raise SceneError(f"--metric {name}={what}: gives {np.size(found)} values; a metric is one real number")
+            raise ArgumentError(f"--metric {name}={what}: gives {np.size(found)} values; a metric is one real number")
         return float(np.asarray(found, dtype=float).item())
 
     return Metric("", what, of)

@@ -15,9 +15,12 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import multiprocessing
 import os
 import re
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
@@ -38,7 +41,7 @@ from ..results.directory import ResultsExist, ResultsUnreadable, RunDirectory, l
 from ..results.trajectory import Trajectory
 from ..run.accuracy import simulate
 from ..run.outcome import RunStopped
-from ..scene import Scene, SceneError, load_scene, with_changes
+from ..scene import ArgumentError, Scene, SceneError, load_scene, with_changes
 from ..scene.scene import split_key
 from .metrics import Metric, costs
 from .tables import Findings, Row
@@ -330,12 +333,31 @@ def _as_done(
                 running[submit(study.record, todo[name])] = name
 
 
+def _refuse_unguarded(workers: int) -> None:
+    """Raise ArgumentError if a script asks for processes outside of ``if __name__ == "__main__"``.
+
+    Each process runs the script again up to there, and would ask for processes as well.
+    """
+    main = sys.modules["__main__"]
+    path, frame = getattr(main, "__file__", None), inspect.currentframe()
+    while frame is not None and (frame.f_code.co_filename, frame.f_code.co_name) != (path, "<module>"):
+        frame = frame.f_back
+    if frame is None or path is None or getattr(main.__spec__, "name", "").endswith("__main__"):
+        return  # no script, or the module of a package, which is not run again
+    for statement in ast.parse(Path(path).read_bytes()).body:
+        guarded = isinstance(statement, ast.If) and "__name__" in ast.unparse(statement.test)
+        if statement.lineno <= frame.f_lineno <= (statement.end_lineno or 0) and not guarded:
+            place = f"{path}, line {frame.f_lineno}"
+            raise ArgumentError(f'--workers {workers}: {place} must stand under if __name__ == "__main__":')
+
+
 @contextmanager
 def _processes(workers: int) -> Iterator[Callable[..., Future[Row]]]:
     """Open a pool of processes, of which one that dies is replaced; they are ended at once if its user gives up.
 
     They end without clearing up after themselves, so the folder of their temporary files is removed here.
     """
+    _refuse_unguarded(workers)
     with TemporaryDirectory(prefix="springbeam-", ignore_cleanup_errors=True) as folder:
         own = {**_ONE_THREAD, "TMPDIR": folder}
         before = {name: os.environ.get(name) for name in own}
@@ -359,9 +381,9 @@ def dask_cluster(scheduler: str) -> Iterator[Executor]:
 
         client = Client(scheduler, timeout=10.0)
     except ImportError as error:
-        raise SceneError(f"--scheduler: {error}; pip install distributed") from error
+        raise ArgumentError(f"--scheduler: {error}; pip install distributed") from error
     except (OSError, ValueError) as error:
-        raise SceneError(f"--scheduler {scheduler}: cannot be reached: {error}") from error
+        raise ArgumentError(f"--scheduler {scheduler}: cannot be reached: {error}") from error
     with client:
         own = metadata.version("springbeam")
         told: Any = client.get_versions(packages=["springbeam"])

@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..pictures.diagrams import Diagram, draw_diagrams
-from ..scene import Load, Scene, SceneError
+from ..scene import ArgumentError, Load, Scene
 from ..scene.messages import unit_of
 from .design import Axis, Sampling, design, parse_axis
 from .metrics import PRINCIPAL, USUAL, Metric, heading, metrics_of
@@ -126,7 +126,7 @@ class Sweep(Study):
             limit = float(value)
             if limit > 0.0:
                 return metric.strip(), limit
-        raise SceneError(
+        raise ArgumentError(
             f"--boundary {self.boundary}: must be METRIC=LIMIT with a limit above 0, as in max_clamp_moment=0.3"
         )
 
@@ -136,7 +136,9 @@ class Sweep(Study):
         names = {axis.name for axis in self.axes}
         pulse = min(names, default="").rpartition(".")[0]
         if names != {f"{pulse}.amplitude", f"{pulse}.duration"} or not pulse.startswith("loads."):
-            raise SceneError("--boundary: takes --vary loads.0.amplitude=… and --vary loads.0.duration=… of one pulse")
+            raise ArgumentError(
+                "--boundary: takes --vary loads.0.amplitude=… and --vary loads.0.duration=… of one pulse"
+            )
         return pulse
 
     def _critical(self, rows: Sequence[Row]) -> list[Row]:
