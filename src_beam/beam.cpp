@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "gauss.hpp"
 #include "midpoint.hpp"
@@ -18,9 +18,11 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// While coefficients stay below `largest_coefficient`, inputs and the sum of squares below `largest`, and step sizes
-/// [s] below `largest_size`, no output can overflow. What is not is refused.
-constexpr double largest_coefficient = 1e40, largest = 1e120, largest_size = 1e10;
+/// While coefficients stay below `largest_coefficient`, inputs below `largest_input`, the state's norm below `largest`
+/// and step sizes [s] below `largest_size`, no output can overflow. What is not is refused.
+constexpr double largest_coefficient = 1e40, largest_input = 1e120, largest = 1e60, largest_size = 1e10;
+/// A frequency is known to rounding: of a larger phase [rad] fewer than 4 digits would be left.
+constexpr double largest_phase = 1e12;
 
 [[noreturn]] void reject(const char* name, double value, const std::string& allowed) {
   throw std::invalid_argument(std::string("beam: ") + name + " = " + number(value) + " is not allowed; it must be " +
@@ -44,8 +46,7 @@ void validate(const Parameters& p) {
   if (unknowns > max_dense_unknowns && (p.n_modes == 0 || p.n_modes > most)) {
     reject("n_modes", p.n_modes,
            "between 1 and " + std::to_string(most) + " with " + mesh + " (all modes only up to " +
-               std::to_string(max_dense_unknowns) +
-               " unknowns); keep fewer n_modes, or use the integrator midpoint");
+               std::to_string(max_dense_unknowns) + " unknowns); keep fewer n_modes, or use the integrator midpoint");
   }
 }
 
@@ -57,7 +58,7 @@ void validate(const Parameters& p) {
     message += std::string(", ") + Loads::names[i] + " = " + number(f[0]) + " and its derivatives " + number(f[1]) +
                ", " + number(f[2]);
   });
-  throw std::domain_error(message + "; the state is unchanged, use a smaller step or smaller inputs");
+  throw std::overflow_error(message + "; the state is unchanged, use smaller inputs");
 }
 
 /// Those that a load of 1 N/m, 1 N or 1 m/s² (Loads::Shape) asks for: Q = ∫f ds, M = ∫(s − x) f ds over x … L. A point
@@ -99,22 +100,27 @@ double point_force_place(const Parameters& p, std::size_t shape) {
 
 std::unique_ptr<Beam> make_beam(const Parameters& parameters) {
   validate(parameters);
-  const auto mesh = std::make_shared<const Timoshenko>(parameters);
-  return parameters.integrator == Integrator::modal ? make_modal_beam(mesh, parameters)
-                                                    : make_midpoint_beam(mesh, parameters);
+  auto mesh = std::make_unique<const Timoshenko>(parameters);
+  return parameters.integrator == Integrator::modal ? make_modal_beam(*mesh, parameters)
+                                                    : make_midpoint_beam(std::move(mesh), parameters);
 }
 
-Beam::Beam(std::shared_ptr<const Discretisation> space, const Parameters& p)
+Beam::Beam(std::unique_ptr<const Discretisation> space, const Parameters& p)
     : alpha_b_(p.alpha_b),
       struck_(space->mass_solve(space->load(Loads::tip))),
-      motion_{p.initial_deflection_slope * space->linear_shape(), p.initial_velocity_slope * space->linear_shape()},
-      start_(motion_),
+      now_{p.initial_deflection_slope * space->linear_shape(), p.initial_velocity_slope * space->linear_shape(), {}},
+      start_(now_),
+      longest_step_(largest_size),
       space_(std::move(space)) {
   for (std::size_t i = 0; i < Loads::count; ++i) {
     const InternalForces forces = internal_forces(p, i);
     shear_.col(static_cast<Eigen::Index>(i)) = forces.shear;
     moment_.col(static_cast<Eigen::Index>(i)) = forces.moment;
   }
+}
+
+void Beam::limit_phase(double fastest) {
+  longest_step_ = largest_phase / std::max(fastest, largest_phase / largest_size);
 }
 
 void Beam::require_coefficients(std::initializer_list<double> values) {
@@ -124,24 +130,36 @@ void Beam::require_coefficients(std::initializer_list<double> values) {
 }
 
 void Beam::step(double size, const Polynomial& c, const Loads& loads) {
-  double inputs = 0.0;
-  for (const double value : c) inputs += std::abs(value);
-  loads.for_each([&inputs](std::size_t, const Polynomial& f) {
-    for (const double value : f) inputs += std::abs(value);
-  });
+  if (!(size <= longest_step_)) {
+    throw std::domain_error("beam: a step of " + number(size) + " s is too long: take at most " +
+                            number(longest_step_) + " s, in which no mode turns by more than " + number(largest_phase) +
+                            " rad");
+  }
+  bool small = true;
+  const auto look_at = [&small](const Polynomial& f) {
+    for (const double value : f) small = small && std::abs(value) < largest_input;
+  };
+  look_at(c);
+  loads.for_each([&look_at](std::size_t, const Polynomial& f) { look_at(f); });
+  if (!small) throw_too_large(size, c, loads);
+  move(size, c, loads);
+  // By the largest one first, as squares may overflow; of their sum, as that is what NaN shows in.
+  const auto in_range = [](const VectorXd& x) {
+    return x.lpNorm<Eigen::Infinity>() < largest && x.squaredNorm() < largest * largest;
+  };
+  if (in_range(now_.q) && in_range(now_.v)) return;
+  restore(start_);
+  throw_too_large(size, c, loads);
+}
+
+void Beam::move(double size, const Polynomial& c, const Loads& loads) {
   book();
-  const Scalars before = now_;
-  std::swap(motion_, start_);
+  std::swap(now_, start_);
+  now_.scalars = start_.scalars;
   advance(size, c, loads);
   booked_ = false;
-  now_.tip_force = value(c, size);
-  now_.loads = loads.at(size);
-  const double squares = motion_.q.squaredNorm() + motion_.v.squaredNorm();
-  if (squares < largest && inputs < largest && size < largest_size) return;
-  motion_ = start_;
-  now_ = before;
-  booked_ = true;
-  throw_too_large(size, c, loads);
+  now_.scalars.tip_force = value(c, size);
+  now_.scalars.loads = loads.at(size);
 }
 
 void Beam::book() const {
@@ -150,20 +168,20 @@ void Beam::book() const {
 }
 
 void Beam::apply_tip_impulse(double impulse) {
-  if (!(std::abs(impulse) < largest)) throw_too_large(0.0, {impulse, 0.0, 0.0}, {});
+  if (!(std::abs(impulse) < largest_input)) throw_too_large(0.0, {impulse, 0.0, 0.0}, {});
   book();
-  motion_.v += impulse * struck_;
+  now_.v += impulse * struck_;
 }
 
 void Beam::observe(double tip_force, const Loads& loads) {
-  now_.tip_force = tip_force;
-  now_.loads = loads.at(0.0);
+  now_.scalars.tip_force = tip_force;
+  now_.scalars.loads = loads.at(0.0);
 }
 
 void Beam::rest() {
   book();
-  motion_.q = space_->flexibility_times(force(now_.loads, now_.tip_force));
-  motion_.v.setZero();
+  now_.q = space_->flexibility_times(force(now_.scalars.loads, now_.scalars.tip_force));
+  now_.v.setZero();
 }
 
 VectorXd Beam::force(Loads::Values loads, double tip_force) const {
@@ -176,12 +194,16 @@ VectorXd Beam::force(Loads::Values loads, double tip_force) const {
 }
 
 VectorXd Beam::inertia_force() const {
-  return force(now_.loads, now_.tip_force) - space_->stiffness_times(motion_.q + alpha_b_ * motion_.v);
+  return force(now_.scalars.loads, now_.scalars.tip_force) - space_->stiffness_times(now_.q + alpha_b_ * now_.v);
 }
 
-double Beam::potential_loads(const VectorXd& x) const {
-  return now_.loads[Loads::distributed] * space_->load(Loads::distributed).dot(x) +
-         now_.loads[Loads::hat] * space_->load(Loads::hat).dot(x);
+double Beam::potential(const Loads::Values& loads, const VectorXd& x) const {
+  return -loads[Loads::distributed] * space_->load(Loads::distributed).dot(x) -
+         loads[Loads::hat] * space_->load(Loads::hat).dot(x);
+}
+
+double Beam::load_potential_rate(const Loads::Values& loads_rate) const {
+  return potential(now_.scalars.loads, now_.v) + potential(loads_rate, now_.q);
 }
 
 Beam::Response Beam::respond(const VectorXd& acceleration, Loads::Values loads, double tip_force) const {
@@ -191,10 +213,10 @@ Beam::Response Beam::respond(const VectorXd& acceleration, Loads::Values loads, 
   return {space_->tip(acceleration), {shear_ * values - inertia.shear, moment_ * values - inertia.moment}};
 }
 
-Beam::Response Beam::response() const { return respond(acceleration(), now_.loads, now_.tip_force); }
+Beam::Response Beam::response() const { return respond(acceleration(), now_.scalars.loads, now_.scalars.tip_force); }
 
 Beam::Response Beam::response_rate(const Loads::Values& loads, double tip_force) const {
-  const VectorXd rate = force(loads, tip_force) - space_->stiffness_times(motion_.v + alpha_b_ * acceleration());
+  const VectorXd rate = force(loads, tip_force) - space_->stiffness_times(now_.v + alpha_b_ * acceleration());
   return respond(space_->mass_solve(rate), loads, tip_force);
 }
 
@@ -207,31 +229,31 @@ Beam::Response Beam::response_per_load(std::size_t shape) const {
 /// Puts the state back.
 class Beam::Trial {
  public:
-  explicit Trial(Beam& beam) : beam_(beam) { beam_.save(state_); }
+  explicit Trial(Beam& beam) : beam_(beam), state_(beam.state()) {}
   Trial(const Trial&) = delete;
   Trial& operator=(const Trial&) = delete;
   ~Trial() { beam_.restore(state_); }
   /// At rest, under nothing.
-  void clear() { beam_.restore(std::vector<double>(state_.size(), 0.0)); }
+  void clear() { beam_.restore({Eigen::VectorXd::Zero(state_.q.size()), Eigen::VectorXd::Zero(state_.v.size()), {}}); }
 
  private:
   Beam& beam_;
-  std::vector<double> state_;
+  State state_;
 };
 
 Beam::Forecast Beam::forecast(double size) {
   const Trial trial(*this);
   const double u = tip_displacement(), v = tip_velocity();
   Loads loads;
-  for (std::size_t i = 0; i < Loads::count; ++i) loads.set(i, {now_.loads[i], 0.0, 0.0});
-  for (int i = 0; i < 2; ++i) step(size, {}, loads);
+  for (std::size_t i = 0; i < Loads::count; ++i) loads.set(i, {now_.scalars.loads[i], 0.0, 0.0});
+  for (int i = 0; i < 2; ++i) move(size, {}, loads);
   return {(tip_displacement() - u) / (2.0 * size), (tip_velocity() - v) / (2.0 * size)};
 }
 
 Beam::Forecast Beam::forecast_per_load(double size, std::size_t shape) {
   Trial trial(*this);
   trial.clear();
-  now_.loads[shape] = 1.0;
+  now_.scalars.loads[shape] = 1.0;
   return forecast(size);
 }
 
@@ -249,29 +271,9 @@ std::array<double, 3> Beam::tip_response(double size) {
   return response;
 }
 
-void Beam::save(std::vector<double>& state) const {
-  book();
-  state.resize(state_size());
-  double* end = state.data();
-  for (const VectorXd* x : {&motion_.q, &motion_.v}) end = std::copy_n(x->data(), x->size(), end);
-  std::memcpy(end, &now_, sizeof now_);
-}
-
-void Beam::restore(const std::vector<double>& state) {
-  if (state.size() != state_size())
-    throw std::invalid_argument("beam: a saved state of " + std::to_string(state.size()) +
-                                " numbers does not belong to this beam");
-  const double* begin = state.data();
-  for (VectorXd* x : {&motion_.q, &motion_.v}) {
-    *x = Eigen::Map<const VectorXd>(begin, x->size());
-    begin += x->size();
-  }
-  std::memcpy(&now_, begin, sizeof now_);
+void Beam::restore(const State& state) {
+  now_ = state;
   booked_ = true;
-}
-
-std::size_t Beam::state_size() const {
-  return static_cast<std::size_t>(2 * motion_.q.size()) + sizeof now_ / sizeof(double);
 }
 
 }  // namespace beam

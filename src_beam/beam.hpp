@@ -9,7 +9,6 @@
 #include <cstddef>
 #include <initializer_list>
 #include <memory>
-#include <vector>
 
 namespace beam {
 
@@ -48,8 +47,8 @@ struct Parameters {
   bool reduced_integration = false;                 ///< p-point Gauss rule for the shear; false = exact (59)
   MassMatrix mass_matrix = MassMatrix::consistent;  ///< see timoshenko.hpp
   Integrator integrator = Integrator::modal;
-  double initial_deflection_slope = 0.0;  ///< s in u⁰ = s·x [–]
-  double initial_velocity_slope = 0.0;    ///< s in u_t⁰ = s·x [1/s]
+  double initial_deflection_slope = 0.0;                           ///< s in u⁰ = s·x [–]
+  double initial_velocity_slope = 0.0;                             ///< s in u_t⁰ = s·x [1/s]
   std::array<double, 4> point_force_position{0.5, 0.5, 0.5, 0.5};  ///< x/L of the point forces
 };
 
@@ -154,7 +153,8 @@ class Beam {
   // Step sizes, forces and impulses are finite, sizes > 0: whoever takes them from outside has checked that.
 
   /// Advance by `size` [s] under the tip force C [N] and the loads.
-  /// @throws std::domain_error (state unchanged) if the result is not finite or too large
+  /// @throws std::domain_error (state unchanged) if the step is too long: a shorter one can be computed
+  /// @throws std::overflow_error (state unchanged) if the inputs or the result are too large
   void step(double size, const Polynomial& tip_force, const Loads& loads);
 
   /// Instantaneous upward impulse J [N·s] at the tip: v += M⁻¹ e J.
@@ -164,35 +164,34 @@ class Beam {
   /// Take C [N] and the loads' values as acting now, for tip_acceleration() and load_potential(), which otherwise refer
   /// to the end of the last step. The motion does not depend on it.
   void observe(double tip_force, const Loads& loads);
-  const Loads::Values& loads() const { return now_.loads; }  ///< acting now
-  double tip_force() const { return now_.tip_force; }        ///< likewise
+  double tip_force() const { return now_.scalars.tip_force; }  ///< that acts now
 
-  double tip_displacement() const { return space_->tip(motion_.q); }       ///< u(L) [m]
-  double tip_velocity() const { return space_->tip(motion_.v); }           ///< u_t(L) [m/s]
-  double tip_acceleration() const { return space_->tip(acceleration()); }  ///< u_tt(L) [m/s²]
-  double tip_rotation() const { return space_->tip_rotation(motion_.q); }  ///< θ(L) [rad]
-  double tip_displacement_integral() const { return now_.integral; }       ///< ∫ u dτ over the last step [m·s]
-  double tip_displacement_integral_2() const { return now_.integral_2; }   ///< ∫∫ u dτ dτ over it [m·s²]
-  double kinetic_energy() const { return 0.5 * space_->mass_norm2(motion_.v); }      ///< [J]
-  double strain_energy() const { return 0.5 * space_->stiffness_norm2(motion_.q); }  ///< [J]
-  double dissipated_energy() const { return book(), now_.dissipated; }               ///< by α_b since the start [J]
-  double load_work() const { return book(), now_.load_work; }  ///< of all loads since the start [J]
+  double tip_displacement() const { return space_->tip(now_.q); }             ///< u(L) [m]
+  double tip_velocity() const { return space_->tip(now_.v); }                 ///< u_t(L) [m/s]
+  double tip_acceleration() const { return space_->tip(acceleration()); }     ///< u_tt(L) [m/s²]
+  double tip_rotation() const { return space_->tip_rotation(now_.q); }        ///< θ(L) [rad]
+  double tip_displacement_integral() const { return now_.scalars.integral; }  ///< ∫ u dτ over the last step [m·s]
+  double tip_displacement_integral_2() const { return now_.scalars.integral_2; }  ///< ∫∫ u dτ dτ over it [m·s²]
+  double kinetic_energy() const { return 0.5 * space_->mass_norm2(now_.v); }      ///< [J]
+  double strain_energy() const { return 0.5 * space_->stiffness_norm2(now_.q); }  ///< [J]
+  double dissipated_energy() const { return book(), now_.scalars.dissipated; }    ///< by α_b since the start [J]
+  double load_work() const { return book(), now_.scalars.load_work; }             ///< of all loads since the start [J]
   double load_potential() const {
-    return -potential_loads(motion_.q);
+    return potential(now_.scalars.loads, now_.q);
   }  ///< −qᵀF [J] of the uniform and the hat load, as if they were constant
   double load_work_per_unit(std::size_t shape) const {
-    return space_->load(shape).dot(motion_.q);
+    return space_->load(shape).dot(now_.q);
   }  ///< qᵀF of a unit of a load, as ∫ u dx [m²]
   // Their rates, under what acts now.
-  double tip_rotation_rate() const { return space_->tip_rotation(motion_.v); }               ///< [rad/s]
-  double kinetic_power() const { return motion_.v.dot(inertia_force()); }                    ///< [W]
-  double strain_power() const { return motion_.v.dot(space_->stiffness_times(motion_.q)); }  ///< [W]
-  double dissipated_power() const { return alpha_b_ * space_->stiffness_norm2(motion_.v); }  ///< [W]
-  double load_power() const { return force(now_.loads).dot(motion_.v); }                     ///< of all loads [W]
-  double load_potential_rate() const { return -potential_loads(motion_.v); }                 ///< [W]
-  double tip_mass() const { return 1.0 / space_->tip(struck_); }                             ///< 1/(eᵀ M⁻¹ e) [kg]
-  Shape deflection() const { return space_->deflection(motion_.q); }                         ///< [m]
-  Shape rotation() const { return space_->rotation(motion_.q); }                             ///< [rad]
+  double tip_rotation_rate() const { return space_->tip_rotation(now_.v); }               ///< [rad/s]
+  double kinetic_power() const { return now_.v.dot(inertia_force()); }                    ///< [W]
+  double strain_power() const { return now_.v.dot(space_->stiffness_times(now_.q)); }     ///< [W]
+  double dissipated_power() const { return alpha_b_ * space_->stiffness_norm2(now_.v); }  ///< [W]
+  double load_power() const { return force(now_.scalars.loads).dot(now_.v); }             ///< of all loads [W]
+  double load_potential_rate(const Loads::Values& loads_rate) const;                      ///< [W]
+  double tip_mass() const { return 1.0 / space_->tip(struck_); }                          ///< 1/(eᵀ M⁻¹ e) [kg]
+  Shape deflection() const { return space_->deflection(now_.q); }                         ///< [m]
+  Shape rotation() const { return space_->rotation(now_.q); }                             ///< [rad]
 
   /// What follows the forces that act now without delay. Internal forces are those that equilibrium asks for, of C, the
   /// loads and the inertia between a point and the tip: there M = 0 and Q = C + the tip load, and the clamp's reaction,
@@ -212,11 +211,10 @@ class Beam {
 
   /// How the tip goes on over two steps of `size` [s] without a tip force.
   struct Forecast {
-    double velocity;      ///< w = [u(t + 2·size) − u(t)]/(2·size) [m/s]
-    double acceleration;  ///< its rate without a tip force, [u_t(t + 2·size) − u_t(t)]/(2·size) [m/s²]
+    double velocity = 0.0;      ///< w = [u(t + 2·size) − u(t)]/(2·size) [m/s]
+    double acceleration = 0.0;  ///< its rate without a tip force, [u_t(t + 2·size) − u_t(t)]/(2·size) [m/s²]
   };
   /// Under the loads that act now, by two trial steps, which leave no trace.
-  /// @throws as step()
   Forecast forecast(double size);
   /// What a load adds to the forecast per unit, which is linear in it.
   Forecast forecast_per_load(double size, std::size_t shape);
@@ -225,30 +223,30 @@ class Beam {
   /// force [m/N]. As the beam is linear, forces C₁, C₂ over the next two steps lead to
   ///     u(t + 2·size) = u(t) + 2·size·w + C₁ r[1] + C₂ r[0].
   /// r[2]: what a tip impulse of 1 N·s adds to w [1/kg].
-  /// @throws as forecast()
+  /// @throws as step()
   std::array<double, 3> tip_response(double size);
 
-  /// The whole dynamic state as a flat vector of fixed length (for one parameter set).
-  void save(std::vector<double>& state) const;
-  /// A state that a beam with the same parameters has saved. @throws std::invalid_argument if its length does not fit
-  void restore(const std::vector<double>& state);
+  /// The whole dynamic state.
+  struct State {
+    Eigen::VectorXd q, v;
+    struct Scalars {
+      double integral = 0.0, integral_2 = 0.0, dissipated = 0.0, load_work = 0.0;
+      double tip_force = 0.0;  ///< C [N] and the loads at the end of the last step, or as observed since
+      Loads::Values loads{};
+    } scalars;
+  };
+  const State& state() const { return book(), now_; }
+  /// @pre the state is of a beam with the same parameters
+  void restore(const State& state);
 
  protected:
-  Beam(std::shared_ptr<const Discretisation> space, const Parameters& parameters);
+  Beam(std::unique_ptr<const Discretisation> space, const Parameters& parameters);
+  /// Refuse steps in which a mode of this frequency [rad/s] turns so far that rounding leaves nothing of its phase.
+  void limit_phase(double fastest);
   /// @throws std::invalid_argument if one of these is so large that outputs could overflow
   static void require_coefficients(std::initializer_list<double> values);
 
-  struct Motion {
-    Eigen::VectorXd q, v;
-  };
-  /// Beside the motion, what a state has.
-  struct Scalars {
-    double integral, integral_2, dissipated, load_work;
-    double tip_force;  // C [N] and the loads at the end of the last step, or as observed since
-    Loads::Values loads;
-  };
-
-  /// Makes `motion_` of `start_` and changes `now_`, but for its forces and, if book_step() does it, work.
+  /// Makes `now_` of `start_`, but for its forces and, if book_step() does it, work.
   virtual void advance(double size, const Polynomial& tip_force, const Loads& loads) = 0;
   /// Adds to `now_` what the last step dissipated and its loads did. Called when that is asked for or a step follows: a
   /// step that is tried and taken back, as event location does with ever new sizes, never pays for it.
@@ -258,19 +256,20 @@ class Beam {
 
   double alpha_b_;          // [s]
   Eigen::VectorXd struck_;  // M⁻¹e, the velocity that a unit impulse leaves
-  Motion motion_, start_;   // now, and at the start of the last step
-  mutable Scalars now_{};
+  mutable State now_;       // with the work of the last step if that is booked
+  State start_;             // at the start of the last step
 
  private:
   class Trial;
   void book() const;
-  std::size_t state_size() const;
+  void move(double size, const Polynomial& tip_force, const Loads& loads);  ///< a step that checks nothing
   Eigen::VectorXd inertia_force() const;  ///< M q̈ under what acts now: all forces that stiffness and damping leave
   Eigen::VectorXd acceleration() const { return space_->mass_solve(inertia_force()); }
-  double potential_loads(const Eigen::VectorXd& x) const;
+  double potential(const Loads::Values& loads, const Eigen::VectorXd& x) const;
   Response respond(const Eigen::VectorXd& acceleration, Loads::Values loads, double tip_force) const;
 
-  std::shared_ptr<const Discretisation> space_;
+  double longest_step_;  // [s]
+  std::unique_ptr<const Discretisation> space_;
   Eigen::Matrix<double, shape_points, Loads::count> shear_, moment_;  // internal forces of each load
   mutable bool booked_ = true;                                        // whether `now_` has the work of the last step
 };

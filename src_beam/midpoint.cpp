@@ -1,5 +1,7 @@
 #include "midpoint.hpp"
 
+#include <utility>
+
 #include "step_cache.hpp"
 
 namespace beam {
@@ -15,8 +17,9 @@ struct StepMatrix {
 
 class MidpointBeam final : public Beam {
  public:
-  MidpointBeam(const std::shared_ptr<const Timoshenko>& mesh, const Parameters& p)
-      : Beam(mesh, p), mesh_(*mesh), rhs_(mesh->size()) {
+  /// `mesh` is that of `owned`.
+  MidpointBeam(const Timoshenko& mesh, std::unique_ptr<const Timoshenko> owned, const Parameters& p)
+      : Beam(std::move(owned), p), mesh_(mesh), rhs_(mesh.size()) {
     const auto most = [](const Eigen::MatrixXd& values) { return values.lpNorm<Eigen::Infinity>(); };
     const double mu = p.density * p.area;
     require_coefficients({most(mesh_.element(1.0, 1.0)), most(mesh_.load(Loads::distributed)), most(struck_), mu,
@@ -28,13 +31,13 @@ class MidpointBeam final : public Beam {
     Loads::Values means{};
     loads.for_each([&](std::size_t i, const Polynomial& f) { means[i] = mean(f, h); });
     w_ = mean_velocity(h, mean(c, h), means);
-    motion_.q = start_.q + h * w_;
-    motion_.v = 2.0 * w_ - start_.v;
-    if (alpha_b_ > 0.0) now_.dissipated += h * alpha_b_ * mesh_.stiffness_norm2(w_);
-    if (loads.any()) now_.load_work += force(means).dot(motion_.q - start_.q);
+    now_.q = start_.q + h * w_;
+    now_.v = 2.0 * w_ - start_.v;
+    if (alpha_b_ > 0.0) now_.scalars.dissipated += h * alpha_b_ * mesh_.stiffness_norm2(w_);
+    if (loads.any()) now_.scalars.load_work += force(means).dot(now_.q - start_.q);
     const double u0 = mesh_.tip(start_.q), u1 = tip_displacement();
-    now_.integral = 0.5 * h * (u0 + u1);
-    now_.integral_2 = h * h * (2.0 * u0 + u1) / 6.0;
+    now_.scalars.integral = 0.5 * h * (u0 + u1);
+    now_.scalars.integral_2 = h * h * (2.0 * u0 + u1) / 6.0;
   }
 
   VectorXd mean_velocity(double h, double tip_force, const Loads::Values& loads) {
@@ -43,8 +46,8 @@ class MidpointBeam final : public Beam {
       matrix.factors = mesh_.factors(1.0, matrix.k);
     });
     // w without tip force, in which it is linear: a coupling that repeats a step from one state with other forces
-    // solves once. What `motion_` still holds is the state that the last step began with.
-    if (h != free_size_ || loads != free_loads_ || start_.q != motion_.q || start_.v != motion_.v) {
+    // solves once. What `now_` still holds is the state that the last step began with.
+    if (h != free_size_ || loads != free_loads_ || start_.q != now_.q || start_.v != now_.v) {
       rhs_ = 0.5 * h * force(loads);
       mesh_.add_products(1.0, start_.v, -0.5 * h, start_.q, rhs_);
       solve(S, free_);
@@ -77,8 +80,9 @@ class MidpointBeam final : public Beam {
 
 }  // namespace
 
-std::unique_ptr<Beam> make_midpoint_beam(const std::shared_ptr<const Timoshenko>& mesh, const Parameters& parameters) {
-  return std::make_unique<MidpointBeam>(mesh, parameters);
+std::unique_ptr<Beam> make_midpoint_beam(std::unique_ptr<const Timoshenko> mesh, const Parameters& parameters) {
+  const Timoshenko& numerics = *mesh;
+  return std::make_unique<MidpointBeam>(numerics, std::move(mesh), parameters);
 }
 
 }  // namespace beam

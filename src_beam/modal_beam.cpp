@@ -33,9 +33,10 @@ double dot(const Polynomial& a, const Polynomial& b) { return a[0] * b[0] + a[1]
 
 class ModalBeam final : public Beam {
  public:
-  ModalBeam(const std::shared_ptr<const Modes>& modes, const Parameters& p)
-      : Beam(modes, p),
-        modes_(*modes),
+  /// `modes` are those of `owned`.
+  ModalBeam(const Modes& modes, std::unique_ptr<const Modes> owned, const Parameters& p)
+      : Beam(std::move(owned), p),
+        modes_(modes),
         tip_(modes_.load(Loads::tip)),
         omega2_(modes_.omega.array().square()),
         damping_(p.alpha_b * omega2_),
@@ -46,12 +47,14 @@ class ModalBeam final : public Beam {
     for (const Eigen::VectorXd& load : modes_.loads) bound(load);
     for (const Eigen::MatrixXd* rows : {&modes_.deflections, &modes_.rotations, &modes_.shears, &modes_.moments})
       bound(*rows);
+    // What is overdamped has no phase.
+    limit_phase((damping_ < 2.0 * modes_.omega.array()).select(modes_.omega.array(), 0.0).maxCoeff());
   }
 
  private:
   void advance(double size, const Polynomial& c, const Loads& loads) override {
     const auto eta = start_.q.array(), v = start_.v.array();
-    auto eta_next = motion_.q.array(), v_next = motion_.v.array();
+    auto eta_next = now_.q.array(), v_next = now_.v.array();
     const Coefficients& k = coefficients(size);
     unbooked_ = {size, c[1] != 0.0 || c[2] != 0.0, loads.any(), false};
     force_[0] = c[0] * tip_;
@@ -94,8 +97,8 @@ class ModalBeam final : public Beam {
       }
       return sum;
     };
-    now_.integral = integral(0);
-    now_.integral_2 = integral(1);
+    now_.scalars.integral = integral(0);
+    now_.scalars.integral_2 = integral(1);
   }
 
   void make_coefficients(double h, Coefficients& k) const {
@@ -133,8 +136,8 @@ class ModalBeam final : public Beam {
   }
 
   void book_step() const override {
-    if (damped_) now_.dissipated += loss();
-    if (unbooked_.loaded) now_.load_work += work();
+    if (damped_) now_.scalars.dissipated += loss();
+    if (unbooked_.loaded) now_.scalars.load_work += work();
   }
 
   double loss() const {
@@ -153,7 +156,7 @@ class ModalBeam final : public Beam {
 
   double work() const {
     const double h = unbooked_.size;
-    const auto rise = (motion_.q - start_.q).array();
+    const auto rise = (now_.q - start_.q).array();
     double sum = (load_[0] * rise).sum();
     if (unbooked_.load_varies) {
       const auto v = start_.v.array();
@@ -188,9 +191,10 @@ class ModalBeam final : public Beam {
 
 }  // namespace
 
-std::unique_ptr<Beam> make_modal_beam(const std::shared_ptr<const Timoshenko>& mesh, const Parameters& parameters) {
-  return std::make_unique<ModalBeam>(std::make_shared<const Modes>(compute_modes(*mesh, parameters.n_modes)),
-                                     parameters);
+std::unique_ptr<Beam> make_modal_beam(const Timoshenko& mesh, const Parameters& parameters) {
+  auto modes = std::make_unique<const Modes>(compute_modes(mesh, parameters.n_modes));
+  const Modes& numerics = *modes;
+  return std::make_unique<ModalBeam>(numerics, std::move(modes), parameters);
 }
 
 }  // namespace beam

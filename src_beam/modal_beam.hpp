@@ -15,6 +15,6 @@
 namespace beam {
 
 /// @throws std::runtime_error if the modes cannot be computed
-std::unique_ptr<Beam> make_modal_beam(const std::shared_ptr<const Timoshenko>& mesh, const Parameters& parameters);
+std::unique_ptr<Beam> make_modal_beam(const Timoshenko& mesh, const Parameters& parameters);
 
 }  // namespace beam

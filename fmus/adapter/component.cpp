@@ -45,17 +45,25 @@ void Component::set_debugging(bool on, std::size_t n, const char* const categori
 }
 
 void Component::start() {
-  instance.ensure_built();
+  instance.start();
   enter(event_mode_used ? event_mode : step_complete, "initialized");
 }
 
 void Component::reset() {
   instance.reset();
+  terminated = false;
   tell(Status::ok, "reset");
 }
 
 Model::Reached Component::step(double time, double size, bool to_event) {
-  const Model::Reached reached = instance.step(time, size, to_event);
+  terminated = false;
+  Model::Reached reached{};
+  try {
+    reached = instance.step(time, size, to_event);
+  } catch (const Discarded& e) {
+    terminated = e.remedy == Discarded::Remedy::none;
+    throw;
+  }
   const std::string warning = instance.take_warning();
   if (!warning.empty()) tell(Status::warning, warning);
   return reached;
@@ -86,6 +94,14 @@ void Component::get_state(void** state) {
   } else {
     *state = keep(std::exchange(spare_, {}));
   }
+}
+
+void Component::set_state(void* state) {
+  instance.restore(found(state));
+  terminated = false;
+  // A state of an instance that has an event mode: here updates follow from steps.
+  Phase& phase = instance.progress.phase;
+  if (phase == event_mode && !event_mode_used) phase = step_complete;
 }
 
 void Component::free_state(void** state) {

@@ -48,6 +48,7 @@ class Component {
   Instance instance;
   bool event_mode_used = false, early_return_allowed = false;  ///< what the importer can do (FMI 3.0)
   const char* function = "";                                   ///< of FMI, that is being called
+  bool terminated = false;                                     ///< no step of any size can follow the last one
 
   /// Sends a message. Events, with Status::ok, are sent if debugging is on for them; the rest always, with the
   /// function's name. After an error the instance is in the phase `error`.
@@ -66,7 +67,7 @@ class Component {
 
   /// Into the state that `*state` names, or a new one if it is NULL.
   void get_state(void** state);
-  void set_state(void* state) { instance.restore(found(state)); }
+  void set_state(void* state);
   void free_state(void** state);
   void state_size(void* state, std::size_t* size);
   void serialize(void* state, void* bytes, std::size_t size);

@@ -155,9 +155,9 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind, fmi2Integ
   return get_status(c, __func__, false, value, [](const Component&) { return 0; });
 }
 
-// The slave never ends a simulation by itself.
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean* value) {
-  return get_status(c, __func__, s == fmi2Terminated, value, [](const Component&) { return fmi2False; });
+  return get_status(c, __func__, s == fmi2Terminated, value,
+                    [](const Component& k) { return k.terminated ? fmi2True : fmi2False; });
 }
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind, fmi2String* value) {

@@ -172,7 +172,14 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint, fmi
                        {lastSuccessfulTime, "lastSuccessfulTime"}});
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = k.instance.progress.time;
-    const auto [size, event] = k.step(currentCommunicationPoint, communicationStepSize, k.early_return_allowed);
+    Model::Reached reached{};
+    try {
+      reached = k.step(currentCommunicationPoint, communicationStepSize, k.early_return_allowed);
+    } catch (const Discarded&) {
+      *terminateSimulation = k.terminated;
+      throw;
+    }
+    const auto [size, event] = reached;
     *lastSuccessfulTime = k.instance.progress.time;
     *earlyReturn = size != communicationStepSize;
     *eventHandlingNeeded = event && k.event_mode_used;

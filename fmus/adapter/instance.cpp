@@ -5,6 +5,7 @@
 #include <cstring>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "references3.hpp"
 #include "text.hpp"
@@ -51,9 +52,10 @@ Instance::Instance() : table_(table()), place_(table_.variables.size()) {
 void Instance::reset() {
   model_ = make_model();
   progress = {};
-  built_ = false;
+  built_ = dirty_ = inputs_set_ = false;
+  refused_.reset();
   values_.clear();
-  for (const Variable* v : settable_) values_.push_back({v->start, unset, unset});
+  for (const Variable* v : settable_) values_.push_back({v->start, 0.0, 0.0});
 }
 
 void Instance::setup(double start, double stop, double tolerance) {
@@ -70,18 +72,38 @@ void Instance::ensure_built() {
   if (built_) return;
   for (std::size_t i = 0; i < n_settings_; ++i) settable_[i]->set(*model_, values_[i]);
   model_->build(progress.tolerance);
+  model_->evaluate(Model::Acting::as_stepped);
   for (const Variable& v : table_.variables)
     if (v.get) finite(v, v.get(*model_), ": the parameters leave the range of floating-point numbers");
   built_ = true;
   for (std::size_t i = n_settings_; i < settable_.size(); ++i) settable_[i]->set(*model_, values_[i]);
-  observe();
+  dirty_ = inputs_set_ = true;
+}
+
+void Instance::evaluate() {
+  ensure_built();
+  if (!std::exchange(dirty_, false)) return;
+  using Acting = Model::Acting;
+  const bool starting = (progress.phase & (instantiated | initialization)) != 0;
+  model_->evaluate(starting ? Acting::at_start : inputs_set_ ? Acting::as_set : Acting::as_stepped);
+}
+
+void Instance::start() {
+  evaluate();
+  dirty_ = true;  // inputs are no start values any longer
+  inputs_set_ = false;
+}
+
+double Instance::evaluated(const Variable& output) {
+  evaluate();
+  return output.get(*model_);
 }
 
 void Instance::changed(std::size_t place) {
   if (place < n_settings_) built_ = false;
   if (!built_) return;
   settable_[place]->set(*model_, values_[place]);
-  observe();
+  dirty_ = inputs_set_ = true;
 }
 
 const Variable& Instance::variable(unsigned reference, Type type, const char* what) const {
@@ -103,8 +125,7 @@ double Instance::get(unsigned reference, Type type) {
   if (progress.phase == instantiated) {
     throw std::invalid_argument("'" + v.name + "' is not known before initialization mode");
   }
-  ensure_built();
-  return finite(v, v.get(*model_), too_large);
+  return finite(v, evaluated(v), too_large);
 }
 
 const Variable& Instance::continuous_input(unsigned reference, const char* what) const {
@@ -135,8 +156,7 @@ void Instance::set_derivative(unsigned reference, int order, double value) {
 
 double Instance::input_derivative(unsigned reference, int order) const {
   continuous_input(reference, "get a derivative of");
-  const double value = values_[place_[reference]].at(static_cast<std::size_t>(order));
-  return std::isnan(value) ? 0.0 : value;
+  return values_[place_[reference]].at(static_cast<std::size_t>(order));
 }
 
 double Instance::output_derivative(unsigned reference, int order) {
@@ -146,7 +166,7 @@ double Instance::output_derivative(unsigned reference, int order) {
     throw std::invalid_argument("derivative of order " + std::to_string(order) + " of '" + v.name +
                                 "' is not available: outputs have that of order 1");
   }
-  ensure_built();
+  evaluate();
   return finite(v, v.derivative(*model_), too_large);
 }
 
@@ -158,7 +178,7 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
   const bool starting = progress.phase == initialization;
   if (!by.continuous_input() && !(is_setting(by) && starting && order == 0))
     throw std::invalid_argument("'" + by.name + "' is not a continuous input");
-  ensure_built();
+  evaluate();
   for (const Dependency& d : of.dependencies) {
     if (d.input != by.name || d.order != order) continue;
     const double partial = d.partial(*model_);
@@ -174,17 +194,16 @@ double Instance::difference(const Variable& of, unsigned known) {
   const Variable& by = table_.variables[known];
   const std::size_t place = place_[known];
   const double x = values_[place][0], change = 1e-6 * (x != 0.0 ? std::abs(x) : by.nominal);
-  const std::pair here{x, of.get(*model_)};
+  const std::pair here{x, evaluated(of)};
   const auto put = [&](double value) {
     values_[place][0] = value;
     changed(place);
-    ensure_built();
   };
   const auto beside = [&](double value) {
     try {
       require_allowed(by, value);
       put(value);
-      return std::pair{value, of.get(*model_)};
+      return std::pair{value, evaluated(of)};
     } catch (const std::invalid_argument&) {
       return here;  // that side is out of bounds, its own or those that other parameters set
     }
@@ -211,39 +230,46 @@ Model::Reached Instance::step(double time, double size, bool to_event) {
     throw std::invalid_argument("a step from " + number(time) + " to " + number(time + size) +
                                 " goes past the stop time " + number(progress.stop_time));
   }
-  ensure_built();
+  evaluate();
   Model::Reached reached{};
   try {
     reached = model_->step(time, size, to_event);
-  } catch (const Discarded&) {
+  } catch (const Discarded& e) {
     ++model_->refused;
-    throw;
+    // The same step under the same inputs ends in the same failure.
+    const bool again = refused_ && refused_->time == time && refused_->size == size && refused_->values == values_;
+    refused_ = Refused{time, size, values_};
+    throw Discarded(e.what(), again ? Discarded::Remedy::none : e.remedy);
   }
-  settle(true);
+  refused_.reset();
+  drop_used(true);
   progress.time = time + reached.size;
   return reached;
 }
 
 void Instance::update() {
-  ensure_built();
+  evaluate();
   model_->update(progress.time);
-  settle(false);
+  drop_used(false);
 }
 
 /// Impulses have acted; after a step derivatives have, too.
-void Instance::settle(bool stepped) {
+void Instance::drop_used(bool stepped) {
   for (std::size_t i = n_settings_; i < settable_.size(); ++i) {
     const bool consumed = settable_[i]->consumed;
     const Polynomial past = values_[i];
-    const bool sloped = stepped && !(std::isnan(past[1]) && std::isnan(past[2]));
+    const bool sloped = stepped && (past[1] != 0.0 || past[2] != 0.0);
     if (!(consumed && past[0] != 0.0) && !sloped) continue;
-    values_[i] = {consumed ? 0.0 : past[0], unset, unset};
+    values_[i] = {consumed ? 0.0 : past[0], 0.0, 0.0};
     settable_[i]->set(*model_, values_[i]);
   }
   if (stepped) model_->settle();
+  dirty_ = true;
+  inputs_set_ = inputs_set_ && !stepped;
 }
 
-void Instance::save(Snapshot& s) const {
+void Instance::save(Snapshot& s) {
+  if (built_) evaluate();
   s.progress = progress;
   s.values = values_;
   s.numerics.clear();
@@ -251,11 +277,12 @@ void Instance::save(Snapshot& s) const {
 }
 
 void Instance::restore(const Snapshot& s) {
+  refused_.reset();
   built_ = built_ && !s.numerics.empty() && progress.tolerance == s.progress.tolerance;
   progress.tolerance = s.progress.tolerance;
   for (std::size_t i = 0; i < settable_.size(); ++i) {
     const void *const now = &values_[i], *const then = &s.values[i];
-    if (std::memcmp(now, then, sizeof(Polynomial)) == 0) continue;  // by their bits: NaN too
+    if (std::memcmp(now, then, sizeof(Polynomial)) == 0) continue;  // by their bits: −0 too
     values_[i] = s.values[i];
     built_ = built_ && i >= n_settings_;
     if (built_) settable_[i]->set(*model_, values_[i]);
@@ -263,6 +290,8 @@ void Instance::restore(const Snapshot& s) {
   if (!s.numerics.empty()) {
     ensure_built();
     model_->restore(s.numerics);
+    dirty_ = true;
+    inputs_set_ = false;
   }
   progress = s.progress;
 }

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +23,8 @@ class Instance {
   void setup(double start, double stop, double tolerance);
   /// Parameters that do not go together are found here.
   void ensure_built();
+  /// Called at the end of initialization mode.
+  void start();
   void reset();
 
   // What the importer asks for wrongly throws std::invalid_argument, also an output that the inputs which were set
@@ -43,7 +46,7 @@ class Instance {
   std::string take_warning() { return std::exchange(model_->warning, {}); }
 
   /// Into a snapshot that may hold an earlier state: its memory is used again.
-  void save(Snapshot& snapshot) const;
+  void save(Snapshot& snapshot);
   void restore(const Snapshot& snapshot);
 
   std::size_t n_values() const { return values_.size(); }
@@ -51,18 +54,27 @@ class Instance {
  private:
   const Variable& variable(unsigned reference, Type type, const char* what) const;
   const Variable& continuous_input(unsigned reference, const char* what) const;
-  void observe() { model_->observe((progress.phase & (instantiated | initialization)) != 0); }
-  void settle(bool stepped);
+  /// Brings the model up to date with all that was set, stepped or restored.
+  void evaluate();
+  double evaluated(const Variable& output);
+  void drop_used(bool stepped);
   double difference(const Variable& of, unsigned known);  ///< the derivative by differences
   void changed(std::size_t place);                        ///< by the importer
 
   const Table& table_;
   std::unique_ptr<Model> model_;
   bool built_ = false;                     ///< it is, with the present settings
+  bool dirty_ = false;                     ///< the model is not evaluated
+  bool inputs_set_ = false;                ///< since the last step
   std::vector<const Variable*> settable_;  ///< what is set before the start, then the inputs
   std::size_t n_settings_ = 0;             ///< the former
   std::vector<std::size_t> place_;         ///< of every variable, among these
   std::vector<Polynomial> values_;         ///< of these
+  struct Refused {
+    double time, size;
+    std::vector<Polynomial> values;
+  };
+  std::optional<Refused> refused_;  ///< the last step, if it was
 };
 
 }  // namespace fmi

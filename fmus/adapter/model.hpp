@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -12,15 +11,20 @@ namespace fmi {
 
 /// A quantity that is quadratic in time over a step: its value and its first two time derivatives at the start.
 using Polynomial = std::array<double, 3>;
-/// In place of a derivative that the importer has not set.
-inline constexpr double unset = std::numeric_limits<double>::quiet_NaN();
 
 /// What was asked for cannot be had, and nothing has changed: becomes fmi2Discard or fmi3Discard, after which the
 /// instance goes on. So FMI 3.0 has it; an importer that follows FMI 2.0 restores a state before it repeats a step,
 /// which does no harm.
 class Discarded : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  /// Whether a step of another size may do. Where none does, importers are told to end the simulation: they would ask
+  /// again and again. Those that know better change inputs or restore a state.
+  enum class Remedy { other_size, none };
+
+  explicit Discarded(const std::string& what, Remedy remedy = Remedy::other_size)
+      : std::runtime_error(what), remedy(remedy) {}
+
+  const Remedy remedy;
 };
 
 class Model {
@@ -32,9 +36,11 @@ class Model {
   /// @throws std::exception naming the parameter
   virtual void build(double tolerance) = 0;
 
-  /// Called after build() and whenever an input was set: outputs that follow inputs without a step are due. `initial`:
-  /// inputs are still start values.
-  virtual void observe(bool initial) = 0;
+  /// What outputs refer to: inputs as set at the start, where they are start values; inputs as set since the last step;
+  /// what the last step ended with, as no input has been set since.
+  enum class Acting { at_start, as_set, as_stepped };
+  /// Called before anything is read, saved or stepped, once for all that has been set, stepped or restored before.
+  virtual void evaluate(Acting acting) = 0;
 
   /// How far a step came [s], and whether something happens there.
   struct Reached {

@@ -126,16 +126,11 @@ class TableBuilder {
     return v;
   }
 
-  /// An input that is a polynomial over the step, handed to `set(model, polynomial)` with 0 for derivatives that are
-  /// unset.
+  /// An input that is a polynomial over the step, handed to `set(model, polynomial)`.
   template <class Set>
   Variable& input(const std::string& name, const std::string& unit, const std::string& description, Set set) {
     Variable& v = add(name, unit, description, Causality::input);
-    v.set = [set](Model& m, Polynomial value) {
-      for (double& derivative : value)
-        if (std::isnan(derivative)) derivative = 0.0;
-      set(static_cast<M&>(m), value);
-    };
+    v.set = [set](Model& m, const Polynomial& value) { set(static_cast<M&>(m), value); };
     return v;
   }
   Variable& input(const std::string& name, const std::string& unit, const std::string& description,

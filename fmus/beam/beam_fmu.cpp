@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "../../src_beam/beam.hpp"
+#include "../adapter/flat.hpp"
 #include "../adapter/table.hpp"
 
 namespace {
@@ -35,60 +36,52 @@ struct BeamModel final : fmi::Model {
   Loads loads;
   double tip_impulse = 0.0;
   std::unique_ptr<Beam> beam;
-  /// With communication_step > 0, otherwise 0. A forecast that leaves the range of numbers is not finite.
-  Beam::Forecast forecast{};
-  std::array<double, 3> tip_response{};
+  std::array<double, 3> tip_response{};  ///< with communication_step > 0, otherwise 0
+  bool resting = false;                  ///< at the start, where that is a state of rest
 
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override {
     beam = beam::make_beam(parameters);
     loads.set(Loads::hat, {parameters.tip_load_coefficient, 0.0, 0.0});
     set_distributed({});
-    forecast = {};
     tip_response = {};
-    if (forecasts()) tip_response = beam->tip_response(parameters.communication_step);
-    forget_instant();
-    look_ahead();
+    if (foresees()) tip_response = beam->tip_response(parameters.communication_step);
   }
 
-  void observe(bool initial) override {
-    const Loads::Values before = forecasts() ? beam->loads() : Loads::Values{};
-    beam->observe(tip_force[0], loads);
-    resting = initial && parameters.initial_state == InitialState::at_rest;
+  void evaluate(Acting acting) override {
+    derived_ = {};
+    resting = acting == Acting::at_start && parameters.initial_state == InitialState::at_rest;
+    if (acting != Acting::as_stepped) beam->observe(tip_force[0], loads);
     if (resting) beam->rest();
-    forget_instant();
-    if (forecasts() && (resting || beam->loads() != before)) look_ahead();
   }
 
   Reached step(double, double size, bool) override {
-    std::vector<double> before;
-    if (tip_impulse != 0.0 || forecasts()) beam->save(before);
+    std::optional<Beam::State> before;
+    if (tip_impulse != 0.0) before = beam->state();
     try {
       if (tip_impulse != 0.0) beam->apply_tip_impulse(tip_impulse);
       beam->step(size, tip_force, loads);
-      foresee();
-    } catch (const std::domain_error& e) {
-      if (!before.empty()) restore(before);
-      throw fmi::Discarded(e.what());
+    } catch (const std::exception& e) {
+      using Remedy = fmi::Discarded::Remedy;
+      if (before) beam->restore(*before);
+      const bool too_long = dynamic_cast<const std::domain_error*>(&e) != nullptr;
+      throw fmi::Discarded(e.what(), too_long ? Remedy::other_size : Remedy::none);
     }
-    resting = false;
-    forget_instant();
     return {size, false};
   }
 
   void update(double) override {
-    if (tip_impulse == 0.0) return;
-    beam->apply_tip_impulse(tip_impulse);
-    resting = false;
-    forget_instant();
-    look_ahead();
+    if (tip_impulse != 0.0) beam->apply_tip_impulse(tip_impulse);
   }
 
-  void save(std::vector<double>& state) const override { beam->save(state); }
+  void save(std::vector<double>& state) const override {
+    const Beam::State& now = beam->state();
+    fmi::flatten(state, now.q, now.v, now.scalars);
+  }
   void restore(const std::vector<double>& state) override {
-    beam->restore(state);
-    forget_instant();
-    look_ahead();
+    Beam::State then = beam->state();
+    fmi::restore(state, then.q, then.v, then.scalars);
+    beam->restore(then);
   }
 
   void set_distributed(fmi::Polynomial value) {
@@ -101,19 +94,16 @@ struct BeamModel final : fmi::Model {
     beam::Shape deflection, rotation;
   };
   const Line& line() const {
-    if (!line_) line_ = Line{beam->deflection(), beam->rotation()};
-    return *line_;
+    if (!derived_.line) derived_.line = Line{beam->deflection(), beam->rotation()};
+    return *derived_.line;
   }
   /// What follows forces without delay. A tool that asks for it after each step does not pay for the shape.
   const Beam::Response& response() const {
-    if (!response_) response_ = beam->response();
-    return *response_;
+    if (!derived_.response) derived_.response = beam->response();
+    return *derived_.response;
   }
-  Beam::Response response_rate() const {
-    Loads::Values rates{};
-    loads.for_each([&](std::size_t i, const fmi::Polynomial& f) { rates[i] = f[1]; });
-    return beam->response_rate(rates, tip_force[1]);
-  }
+  Beam::Response response_rate() const { return beam->response_rate(load_rates(), tip_force[1]); }
+  double load_potential_rate() const { return beam->load_potential_rate(load_rates()); }
   /// Of `forces`, at the point where the bending moment is largest now.
   double bending_stress(const beam::InternalForces& forces) const {
     const beam::Shape& moment = response().forces.moment;
@@ -123,46 +113,47 @@ struct BeamModel final : fmi::Model {
     return sign * forces.moment[most] * parameters.section_height / (2.0 * parameters.second_moment_of_area);
   }
 
-  void forget_instant() {
-    line_.reset();
-    response_.reset();
+  const Beam::Forecast& forecast() const {
+    if (!derived_.forecast)
+      derived_.forecast = foresees() ? beam->forecast(parameters.communication_step) : Beam::Forecast{};
+    return *derived_.forecast;
   }
-
-  bool resting = false;  ///< at the start, where that is a state of rest
-
   /// As the tip goes on under the tip force and the loads that are set.
   double forecast_rate() const {
-    double rate = forecast.acceleration + tip_response[2] * beam->tip_force();
+    double rate = forecast().acceleration + tip_response[2] * beam->tip_force();
     loads.for_each([&](std::size_t i, const fmi::Polynomial& f) {
-      if (f[1] != 0.0) rate += f[1] * forecast_by(i);
+      if (f[1] != 0.0) rate += f[1] * forecast_per_load(i);
     });
     return rate;
   }
-  double forecast_by(std::size_t load) const {
-    if (resting) return std::numeric_limits<double>::quiet_NaN();
-    return forecasts() ? beam->forecast_per_load(parameters.communication_step, load).velocity : 0.0;
+  double forecast_per_load(std::size_t load) const {
+    return foresees() ? beam->forecast_per_load(parameters.communication_step, load).velocity : 0.0;
   }
 
  private:
-  bool forecasts() const { return parameters.communication_step > 0.0; }
-
-  /// @throws std::domain_error
-  void foresee() {
-    if (forecasts()) forecast = beam->forecast(parameters.communication_step);
+  bool foresees() const { return parameters.communication_step > 0.0; }
+  Loads::Values load_rates() const {
+    Loads::Values rates{};
+    loads.for_each([&](std::size_t i, const fmi::Polynomial& f) { rates[i] = f[1]; });
+    return rates;
   }
 
-  void look_ahead() {
-    try {
-      foresee();
-    } catch (const std::domain_error&) {
-      constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-      forecast = {unknown, unknown};
-    }
-  }
-
-  mutable std::optional<Line> line_;
-  mutable std::optional<Beam::Response> response_;
+  /// What is found where it is asked for, and kept until something changes.
+  struct Derived {
+    std::optional<Line> line;
+    std::optional<Beam::Response> response;
+    std::optional<Beam::Forecast> forecast;
+  };
+  mutable Derived derived_;
 };
+
+/// The partial derivative by an input where that is known: a state of rest follows the loads as a whole.
+template <class Partial>
+auto unless_resting(Partial partial) {
+  return [partial](const BeamModel& m) {
+    return m.resting ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(partial(m));
+  };
+}
 
 template <class Value>
 auto of(Value (Beam::*value)() const) {
@@ -326,11 +317,10 @@ fmi::Table fmi::make_table() {
              of(&Beam::dissipated_power));
   add.output("load_potential", "J",
              "potential of the loads distributed_load, gravity and tip_load_coefficient, as if they were constant",
-             of(&Beam::load_potential), of(&Beam::load_potential_rate))
+             of(&Beam::load_potential), [](const BeamModel& m) { return m.load_potential_rate(); })
       .from(without({"initial_velocity_slope"}));
-  add.depends("distributed_load", [](const BeamModel& m) {
-    return m.resting ? std::numeric_limits<double>::quiet_NaN() : -m.beam->load_work_per_unit(Loads::distributed);
-  });
+  add.depends("distributed_load",
+              unless_resting([](const BeamModel& m) { return -m.beam->load_work_per_unit(Loads::distributed); }));
   add.output(
       "load_work", "J",
       "work of all loads on the beam since the start, where it is 0: distributed_load, point_force, tip_load, "
@@ -347,10 +337,10 @@ fmi::Table fmi::make_table() {
          "tip_velocity_forecast", "m/s",
          "mean velocity of the tip over the next two steps of communication_step were there no tip_force; 0 if that is "
          "0",
-         [](const BeamModel& m) { return m.forecast.velocity; }, [](const BeamModel& m) { return m.forecast_rate(); })
+         [](const BeamModel& m) { return m.forecast().velocity; }, [](const BeamModel& m) { return m.forecast_rate(); })
       .from(free_motion);
   for (std::size_t i = 0; i < load_names.size(); ++i) {
-    add.depends(load_names[i], [i](const BeamModel& m) { return m.forecast_by(i); });
+    add.depends(load_names[i], unless_resting([i](const BeamModel& m) { return m.forecast_per_load(i); }));
   }
   add.local("tip_response", "m/N",
             "what 1 N held over one communication_step adds to tip_displacement at its end; 0 if that is 0",
@@ -367,9 +357,8 @@ fmi::Table fmi::make_table() {
            [=](const BeamModel& m) { return of_response(m, m.response_rate()); })
         .from(everything);
     const auto follows = [&](const std::string& input, std::size_t load) {
-      add.depends(input, [=](const BeamModel& m) {
-        return m.resting ? std::numeric_limits<double>::quiet_NaN() : of_response(m, m.beam->response_per_load(load));
-      });
+      add.depends(input,
+                  unless_resting([=](const BeamModel& m) { return of_response(m, m.beam->response_per_load(load)); }));
     };
     follows("tip_force", Loads::tip);
     for (std::size_t i = 0; i < load_names.size(); ++i) follows(load_names[i], i);

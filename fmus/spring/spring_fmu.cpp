@@ -34,8 +34,8 @@ struct SpringModel final : fmi::Model {
   FmuParameters parameters;
   spring::Inputs inputs;  ///< but for the tip
   fmi::Polynomial tip_velocity{}, forecast{};
-  fmi::Polynomial tip_displacement{0.0, fmi::unset, fmi::unset};  ///< as set
-  bool tip_is_set = false, tip_velocity_is_set = false;           ///< since the last observe()
+  fmi::Polynomial tip_displacement{};                    ///< as set
+  bool tip_is_set = false, tip_velocity_is_set = false;  ///< since the last observe()
   double impulse = 0.0;
   mutable std::optional<Spring> spring;  ///< which trial steps leave as it was
   std::optional<HeldContact> held;
@@ -51,19 +51,25 @@ struct SpringModel final : fmi::Model {
     if (holds) held.emplace(law, p.mass, p.communication_step, std::array{p.tip_response, p.tip_response_2});
   }
 
-  void observe(bool initial) override {
+  void evaluate(Acting acting) override {
+    if (acting == Acting::as_stepped) return;
+    const bool initial = acting == Acting::at_start;
     if (held && !held->started()) held->begin(message(), initial, spring->displacement(), trial());
     look();
   }
 
   Reached step(double time, double size, bool to_event) override {
+    using Remedy = fmi::Discarded::Remedy;
     // Tools that add up their times end with a step that is nothing but rounding: the force is held over it too.
-    const bool goes_on = held && size > rounding * held->size();
-    if (goes_on && std::abs(size - held->size()) > rounding * held->size()) {
+    const double late = 64.0 * std::numeric_limits<double>::epsilon() * std::abs(time);  // t itself is rounded
+    const double rounded = held ? rounding * held->size() + late : 0.0;
+    const bool goes_on = held && size > rounded;
+    if (goes_on && std::abs(size - held->size()) > rounded) {
       throw fmi::Discarded("a step of " + fmi::number(size) + " s, but communication_step = " +
-                           fmi::number(held->size()) + " s: steps must have that size, or the parameter be 0");
+                               fmi::number(held->size()) + " s: steps must have that size, or the parameter be 0",
+                           Remedy::none);
     }
-    if (!has_force()) throw fmi::Discarded(no_force());
+    if (!has_force()) throw fmi::Discarded(no_force(), Remedy::none);
     std::vector<double> before;
     if (impulse != 0.0 || held) save(before);
     spring::Inputs present = acting();
@@ -78,7 +84,7 @@ struct SpringModel final : fmi::Model {
       if (!has_force()) throw spring::StepFailure(no_force(), 0.0);
     } catch (const spring::StepFailure& e) {
       if (!before.empty()) restore(before);
-      throw fmi::Discarded(e.what());
+      throw fmi::Discarded(e.what(), held ? Remedy::none : Remedy::other_size);
     }
     if (held) look();
     check_wiring();
@@ -125,10 +131,10 @@ struct SpringModel final : fmi::Model {
     return held ? held_force_by_input() : -spring->reaction_slopes().force_by_depth;
   }
   double reaction_by_tip_velocity() const {
-    return is_set(tip_displacement[1]) ? 0.0 : -spring->reaction_slopes().force_by_rate;
+    return tip_displacement[1] != 0.0 ? 0.0 : -spring->reaction_slopes().force_by_rate;
   }
   double reaction_by_tip_rate() const {
-    return is_set(tip_displacement[1]) ? -spring->reaction_slopes().force_by_rate : 0.0;
+    return tip_displacement[1] != 0.0 ? -spring->reaction_slopes().force_by_rate : 0.0;
   }
   double contact_energy_by_tip_displacement() const { return held && held->started() ? 0.0 : -elastic_reaction(); }
 
@@ -190,13 +196,11 @@ struct SpringModel final : fmi::Model {
   std::array<bool, faults.size()> told_{};
   mutable std::string trial_failure_;
 
-  static bool is_set(double derivative) { return !std::isnan(derivative); }
-
-  /// The tip from now on: tip_velocity is its rate where tip_displacement has no derivative.
+  /// The tip from now on: tip_velocity is its rate where tip_displacement has no derivative, or one of 0.
   fmi::Polynomial tip() const {
     const auto& [u, rate, curvature] = tip_displacement;
-    if (!is_set(rate)) return {u, tip_velocity[0], is_set(curvature) ? curvature : tip_velocity[1]};
-    return {u, rate, is_set(curvature) ? curvature : 0.0};
+    if (rate == 0.0) return {u, tip_velocity[0], curvature != 0.0 ? curvature : tip_velocity[1]};
+    return tip_displacement;
   }
 
   /// What acts, but for the tip.
@@ -356,11 +360,11 @@ fmi::Table fmi::make_table() {
             &SpringModel::tip_displacement)
       .set = [](fmi::Model& m, const fmi::Polynomial& value) {
     auto& model = static_cast<SpringModel&>(m);
-    model.tip_displacement = value;  // with what is unset
+    model.tip_displacement = value;
     model.tip_is_set = true;
   };
   add.input("tip_velocity", "m/s",
-            "velocity of the beam's tip, read by contact_law = 2 where no derivative of tip_displacement is set; its "
+            "velocity of the beam's tip, read by contact_law = 2 where the derivative of tip_displacement is 0; its "
             "derivative of order 1 is the tip's acceleration, that of order 2 is not used",
             [](SpringModel& m, const fmi::Polynomial& value) {
               m.tip_velocity = value;

@@ -142,10 +142,8 @@ int main(int argc, char** argv) {
     Bare bare(paper(1000, 0));
     double force = 1.0;
     bench::compare(
-        "midpoint", o, [&] { direct->step(h, {force += 1e-3, 0.0, 0.0}, 0.0); },
-        [&] { bare.solve_and_multiply(); });
-    std::vector<double> state;
-    direct->save(state);
+        "midpoint", o, [&] { direct->step(h, {force += 1e-3, 0.0, 0.0}, 0.0); }, [&] { bare.solve_and_multiply(); });
+    const beam::Beam::State state = direct->state();
     bench::compare(
         "midpoint repeated", o,
         [&] {

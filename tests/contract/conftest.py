@@ -195,6 +195,10 @@ class Instance:
         """How far the last step came."""
         return self.slave.getRealStatus(fmi2.fmi2LastSuccessfulTime)
 
+    def ends(self):
+        """Whether the FMU asks to end the simulation, as no step can follow."""
+        return bool(self.slave.getBooleanStatus(fmi2.fmi2Terminated))
+
     def step(self, time, size):
         assert self.try_step(time, size) == OK, self.message
 
@@ -251,6 +255,9 @@ class Instance3(Instance):
 
     def reached(self):
         return self.last.value
+
+    def ends(self):
+        return bool(self.end.value)
 
 
 @pytest.fixture

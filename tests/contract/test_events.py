@@ -182,3 +182,13 @@ def test_fmpy_handles_the_event(spring):
     assert (before["number_of_impacts"], after["number_of_impacts"]) == (0, 1)
     assert len(runs[True]) == len(runs[False]) + 2 * runs[True]["number_of_impacts"][-1]
     assert runs[True]["velocity"][-1] == pytest.approx(runs[False]["velocity"][-1], rel=1e-10)
+
+
+def test_a_state_saved_in_event_mode_is_one_between_steps_where_there_is_no_event_mode(case):
+    k, plain = case.instance(events=True).start(), started(case, events=False)
+    assert k.call("EnterStepMode") == OK
+    k.step(0.0, 0.1)
+    assert k.call("EnterEventMode") == OK
+    plain.restore(plain.deserialized(k.serialized()))
+    assert plain.outputs() == k.outputs()
+    plain.step(0.1, 0.1)

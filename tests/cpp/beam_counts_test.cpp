@@ -62,8 +62,7 @@ TEST(BeamCounts, TheSizeOfMostStepsIsKeptWhileOthersComeAndGo) {
 
 TEST(BeamCounts, AStepThatIsTakenBackNeverPaysForItsDissipation) {
   const auto tried = [](Beam& b) {
-    std::vector<double> state;
-    b.save(state);
+    const Beam::State state = b.state();
     for (int i = 1; i < 9; ++i) {
       b.step(0.01 / i, {1.0, 0.0, 0.0}, 0.0);
       b.restore(state);

@@ -65,8 +65,7 @@ TEST(BeamState, AStepRepeatedFromTheSameStateIsBitIdentical) {
     some_steps();
     for (const bool after_impulse : {false, true}) {
       if (after_impulse) b->apply_tip_impulse(0.05);
-      std::vector<double> state;
-      b->save(state);
+      const Beam::State state = b->state();
       const std::vector<double> saved = outputs(*b);
       const std::vector<double> first = some_steps();
 
@@ -91,8 +90,9 @@ TEST(BeamState, AStepRepeatedFromTheSameStateIsBitIdentical) {
       EXPECT_EQ(outputs(*other), outputs(*b));
 
       // Nor that the step was tried with another force or load before, from another velocity or from another place.
-      std::vector<double> elsewhere = state;
-      elsewhere[0] += 0.01;
+      Beam::State moved = state;
+      moved.q[0] += 0.01;
+      const Beam::State& elsewhere = moved;
       for (const auto& [load, impulse, from] : {std::tuple(0.0, 0.0, &state), std::tuple(0.6, 0.0, &state),
                                                 std::tuple(0.6, 0.1, &state), std::tuple(0.6, 0.1, &elsewhere)}) {
         const auto fresh = make_beam(p);
@@ -107,35 +107,26 @@ TEST(BeamState, AStepRepeatedFromTheSameStateIsBitIdentical) {
   }
 }
 
-TEST(BeamState, AStateOfAnotherLengthIsRefused) {
-  const auto b = make_beam(general_beam(10)), other = make_beam(general_beam(11));
-  std::vector<double> state;
-  other->save(state);
-  const std::vector<double> before = outputs(*b);
-  EXPECT_THROW(b->restore(state), std::invalid_argument);
-  EXPECT_EQ(outputs(*b), before);
-}
-
 TEST(BeamState, AResultThatIsNotFiniteLeavesTheStateUnchanged) {
   for (const Parameters& p : variants()) {
     const auto b = make_beam(p);
     b->step(0.01, {0.3, 0.0, 0.0}, 0.1);
     const std::vector<double> before = outputs(*b);
-    EXPECT_THROW(b->step(1e10, {1e308, 1e308, 1e308}, -3.0), std::domain_error);
+    EXPECT_THROW(b->step(1e9, {1e308, 1e308, 1e308}, -3.0), std::overflow_error);
     EXPECT_EQ(outputs(*b), before);
-    EXPECT_THROW(b->apply_tip_impulse(1.7e308), std::domain_error);
+    EXPECT_THROW(b->apply_tip_impulse(1.7e308), std::overflow_error);
     EXPECT_EQ(outputs(*b), before);
     // The tip's motion is finite, the energies are not.
-    EXPECT_THROW(b->step(1e-3, {1e200, 0.0, 0.0}, 0.1), std::domain_error);
+    EXPECT_THROW(b->step(1e-3, {1e200, 0.0, 0.0}, 0.1), std::overflow_error);
     EXPECT_EQ(outputs(*b), before);
     // What is seen of the force at once is too large, then what the integrals grow with.
-    EXPECT_THROW(b->step(1e-200, {1e200, 0.0, 0.0}, 0.1), std::domain_error);
+    EXPECT_THROW(b->step(1e-200, {1e200, 0.0, 0.0}, 0.1), std::overflow_error);
     EXPECT_THROW(b->step(1e11, {0.0, 0.0, 0.0}, 0.0), std::domain_error);
     EXPECT_EQ(outputs(*b), before);
     try {
       b->step(0.25, {1e200, 2.0, 3.0}, Polynomial{4.0, 5.0, 6.0});
       ADD_FAILURE() << "the step was made";
-    } catch (const std::domain_error& error) {
+    } catch (const std::overflow_error& error) {
       const std::string said =
           "step of 0.25 s under the tip force 1e+200 N, 2 N/s, 3 N/s2, distributed_load = 4 and its "
           "derivatives 5, 6;";
@@ -147,6 +138,18 @@ TEST(BeamState, AResultThatIsNotFiniteLeavesTheStateUnchanged) {
     b->step(0.01, {0.2, 0.0, 0.0}, 0.1);
     EXPECT_EQ(outputs(*b), outputs(*same));
   }
+}
+
+// ε ω H is the error of a phase: 1e12 rad keep 4 digits of it. An overdamped mode has no phase.
+TEST(BeamState, AStepWhosePhasesAreRoundingIsRefused) {
+  Parameters p = unit_beam(4, 1e28);
+  p.initial_velocity_slope = 1.0;
+  const double fastest = testing::frequencies(p).back();
+  const auto b = make_beam(p);
+  EXPECT_THROW(b->step(1.01e12 / fastest, {}, 0.0), std::domain_error);
+  EXPECT_NO_THROW(b->step(0.99e12 / fastest, {}, 0.0));
+  p.alpha_b = 1.0;
+  EXPECT_NO_THROW(make_beam(p)->step(1.01e12 / fastest, {}, 0.0));
 }
 
 // The message names the parameter, its value and what is allowed.
