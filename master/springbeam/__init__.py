@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .bodies.protocol import Body, Energies, Motion
     from .results.trajectory import Event, Trajectory
     from .run.outcome import RunStopped
-    from .run.runner import Simulation, resume
+    from .run.runner import Simulation
     from .scene import Scene, SceneError, load_scene, with_changes
 
 __all__ = [
@@ -32,7 +32,6 @@ __all__ = [
     "__version__",
     "load",
     "load_scene",
-    "resume",
     "simulate",
     "with_changes",
 ]
@@ -45,7 +44,7 @@ _HOME = {
         "bodies.protocol": ("Body", "Energies", "Motion"),
         "results.trajectory": ("Event", "Trajectory"),
         "run.outcome": ("RunStopped",),
-        "run.runner": ("Simulation", "resume"),
+        "run.runner": ("Simulation",),
         "scene": ("Scene", "SceneError", "load_scene", "with_changes"),
     }.items()
     for name in names

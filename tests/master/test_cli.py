@@ -29,7 +29,7 @@ from springbeam.results.totals import totals
 SUMMARY = {"status": "done", "macro_steps": 31, "wall_time": 0.25, "max_energy_residual": 3e-14, "warnings": []}
 
 
-def fake_steps(scene, recorder, progress=None, **checkpoints):
+def fake_steps(scene, recorder, progress=None):
     """Steps, as the real runner reports them."""
     steps, _, shapes = block(31, scene, scene.time.t_end)
     steps["events"] = 1.0
@@ -38,7 +38,7 @@ def fake_steps(scene, recorder, progress=None, **checkpoints):
         progress(steps["time"][i], "free", i)
 
 
-def fake_run(scene, recorder, progress=None, **checkpoints):
+def fake_run(scene, recorder, progress=None):
     fake_steps(scene, recorder, progress)
     recorder.finish(SUMMARY)
     return SUMMARY
@@ -52,7 +52,7 @@ def here(tmp_path, monkeypatch):
 
 
 def replace_run(monkeypatch, error):
-    def run(scene, recorder, *progress, **checkpoints):
+    def run(scene, recorder, *progress):
         fake_steps(scene, recorder, *progress)
         recorder.finish({"status": "stopped"})
         raise error
@@ -100,7 +100,7 @@ def test_a_picture_that_cannot_be_written_ends_with_3_and_loses_nothing(here, mo
 def test_report_fits_80_columns_with_whole_numbers_and_warnings_as_they_are(here, monkeypatch):
     """It says how many events are not shown; what rounding leaves of a zero is 0."""
 
-    def many(scene, recorder, progress=None, **checkpoints):
+    def many(scene, recorder, progress=None):
         strike = Event(123.456789, "stop_impact", -1.2345e-5, -1.234e-5, 0.1, 0.1, -1.234e-7, 1e-9, 1e-9)
         strikes = [replace(strike, time=strike.time + i) for i in range(40)]
         events = [Event(0.2, "release", -1.355e-20, 0.25, 0.0, 0.25), *strikes]
@@ -141,7 +141,7 @@ def test_a_run_that_stops_early(here, unpainted, monkeypatch, error, fragments):
     replace_run(monkeypatch, error)
     result = command("run", "soft")
     assert result.exit_code == 3
-    for fragment in [*fragments, "what was computed is in results/soft; a run begun with --checkpoint SECONDS can"]:
+    for fragment in [*fragments, "what was computed is in results/soft"]:
         assert fragment in result.stderr
     assert "Traceback" not in result.output
     assert len(load_trajectory(here / "results" / "soft")) == 31

@@ -400,7 +400,7 @@ def damaged(path, damage, message):
 
 
 WRITTEN = ["events.csv", "shapes.csv", "steps.bin", "summary.json", "trajectory.csv"]
-RESULT_FILES = [*WRITTEN, "run.checkpoint", PARQUET[0], PICTURES["positions"], REPORT, ANIMATIONS[0]]
+RESULT_FILES = [*WRITTEN, PARQUET[0], PICTURES["positions"], REPORT, ANIMATIONS[0]]
 
 
 @pytest.mark.parametrize("name", RESULT_FILES)
@@ -435,11 +435,7 @@ def test_two_runs_do_not_share_a_directory_from_the_moment_it_is_made(tmp_path):
             RunDirectory.create(tmp_path / "run", replace=replaced)
     recorder = FileRecorder(PAIR, first)
     recorder.keep(*block(3))
-    saved = recorder.save()
-    with pytest.raises(ResultsInUse, match="another process"):
-        FileRecorder(PAIR, RunDirectory(tmp_path / "run")).restore(saved)
     recorder.close()
-    FileRecorder(PAIR, RunDirectory(tmp_path / "run")).restore(saved)
     with pytest.raises(ResultsExist):
         RunDirectory.create(tmp_path / "run")
     RunDirectory.create(tmp_path / "run", replace=True)  # those that were refused hold no claim
@@ -449,33 +445,6 @@ def test_numbered_directories_are_new_each_time_also_in_parallel(tmp_path):
     with ThreadPoolExecutor(8) as pool:
         made = list(pool.map(lambda _: RunDirectory.create_numbered(tmp_path / "results" / "soft").path, range(12)))
     assert {path.name for path in made} == {"soft", *(f"soft-{i}" for i in range(2, 13))}
-
-
-# -- going on -----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["steps.bin", "events.csv", "shapes.csv"])
-@pytest.mark.parametrize(
-    ("damage", "message"),
-    [
-        (lambda file: file.unlink(), "missing"),
-        (lambda file: file.write_bytes(file.read_bytes()[:-1]), r"\d+ bytes, \d+ bytes were written"),
-    ],
-    ids=["missing", "cut"],
-)
-def test_results_that_are_cut_are_not_continued_nor_touched(tmp_path, name, damage, message):
-    recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path))
-    recorder.keep(*block(3))
-    saved = recorder.save()
-    recorder.close()
-    damage(tmp_path / name)
-    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
-    with (
-        pytest.raises(ResultsUnreadable, match=rf"{name}: .*{message}"),
-        FileRecorder(PAIR, RunDirectory(tmp_path)) as refused,
-    ):
-        refused.restore(saved)
-    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
 
 
 # -- a full disk --------------------------------------------------------------------------------------------------
@@ -526,10 +495,3 @@ def test_a_run_is_handed_over_up_to_where_it_goes_wrong():
     kept = recorder.trajectory()
     assert (len(kept), len(kept.events), len(kept.shape_table)) == (47, kept.steps["events"][-1], 47)
     assert judged == [(30, [0.0]), (17, [0.0])]
-    # A run that goes on: what it has is judged before what comes.
-    judged.clear()
-    log = Log(PAIR, recorder, judge)
-    log.records.append(block(30)[0][-1].tobytes())
-    log.hand_over()
-    assert judged == [(47, [0.0]), (1, [0.0])]
-    assert len(recorder.events()) == len(kept.events)

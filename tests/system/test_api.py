@@ -43,7 +43,6 @@ def test_rows_at_an_interval_are_those_of_at(here):
 
 
 def test_a_run_that_is_made_step_by_step_is_a_trajectory_on_the_way():
-    """test_checkpoint.py compares it with one that is made at once."""
     scene = with_changes(load_scene("soft"), time={"t_end": 0.1}, beam={"n_elements": 8})
     with springbeam.Simulation(scene) as sim:
         assert len(sim.run) == 0

@@ -7,11 +7,10 @@ import shlex
 import shutil
 import subprocess
 import sys
-from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
-from commands import COMMAND, HANGS, Interrupt, command, printed, refused
+from commands import COMMAND, HANGS, command, printed, refused
 from typer.testing import CliRunner
 
 from springbeam.bodies.archive import fmu_directory
@@ -31,7 +30,6 @@ TABLES = {
     "keys": "",
     "new": "my_scene",
     "run": "soft --no-plots",
-    "resume": "cut --no-plots",
     "paper": "2 --no-plots --set beam.n_elements=10 --set beam.n_modes=0 --set time.t_end=0.55",
     "sweep": "duffing --vary spring.mass=0.5,1 --set time.t_end=1 --scheduler {scheduler} --out varied",
     "compare": "done done --out compared.png",
@@ -50,7 +48,7 @@ TABLES = {
 }
 
 #: Those that print a name of a file alone, or whose documents are read in the tests of their own.
-WITHOUT_JSON = ("new", "compare", "spectrum", "fit", "report", "plot", "animate", "export", "resume")
+WITHOUT_JSON = ("new", "compare", "spectrum", "fit", "report", "plot", "animate", "export")
 
 
 #: What holds for the document of a command; of others, that their table is in their directory.
@@ -85,14 +83,11 @@ DOCUMENTS = {
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """A folder with a run that is done, and one that was interrupted after its first checkpoint."""
+    """A folder with a run that is done."""
     with pytest.MonkeyPatch.context() as there:
         there.chdir(tmp_path_factory.mktemp("place"))
         printed("run", "soft", "--no-plots", "--out", "done")
         Path("curve.csv").write_text("time,y\n0.1,0.49\n0.5,0.32\n0.9,0.01\n", encoding="utf-8")
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("springbeam.cli.run._progress", lambda *_, **__: nullcontext(Interrupt(40)))
-            assert command("run", "soft", "--checkpoint", "1000", "--no-plots", "--out", "cut").exit_code == 3
         yield Path.cwd()
 
 

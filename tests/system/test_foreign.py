@@ -20,14 +20,11 @@ import tomli_w
 from commands import HANGS, command, printed, ran, refused
 from scenes import kinds
 
-from springbeam import RunStopped, SceneError, resume, simulate, with_changes
+from springbeam import RunStopped, SceneError, simulate, with_changes
 from springbeam.bodies import isolated
 from springbeam.bodies.foreign import ForeignBody
 from springbeam.bodies.protocol import FmuError
-from springbeam.results.directory import RunDirectory
 from springbeam.results.files import load_summary
-from springbeam.results.recording import FileRecorder
-from springbeam.run import runner
 from springbeam.scene import scene_from_dict
 
 M1, M2, K, C, V = 2.0, 3.0, 40.0, 0.2, -0.3
@@ -223,15 +220,6 @@ def test_a_missing_capability_is_named_with_what_would_work(fmu, what):
         simulate(scene)
     lines = str(caught.value).splitlines()
     assert any(all(text in line for text in (*words, "[spring]")) for line in lines)
-
-
-def test_a_state_that_cannot_be_written_is_refused_before_a_run_with_checkpoints(fmu, tmp_path):
-    scene = pair(fmu("plain", **PLAIN), coupling={"scheme": "jacobi", "degree": 0})
-    directory = RunDirectory.create(tmp_path / "run")
-    refused = pytest.raises(SceneError, match=r"\[spring\] fmu: .*canSerializeFMUstate = false.*--checkpoint")
-    with refused, FileRecorder(scene, directory) as recorder:
-        runner.run(scene, recorder, seconds=0.0)
-    assert not directory.results()
 
 
 @pytest.mark.parametrize(
@@ -540,20 +528,7 @@ def test_a_number_that_does_not_fit_its_variable_is_refused(fmu_folder):
         simulate(pair("", beam=names, spring={"element": "rigid_wall"}, contact={"law": "link", "stiffness": 1.0}))
 
 
-def goes_on_to_the_same_bits(scene, run, tmp_path, until):
-    """Whether a run that is interrupted after ``until`` [s] and resumed is ``run``."""
-
-    def interrupted(time, phase, steps):
-        if time > until:
-            raise KeyboardInterrupt
-
-    directory = RunDirectory.create(tmp_path / "run")
-    with pytest.raises(KeyboardInterrupt), FileRecorder(scene, directory) as recorder:
-        runner.run(scene, recorder, interrupted, seconds=0.0)
-    return resume(directory.path).steps.tobytes() == run.steps.tobytes()
-
-
-def test_events_are_those_of_the_element_and_a_run_goes_on_to_the_same_bits(fmu, tmp_path):
+def test_events_are_those_of_the_element(fmu):
     """A mass falls on a foreign oscillator above a lossy foundation."""
     tables = {
         "beam": {"displacement": 0.01, "velocity": -1.0, "external_force": -5.0},
@@ -569,22 +544,6 @@ def test_events_are_those_of_the_element_and_a_run_goes_on_to_the_same_bits(fmu,
     assert [e.time for e in run.events] == pytest.approx([e.time for e in exact.events], abs=1e-10)
     assert exact.summary["max_energy_residual"] < 1e-11
     assert run.summary["max_interface_residual"] < 1e-12
-    assert goes_on_to_the_same_bits(scene, run, tmp_path, 0.5)
-
-
-def test_a_foreign_body_that_rests_on_the_stop_is_resumed_to_the_same_bits(fmu, tmp_path):
-    """The force that holds it there was found by trial steps when it came to rest; found again it has other digits."""
-    scene = pair(
-        fmu(),
-        beam={"displacement": 0.01, "velocity": -1.0, "external_force": -30.0},
-        spring={"parameters": {"m": 0.5, "k": 400.0, "c": 2.0}},
-        stop={"position": -0.03, "restitution": 0.0},
-        contact={"law": "transmission", "damping": 0.0},
-        coupling={"macro_step": 0.01},
-    )
-    run = simulate(scene)
-    assert run.at(0.6).phase[0] == "seated"
-    assert goes_on_to_the_same_bits(scene, run, tmp_path, 0.6)
 
 
 def test_commands(fmu, tmp_path, unpainted):
@@ -595,7 +554,7 @@ def test_commands(fmu, tmp_path, unpainted):
     shown = printed("doctor", file)
     assert "the ledger of the interface" in shown
     assert "the scene can be run" in shown
-    printed("run", file, "--out", tmp_path / "run", "--checkpoint", "0", "--quiet")
+    printed("run", file, "--out", tmp_path / "run", "--quiet")
     printed("report", tmp_path / "run")
     assert "no reference knows this body" in refused("crosscheck", file)
     printed("run", file, "--accuracy", "1e-4", "--out", tmp_path / "accurate", "--quiet")

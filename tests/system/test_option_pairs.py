@@ -1,13 +1,12 @@
 """Every pair of options of a run: it ends well, with complete files, or is refused by one clear error."""
 
 import json
-from contextlib import nullcontext
 from itertools import combinations
 from pathlib import Path
 
 import pytest
 import tomli_w
-from commands import Interrupt, command
+from commands import command
 from scenes import completed
 
 from springbeam.results.files import load_trajectory
@@ -25,7 +24,6 @@ SCENE = {
 #: A word is an option of the command, ``table.key=value`` a setting, ``no-table`` takes a table out of the scene file.
 OPTIONS = {
     "accuracy": "--accuracy 1e-2",
-    "resume": "--checkpoint 0",  # and the run is interrupted
     "json": "--json",
     "interval": "--output-interval 1e-3",
     "macro step": "coupling.macro_step=7e-4",
@@ -67,9 +65,6 @@ def test_a_pair_runs_or_is_refused(tmp_path, monkeypatch, pair):
     arguments = ["run", "scene.toml", "--out", "run", *(f"--set={word}" for word in settings)]
     arguments += [word for word in words if "=" not in word and word.removeprefix("no-") not in left_out]
     output = ["--no-plots"] + ["--json"] * ("json" in pair)
-    if "resume" in pair:
-        interrupt = Interrupt(6)
-        monkeypatch.setattr("springbeam.cli.run._progress", lambda *_, **__: nullcontext(lambda *_: interrupt()))
     result = command(*arguments, *output)
 
     if result.exit_code == 2:
@@ -80,9 +75,6 @@ def test_a_pair_runs_or_is_refused(tmp_path, monkeypatch, pair):
             assert any(word in line for word in (*named, *left_out, *(w for w in words if w.startswith("--"))))
         assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml"]
         return
-    if "resume" in pair:
-        assert result.exit_code == 3, result.output
-        result = command("resume", "run", *output)
     assert (result.exit_code, result.stderr) == (0, "")
     run = load_trajectory("run")
     if "json" in pair:
@@ -94,7 +86,7 @@ def test_a_pair_runs_or_is_refused(tmp_path, monkeypatch, pair):
         run.scene, coupling={k: v for k, v in run.summary.get("coupling", {}).items() if k != "because"}
     )
     assert run.summary["max_energy_residual"] <= bounds(as_run)[0] or said
-    if "interval" in pair:  # also where it was interrupted
+    if "interval" in pair:
         multiples = [float(row.partition(",")[0]) / 1e-3 for row in Path("run/trajectory.csv").read_text().split()[1:]]
         assert multiples == pytest.approx([round(k) for k in multiples], abs=1e-9)
     files = {"trajectory.csv", "events.csv", "steps.bin", "summary.json", *(["shapes.csv"] if run.scene.beam else [])}

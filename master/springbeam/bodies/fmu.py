@@ -320,19 +320,6 @@ class Fmu:
 
     # -- its state, and how long it lives ------------------------------------------------------------------------------
 
-    def serialized(self) -> bytes:
-        """Return the present state as the FMU writes it. Raises FmuError."""
-        state = self._asked("cannot save the state", self._slave.getFMUState)
-        content: bytes = self._asked("cannot save the state", self._slave.serializeFMUState, state)
-        self._asked("cannot save the state", self._slave.freeFMUState, state)
-        return content
-
-    def deserialize(self, content: bytes) -> None:
-        """Go on from what `serialized` of an equal FMU returned. Raises FmuError."""
-        state = self._asked("cannot restore the state", self._slave.deserializeFMUState, content)
-        self._asked("cannot restore the state", self._slave.setFMUState, state)
-        self._asked("cannot restore the state", self._slave.freeFMUState, state)
-
     @classmethod
     def of(cls, name: str, parameters: Mapping[str, Value], start_time: float) -> Fmu:
         """Return an instance of our FMU ``name``, new or given back; both step to the same bits. Raises FmuError."""

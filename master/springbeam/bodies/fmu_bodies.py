@@ -11,7 +11,6 @@ from math import isfinite
 from struct import Struct
 from typing import Any, ClassVar, NamedTuple, NoReturn
 
-import msgspec
 import numpy as np
 
 from ..scene import Beam, Load, Spring
@@ -129,12 +128,6 @@ class Port:
     def _refuse_to_repeat(self) -> NoReturn:
         raise BodyFailed(f"{self.path}: a step had to be repeated, and its state cannot be restored")
 
-    def save(self) -> bytes:
-        return self._fmu.serialized()
-
-    def restore(self, content: bytes) -> None:
-        self._fmu.deserialize(content)
-
     def close(self) -> bool:
         """Free the FMU; return whether this process may instantiate it again."""
         self._fmu.close()
@@ -195,15 +188,6 @@ class FmuBody(Body):
                 raise port.failed(status, CANNOT["set_state"])
             self._moved, self.state = False, self._marked
             self.rewinds += 1
-
-    def save(self) -> bytes:
-        return msgspec.msgpack.encode((super().save(), self.steps, self.rewinds, self._port.save()))
-
-    def restore(self, saved: bytes) -> None:
-        kept = msgspec.msgpack.decode(saved, type=tuple[bytes, int, int, bytes])
-        state, self.steps, self.rewinds, content = kept
-        super().restore(state)
-        self._port.restore(content)
 
     def motion(self) -> Motion:
         motion: Motion = self.state.motion

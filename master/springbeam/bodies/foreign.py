@@ -45,7 +45,6 @@ def _promised(spec: ForeignFmu, says: Any) -> Abilities:
     state = bool(says.canGetAndSetFMUstate)
     return Abilities(
         state=state,
-        serialized=state and bool(says.canSerializeFMUstate),
         any_size=bool(says.canHandleVariableCommunicationStepSize),
         velocity=spec.velocity is not None,
         integrals=0 if spec.integral is None else 1 if spec.integral_2 is None else 2,

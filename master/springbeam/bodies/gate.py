@@ -116,7 +116,6 @@ def refusals(scene: Scene, abilities: Mapping[str, Abilities]) -> list[str]:
 OFFERED = (
     ("state", "canGetAndSetFMUstate", 'scheme "energy", tie, transmission, foundation', '"jacobi", "gauss_seidel"'),
     ("any_size", "canHandleVariableCommunicationStepSize", "events, adaptive steps", "equal macro steps only"),
-    ("serialized", "canSerializeFMUstate", "--checkpoint and resume", "no checkpoints"),
     ("slopes", "canInterpolateInputs", "degree 1, 2", "degree 0"),
     ("integrals", "integral, integral_2", "degree 1, 2; adaptive steps", "degree 0"),
     ("velocity", "velocity", "events, hermite, adaptive steps", "the mean over a step in its place"),

@@ -210,12 +210,6 @@ class RemotePort(Port):
         self._waiting.append(("set_state",))
         return OK
 
-    def save(self) -> Any:
-        return self._ask("saving its state", "save")
-
-    def restore(self, content: bytes) -> None:
-        self._ask("restoring its state", "restore", content)
-
     def close(self) -> bool:
         process, self._process = self._process, None
         again = False

@@ -197,7 +197,7 @@ def _check_state(bench: Bench) -> None:
 
     if next(bench.taken(differs, bench.sizes)):
         bench.faults.append("canGetAndSetFMUstate = true, but equal steps from one restored state differ in their bits")
-        bench.renew(state=False, serialized=False)  # what follows starts from new instances
+        bench.renew(state=False)  # what follows starts from new instances
 
 
 def _inertia(bench: Bench, size: float) -> float | None:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
-import msgspec
 import numpy as np
 
 from ..scene import Load, SceneError
@@ -68,35 +67,11 @@ class Felt(NamedTuple):
     bending_stress: float  #: the largest along the beam [Pa]; 0 where the height of its section is not known
 
 
-#: All that a run changes while it runs: by part, what `Stateful.save` returns.
-RunState = dict[str, bytes]
-
-
-class Memory(msgspec.Struct, forbid_unknown_fields=True):
-    """Named numbers that a part changes in place."""
-
-
-class Stateful:
-    """A part of a run whose future depends on its past."""
-
-    #: All that changes and is not set anew before it is used: a number, a typed tuple, or a `Memory`.
-    state: Any = None
-
-    def save(self) -> bytes:
-        """Return `state` as MessagePack, numbers to the last bit."""
-        return msgspec.msgpack.encode(self.state)
-
-    def restore(self, saved: bytes) -> None:
-        """Go on from what `save` of an equal part returned. Raises msgspec.DecodeError if it was of another kind."""
-        self.state = msgspec.msgpack.decode(saved, type=type(self.state))
-
-
 @dataclass(frozen=True)
 class Abilities:
     """What a body can do; the default is that of our own."""
 
     state: bool = True  #: its state can be saved and restored
-    serialized: bool = True  #: … and written to a file
     any_size: bool = True  #: its steps may have any size
     velocity: bool = True  #: it tells its velocity
     integrals: int = 2  #: it tells ∫x (1) and ∫∫x (2) over a step
@@ -105,15 +80,16 @@ class Abilities:
     energies: bool = True  #: it tells its energies
 
 
-class Body(Stateful):
+class Body:
     """A body with one interface end and a state that can be rewound; a body of one's own derives from it.
 
     ``advance`` prescribes the contact force C on the step: the upper body takes it as +C, the lower one as −C.
-    What changes is its `state`, a value that is replaced and never changed in place.
     Impulses act at once: ``motion`` and ``energies`` show the state after them. Every method but ``close`` may raise
     BodyFailed.
     """
 
+    #: All of the body that changes, a value that is replaced and never changed in place.
+    state: Any = None
     #: What an impulse at the end meets [kg].
     mass: float
     #: Whether columns tell its acceleration and the forces inside it: of our own beam and spring.

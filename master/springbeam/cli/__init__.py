@@ -76,7 +76,7 @@ def _common(
 
 _COMMANDS: dict[str, tuple[Callable[..., Findings], ...]] = {
     "Scenes": (scenes.scenes, scenes.keys, scenes.new),
-    "Run": (run.run, studies.resume, studies.sweep, paper.paper),
+    "Run": (run.run, studies.sweep, paper.paper),
     "Look": (look.report, look.plot, look.animate, look.export, look.compare, look.spectrum, studies.fit),
     "Choose scheme and accuracy": (scenes.predict, studies.tradeoff, studies.converge),
     "Check": (studies.crosscheck, studies.stability, checks.doctor),

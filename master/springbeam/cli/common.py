@@ -26,7 +26,6 @@ from typer.core import TyperCommand, TyperGroup
 from ..bodies.protocol import FmuError
 from ..results.directory import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory
 from ..results.files import as_json as json_of
-from ..run.checkpoint import CheckpointRefused
 from ..scene import ArgumentError, SceneError, scene_keys, shipped_scenes
 from ..studies.tables import Findings
 
@@ -35,6 +34,8 @@ BAD_INPUT = 2
 STOPPED = 3
 #: Commands and options that there are no more, with what to do instead.
 GONE = {
+    "--checkpoint": "what a run that ends early has computed is in its directory; run it again for the rest",
+    "resume": "run the scene again; a study goes on where its own command is given again",
     "--mesh": "springbeam converge SCENE shows how far the mesh is from the continuous beam",
     "verify": "springbeam doctor asks the FMUs for what is known exactly, springbeam crosscheck judges a scene",
 }
@@ -189,7 +190,7 @@ def bad_input_reported() -> Iterator[None]:
         fail(BAD_INPUT, f"{error}; --force replaces them, --out DIR puts the new ones elsewhere")
     except ArgumentError as error:
         fail(BAD_INPUT, error.typed)
-    except (SceneError, FmuError, CheckpointRefused, ResultsInUse, ResultsUnreadable) as error:
+    except (SceneError, FmuError, ResultsInUse, ResultsUnreadable) as error:
         fail(BAD_INPUT, str(error))
     except FileExistsError as error:
         fail(BAD_INPUT, f"{error.filename}: is a file; --out DIR names a directory, new or without results")

@@ -52,9 +52,7 @@ def paper(
         made = failure.trajectory
         made.summary |= {"status": "stopped", "cause": str(failure)}
     directory = _directory(Path("results") / f"paper-fig{figure}", out, force=force)
-    found = carry_out(
-        FileRecorder(scene, directory), seconds=None, made=made, no_plots=no_plots, silent=quiet or as_json
-    )
+    found = carry_out(FileRecorder(scene, directory), made=made, no_plots=no_plots, silent=quiet or as_json)
     solves = made.summary["iterations_per_solve"]
     printed = figures.TABLE_2[int(figure)][0]
     line = f"Table 2   {solves:.3f} iterations per solve of (53), printed {printed:.3f}"

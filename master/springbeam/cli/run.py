@@ -22,7 +22,6 @@ from ..results.files import load_events, load_summary, load_trajectory
 from ..results.recording import FileRecorder
 from ..results.totals import in_words
 from ..results.trajectory import Event, Trajectory, rounded
-from ..run.checkpoint import Checkpoint
 from ..run.outcome import Progress
 from ..scene import Scene, load_scene
 from ..scene.suspicions import implausible
@@ -65,15 +64,6 @@ def run(
             help="Largest relative error of motion, contact times and impulses; picks scheme and steps.",
         ),
     ] = None,
-    checkpoint: Annotated[
-        float | None,
-        typer.Option(
-            "--checkpoint",
-            metavar="SECONDS",
-            min=0.0,
-            help="Save every so many seconds what springbeam resume needs. Not with an accuracy.",
-        ),
-    ] = None,
     interval: Annotated[
         float | None,
         typer.Option(
@@ -92,7 +82,7 @@ def run(
     Example: springbeam run soft --set coupling.macro_step=5e-4 --out results/fine
     """
     what = load_scene(scene, settings or (), accuracy)
-    _refuse_options(what, checkpoint, interval)
+    _refuse_options(what, interval)
     for line in () if quiet or as_json else implausible(what):
         typer.echo(f"warning: {line}", err=True)
     made = picked(what)
@@ -103,15 +93,12 @@ def run(
     else:
         directory = RunDirectory.create(out or default, replace=force)
     recorder, silent = FileRecorder(what, directory, interval), quiet or as_json
-    return carry_out(recorder, seconds=checkpoint, made=made, no_plots=no_plots, silent=silent)
+    return carry_out(recorder, made=made, no_plots=no_plots, silent=silent)
 
 
-def _refuse_options(scene: Scene, checkpoint: float | None, interval: float | None) -> None:
+def _refuse_options(scene: Scene, interval: float | None) -> None:
     """End the command if the run of ``scene`` cannot have an option."""
-    apart, end = "leave one of the two out", scene.time.t_end
-    if checkpoint is not None and scene.accuracy is not None:
-        why = f"a run with accuracy = {scene.accuracy:g} is written when it is done, and has nothing to resume before"
-        fail(BAD_INPUT, f"--checkpoint {checkpoint:g}: {why}; {apart}")
+    end = scene.time.t_end
     if interval is not None and not end / _MOST_ROWS <= interval < inf:
         rows = f"of which at most {_MOST_ROWS:,} lie before time.t_end = {end:g} s"
         fail(BAD_INPUT, f"--output-interval {interval:g}: must be a time [s], {rows}")
@@ -133,15 +120,13 @@ def picked(scene: Scene) -> Trajectory | None:
 def carry_out(
     recorder: FileRecorder,
     *,
-    seconds: float | None,
-    start: Checkpoint | None = None,
     made: Trajectory | None = None,
     no_plots: bool,
     silent: bool,
 ) -> Findings:
-    """Run the scene of ``recorder``, from ``start`` if given, or write a run that is ``made``, and draw it.
+    """Run the scene of ``recorder``, or write a run that is ``made``, and draw it.
 
-    ``seconds`` as of `springbeam.run.runner.run`. Raises what keeps the run from recording anything.
+    Raises what keeps the run from recording anything.
     """
     from ..run.outcome import RunStopped
     from ..run.runner import run as run_scene
@@ -152,17 +137,14 @@ def carry_out(
             if made is not None:
                 recorder.write(made)
             else:
-                run_scene(recorder.scene, recorder, progress, seconds=seconds, start=start)
+                run_scene(recorder.scene, recorder, progress)
     except (RunStopped, OSError, FmuError, KeyboardInterrupt) as stopped:
         if not recorder.begun and not isinstance(stopped, RunStopped):
             raise
         cause = cause_of(stopped, directory.path)
-        begun = "; a run begun with --checkpoint SECONDS can go on after it has ended early"
-        again = f"; springbeam resume {directory.path} goes on from the last checkpoint"
-        how = again if directory.checkpoint.exists() else begun * (seconds is None and made is None)
         what = cause if isinstance(stopped, KeyboardInterrupt) else f"the run stopped early: {cause}"
         where = f"(reached t = {recorder.time:.9g} s of {t_end:g} s)"
-        error = f"{what} {where}; what was computed is in {directory.path}{how}"
+        error = f"{what} {where}; what was computed is in {directory.path}"
     finally:
         if not recorder.begun:
             directory.discard()

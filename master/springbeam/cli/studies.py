@@ -1,4 +1,4 @@
-"""The commands that carry out a study: sweep, fit, tradeoff, converge, crosscheck, stability; and resume.
+"""The commands that carry out a study: sweep, fit, tradeoff, converge, crosscheck, stability.
 
 Each is a function that makes the study of its own options. `study_command` adds what all studies share: where records
 go, progress, how a study stops and goes on.
@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
 
-from ..results.directory import ResultsExist, RunDirectory
-from ..results.recording import FileRecorder
+from ..results.directory import ResultsExist
 from ..scene import load_scene
 from ..studies.tables import Findings
 from .common import (
@@ -38,9 +37,7 @@ from .common import (
     console_for,
     fail,
     progress_bar,
-    results_directory,
 )
-from .run import carry_out as carry_out_run
 from .run import picked, picked_in_words
 
 if TYPE_CHECKING:
@@ -134,7 +131,7 @@ def _going_on(records: Records, total: int) -> Iterator[None]:
     except (KeyboardInterrupt, RunStopped, ReferenceFailure, OSError) as error:
         if isinstance(error, OSError) and not records.by_name:
             raise
-        there = f"; {len(records.by_name)} of {total} records are in {directory}; springbeam resume {directory} goes on"
+        there = f"; {len(records.by_name)} of {total} records are in {directory}; the same command goes on"
         fail(STOPPED, cause_of(error, directory) + there * bool(records.by_name))
 
 
@@ -346,29 +343,3 @@ def stability(
     from ..studies.stability.grid import Grid
 
     return Grid(samples=samples, resolution=resolution, seed=seed, quick=quick)
-
-
-def resume(
-    directory: Annotated[
-        Path, typer.Argument(metavar="DIR", help="The directory of the run or the study.", show_default=False)
-    ],
-    no_plots: NoPlotsOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-) -> Findings:
-    """Go on with a run or a study that was killed or stopped.
-
-    A run needs --checkpoint; its results are those of a run that was never stopped, to the last bit. A study (sweep,
-    tradeoff, converge, stability, crosscheck) goes on with the cases that have no record yet.
-
-    Example: springbeam resume results/soft
-    """
-    from ..run.runner import last_checkpoint
-    from ..studies.study import study_in
-
-    study = study_in(directory)
-    if study is not None:
-        return carry_out(study, None, Frame(directory, False, no_plots, quiet, as_json))
-    start = last_checkpoint(results_directory(directory))
-    recorder, silent = FileRecorder(start.scene, RunDirectory(directory), start.interval), quiet or as_json
-    return carry_out_run(recorder, seconds=start.seconds, start=start, no_plots=no_plots, silent=silent)

@@ -11,7 +11,7 @@ from enum import Enum
 from functools import cached_property
 from math import inf
 
-from ..bodies.protocol import Ends, Motion, Stateful
+from ..bodies.protocol import Ends, Motion
 from ..results.trajectory import EventKind
 from ..scene import Scene
 from ..scene.resolution import VIBRATION
@@ -95,7 +95,7 @@ def common_velocity(v: float, z: float, tip_mass: float, mass: float) -> float:
     return (tip_mass * v + mass * z) / (tip_mass + mass)
 
 
-class Transitions(Stateful):
+class Transitions:
     """What each kind of event does to the phase and to the velocities.
 
     Parameters
@@ -110,7 +110,7 @@ class Transitions(Stateful):
         Ψ: the height below which the ends are tied [m].
     """
 
-    state: float = 0.0  #: speed of the fastest impact on the foundation so far [m/s]
+    _hardest = 0.0  #: speed of the fastest impact on the foundation so far [m/s]
 
     def __init__(
         self,
@@ -203,11 +203,11 @@ class Transitions(Stateful):
         masses = self._tip_mass if with_tip else 0.0, 0.0 if self._alone else self._mass
         v, z = (end.velocity for end in ends)
         speed = max(abs(z), abs(v) if with_tip else 0.0)
-        self.state = max(self.state, speed)
+        self._hardest = max(self._hardest, speed)
         after, before = (common_velocity(tip.velocity, low.velocity, *masses) for tip, low in (ends, start))
         # It strikes while rising if the rebound would be over in no time.
-        dies_out = after > 0.0 or e * speed <= _SEATING_SPEED * self.state
-        if not self._alone and elapsed > 0.0 and e * speed <= _SEATING_SPEED_UNSEEN * self.state:
+        dies_out = after > 0.0 or e * speed <= _SEATING_SPEED * self._hardest
+        if not self._alone and elapsed > 0.0 and e * speed <= _SEATING_SPEED_UNSEEN * self._hardest:
             # What presses it down is told by the flight: C at its end may be off by what reverses a mismatch of
             # velocities, (d + 1)(d + 2) times their quotient by the step. It rises by (e z)²/2a; each impact is found
             # to no better than the tolerance, which brings it as much.

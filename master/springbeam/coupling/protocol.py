@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Memory, Motion, Stateful, StepRefused
+from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Motion, StepRefused
 
 #: Conditions on the gap over a step of size H as a linear map of an end's motion, each in metres.
 Conditions = Callable[[Motion, float], tuple[float, ...]]
@@ -44,14 +45,15 @@ class Scales(NamedTuple):
     reduced_mass: float  #: of both ends [kg]
 
 
-class Counts(Memory):
+@dataclass
+class Counts:
     """What a coupling remembers: at least what it has counted."""
 
     iterations: int = 0  #: corrections of the force since the start
     dissipated: float = 0.0  #: by a soft law since the start [J]
 
 
-class Coupling(Stateful):
+class Coupling:
     """Finds the contact force of a step and advances both bodies under it."""
 
     #: Degree of the contact force over a step.

@@ -12,6 +12,7 @@ find the root. `StepSolver` then tries the crossing on the bodies.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from operator import add, neg, sub
 
 import numpy as np
@@ -34,6 +35,7 @@ _ROUNDING = 1e-12
 _STIFFER = 16.0
 
 
+@dataclass
 class SoftState(Responses):
     """What the solver of a soft law remembers."""
 

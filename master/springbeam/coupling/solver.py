@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from math import inf
 from operator import add, sub
 
-import msgspec
 import numpy as np
 
 from ..bodies import force
@@ -67,10 +67,11 @@ Response = tuple[Matrix, Matrix | None, bool]
 _UNKNOWN: tuple[None, None, bool] = (None, None, False)
 
 
+@dataclass
 class Responses(Counts):
     """What a solver remembers."""
 
-    of_size: dict[float, Response] = msgspec.field(default_factory=dict)  #: by size [s], the last used at the end
+    of_size: dict[float, Response] = field(default_factory=dict)  #: by size [s], the last used at the end
     reach: float = 0.0  #: largest displacement of an end under a force found [m]
 
 

@@ -60,13 +60,11 @@ class RunDirectory:
         self.shapes = self.path / "shapes.csv"
         self.trajectory = self.path / "trajectory.csv"
         self.summary = self.path / "summary.json"
-        #: It exists until the run is done (`springbeam.run.checkpoint`).
-        self.checkpoint = self.path / "run.checkpoint"
         self._claim: finalize[..., RunDirectory] | None = None
 
     def results(self) -> list[Path]:
         """Return the result files that exist, and the files made from them."""
-        files = (self.summary, self.trajectory, self.events, self.shapes, self.steps, self.checkpoint)
+        files = (self.summary, self.trajectory, self.events, self.shapes, self.steps)
         made = (self.path / name for name in (*PARQUET, *PICTURES.values(), REPORT, *ANIMATIONS))
         return [file for file in (*files, *made) if file.exists()]
 

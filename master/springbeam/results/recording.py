@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from io import FileIO
@@ -15,7 +14,7 @@ from ..scene import Scene
 from .columns import blocks, trajectory_of
 from .dense import at_multiples
 from .directory import RunDirectory
-from .files import event_lines, lines, load_events, read_run, refuse_cut, write_rows, write_summary
+from .files import event_lines, lines, load_events, read_run, write_rows, write_summary
 from .steps import STEP
 from .trajectory import EVENT_COLUMNS, SHAPE_COLUMNS, Event, Trajectory
 
@@ -155,8 +154,6 @@ class FileRecorder(AbstractContextManager["FileRecorder"]):
             write_rows(self.directory, rows)
         finally:  # also where the disk has no room for them
             write_summary(self.directory, _with_scene({**summary, "files": self.directory.sizes()}, self.scene))
-            if summary.get("status") == "done":
-                self.directory.checkpoint.unlink(missing_ok=True)
 
     def close(self) -> None:
         """Close the files, and let other processes use the directory."""
@@ -167,44 +164,15 @@ class FileRecorder(AbstractContextManager["FileRecorder"]):
         for file in self._files.values():
             file.close()
 
-    def save(self) -> dict[str, int]:
-        """Write what was recorded to the disk, and return the sizes of its files [bytes], which `restore` needs."""
-        self._begin()
-        for file in self._files.values():
-            os.fsync(file.fileno())
-        return self.directory.sizes()
-
-    def restore(self, saved: Mapping[str, int]) -> None:
-        """Go on from what `save` of a recorder in the same directory returned; what came later is removed.
-
-        Raises
-        ------
-        ResultsUnreadable
-            If a file is missing or shorter than it was; nothing is removed then.
-        ResultsInUse
-            If another process is writing them.
-        """
-        self.directory.claim()
-        refuse_cut(self.directory, saved)
-        for name, size in saved.items():
-            os.truncate(self.directory.path / name, size)
-        self.directory.trajectory.unlink(missing_ok=True)
-        self._open()
-
     def _begin(self) -> None:
-        """Remove earlier results and open the files, if that is not done."""
+        """Remove earlier results and begin the files, if that is not done."""
         if self._files:
             return
         for file in self.directory.results():
             file.unlink()
-        self._open()
-
-    def _open(self) -> None:
-        """Open the files, begin new ones with their headers, and say that the run goes on."""
         self._files = {path: path.open("ab", buffering=0) for path in self._headers}
-        for path, file in self._files.items():
-            if file.tell() == 0:
-                _append(file, self._headers[path])
+        for path, header in self._headers.items():
+            _append(self._files[path], header)
         # Last: where there is a summary, there is a run that can be loaded.
         write_summary(self.directory, _with_scene({"status": "running"}, self.scene))
 

@@ -41,9 +41,6 @@ class Log:
         self.due = monotonic() + _WAITS
         if not self.records:
             return
-        if not self._first.size and len(earlier := self._recorder.steps()):  # this run goes on
-            self._events = int(earlier["events"][-1])
-            self._sound(earlier)
         steps, stopped = self._sound(np.frombuffer(b"".join(self.records), STEP))
         shapes = np.array(self.shapes).reshape(-1, len(SHAPE_COLUMNS))
         finite = np.isfinite(shapes).all(axis=1)

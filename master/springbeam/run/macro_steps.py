@@ -7,9 +7,9 @@ of higher order than those the scheme has imposed are looked at where the step h
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import ceil, inf, log2, sqrt
 
-from ..bodies.protocol import Memory, Stateful
 from ..contact.phases import Phase
 from ..coupling.protocol import Scales, Step
 from ..results.paths import Path
@@ -35,7 +35,7 @@ _ROUNDING = 64.0 * 2.0**-52
 _CUBIC = 4
 
 
-class MacroGrid(Stateful):
+class MacroGrid:
     """The grid t₀ + k H up to t_end [s]."""
 
     def __init__(self, start: float, end: float, macro_step: float) -> None:
@@ -64,7 +64,8 @@ class MacroGrid(Stateful):
         return target, H if abs(size - H) <= SAME * H else size
 
 
-class Adapted(Memory):
+@dataclass
+class Adapted:
     """The size of the next step, and how far the motion has come."""
 
     ways: list[tuple[float, float]]  #: lowest and highest position of each end [m]
@@ -73,7 +74,7 @@ class Adapted(Memory):
     just_rejected: bool = False
 
 
-class AdaptiveSteps(Stateful):
+class AdaptiveSteps:
     """Sizes that keep the error of each step at the tolerances of a scene.
 
     The error of a step of size H goes as H^order, so the next one is 0.9 (tolerance/error)^(1/order) times as long,

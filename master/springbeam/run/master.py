@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..bodies.gate import admit
-from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, Ends, RunState, Stateful, StepRefused
+from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, Ends, StepRefused
 from ..contact.laws import stiffest
 from ..contact.phases import Impact, Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
@@ -44,7 +44,7 @@ _NOTHING_FELT = (0.0, 0.0, 0.0, 0.0)
 _SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
 
 
-class Master(Stateful):
+class Master:
     """One run of a scene with given bodies, a step at a time.
 
     Parameters
@@ -127,29 +127,6 @@ class Master(Stateful):
     def hand_over(self) -> None:
         """Give the recorder the records that it does not have yet; see `Log.hand_over`."""
         self._log.hand_over()
-
-    def run_state(self) -> RunState:
-        """Return the state of every part; with the scene and the records so far, the run goes on from it."""
-        return {name: part.save() for name, part in self._parts().items()}
-
-    def go_on(self, saved: RunState) -> None:
-        """Continue where an equal run has returned `run_state`. Raises ValueError if it was another."""
-        parts = self._parts()
-        if saved.keys() != parts.keys():
-            raise ValueError(f"a state of {', '.join(saved)}, not of {', '.join(parts)}")
-        for name, part in parts.items():
-            part.restore(saved[name])
-
-    def _parts(self) -> dict[str, Stateful]:
-        pair = self._pair
-        return {
-            "run": self,
-            "steps": self._steps,
-            "transitions": self._transitions,
-            "coupling": pair.joined,
-            "beam": pair.upper,
-            "spring": pair.lower,
-        }
 
     def _step(self) -> None:
         state, steps, pair = self.state, self._steps, self._pair

@@ -5,20 +5,16 @@ from __future__ import annotations
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from .. import __version__
-from ..bodies.factory import findings, fingerprints, load_bodies
+from ..bodies.factory import load_bodies
 from ..bodies.fmu_bodies import FmuBody
 from ..bodies.protocol import Body
-from ..results.directory import RunDirectory
-from ..results.files import load_summary, load_trajectory
-from ..results.recording import FileRecorder, MemoryRecorder, Recorder
+from ..results.recording import MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
-from ..scene import ArgumentError, Scene, SceneError, as_scene, scene_from_dict, suspicions
-from .checkpoint import Checkpoint, CheckpointRefused
+from ..scene import ArgumentError, Scene, SceneError, as_scene, suspicions
 from .equilibrium import contact_at_rest
 from .master import Master
 from .outcome import Progress, RunStopped
@@ -34,8 +30,6 @@ class Simulation(AbstractContextManager["Simulation"]):
         What is simulated, as for `springbeam.simulate`; it asks for no accuracy.
     recorder
         Where the results go; default: kept in memory.
-    start
-        Go on from here, `last_checkpoint` of the directory of ``recorder``, instead of from the start.
     upper, lower
         Bodies that take the places of the beam and the spring, which the scene then describes as far as the master
         asks; they are the caller's to close.
@@ -46,8 +40,6 @@ class Simulation(AbstractContextManager["Simulation"]):
         If the scene asks for what its bodies cannot do, or for an accuracy.
     FmuError
         If an FMU cannot be found or loaded.
-    ResultsUnreadable, ResultsInUse
-        If the results do not belong to ``start``, or another process is writing them.
     """
 
     def __init__(
@@ -55,7 +47,6 @@ class Simulation(AbstractContextManager["Simulation"]):
         scene: Scene | Mapping[str, Any] | str | Path,
         recorder: Recorder | None = None,
         *,
-        start: Checkpoint | None = None,
         upper: Body | None = None,
         lower: Body | None = None,
     ) -> None:
@@ -69,23 +60,12 @@ class Simulation(AbstractContextManager["Simulation"]):
         self._bodies = beam, spring = load_bodies(of_scene, start_time, contact)
         try:
             self._master = Master(scene, start_time, upper or beam, lower or spring, self.recorder, contact)
-            if start is not None:
-                self._go_on(start)
         except BaseException:
             self.close()
             raise
         self._loaded = perf_counter()
-        self._setup_time, self._before = self._loaded - began, 0.0 if start is None else start.wall_time
+        self._setup_time = self._loaded - began
         self._summary: dict[str, Any] = {}  #: of the run when it has ended
-
-    def _go_on(self, start: Checkpoint) -> None:
-        assert isinstance(self.recorder, FileRecorder), "the results of a checkpoint are in its directory"
-        try:
-            self._master.go_on(start.state)
-        except ValueError as error:
-            path = self.recorder.directory.checkpoint
-            raise CheckpointRefused(f"{path}: written by another version: {error}") from error
-        self.recorder.restore(start.results)
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -129,28 +109,15 @@ class Simulation(AbstractContextManager["Simulation"]):
             self._end({"status": "done"})
         return not self.done
 
-    def finish(self, progress: Progress | None = None, seconds: float | None = None) -> dict[str, Any]:
+    def finish(self, progress: Progress | None = None) -> dict[str, Any]:
         """Make all steps that are left and return the summary. Raises RunStopped; parameters as of `run`."""
-        master, recorder, due = self._master, self.recorder, 0.0
-        if seconds is not None:
-            assert isinstance(recorder, FileRecorder), "a run with checkpoints has its results in a directory"
-            _refuse_checkpoints(self.scene)
-            files = fingerprints(self.scene)
+        master = self._master
         with self._ending():
             while not master.done:
                 master.step()
                 if progress is not None:
                     progress(master.state.time, master.state.phase.name, master.state.macro_steps)
-                if isinstance(recorder, FileRecorder) and seconds is not None and perf_counter() >= due:
-                    master.hand_over()
-                    kept, state = recorder.save(), master.run_state()
-                    begun = self.scene, __version__, files, seconds, self._wall_time(), recorder.interval
-                    Checkpoint(*begun, kept, state).write(recorder.directory.checkpoint)
-                    due = perf_counter() + seconds
         return self._end({"status": "done"})
-
-    def _wall_time(self) -> float:
-        return self._before + perf_counter() - self._loaded
 
     @contextmanager
     def _ending(self) -> Iterator[None]:
@@ -186,7 +153,8 @@ class Simulation(AbstractContextManager["Simulation"]):
         return self._summary
 
     def _summed_up(self, status: dict[str, Any]) -> dict[str, Any]:
-        wall_time, summary = self._wall_time(), self._master.summary()
+        wall_time = perf_counter() - self._loaded
+        summary = self._master.summary()
         told = zip(("beam", "spring"), self._bodies, strict=True)
         counting = {name: body for name, body in told if isinstance(body, FmuBody)}
         return {
@@ -206,8 +174,6 @@ def run(
     recorder: Recorder,
     progress: Progress | None = None,
     *,
-    seconds: float | None = None,
-    start: Checkpoint | None = None,
     upper: Body | None = None,
     lower: Body | None = None,
 ) -> dict[str, Any]:
@@ -215,13 +181,10 @@ def run(
 
     Parameters
     ----------
-    scene, recorder, start, upper, lower
+    scene, recorder, upper, lower
         As of `Simulation`, which raises the same errors.
     progress
         Called after each step.
-    seconds
-        Take a checkpoint into the directory of ``recorder``, which is then a `FileRecorder`, after the first step and
-        whenever so much time of the clock has passed [s].
 
     Raises
     ------
@@ -232,51 +195,8 @@ def run(
     OSError
         If the results cannot be written.
     """
-    with Simulation(scene, recorder, start=start, upper=upper, lower=lower) as simulation:
-        return simulation.finish(progress, seconds)
-
-
-def last_checkpoint(directory: str | Path) -> Checkpoint:
-    """The checkpoint of a run that is not done.
-
-    Raises
-    ------
-    CheckpointRefused
-        If the run is done, has no checkpoint, or would not go on as it began: another version of springbeam, another
-        FMU, another scene.
-    ResultsUnreadable
-        If ``directory`` holds no run.
-    FmuError
-        If an FMU is missing.
-    """
-    results = RunDirectory(directory)
-    summary = load_summary(results.path)
-    if summary.get("status") == "done":
-        raise CheckpointRefused(f"{results.path}: the run is done, nothing to resume")
-    if not results.checkpoint.exists():
-        raise CheckpointRefused(f"{results.path}: no checkpoint; springbeam run --checkpoint SECONDS takes them")
-    start = Checkpoint.read(results.checkpoint)
-    if start.version != __version__:
-        raise CheckpointRefused(f"{results.checkpoint}: written by springbeam {start.version}, this is {__version__}")
-    if start.scene != scene_from_dict(summary["scene"], source=f"{results.summary}: scene"):
-        raise CheckpointRefused(f"{results.summary}: its scene is not the one that was run")
-    found = fingerprints(start.scene)
-    changed = [name for name in found if found[name] != start.files.get(name)]
-    if changed:
-        raise CheckpointRefused(f"{results.checkpoint}: the run began with another {' and another '.join(changed)}")
-    return start
-
-
-def resume(directory: str | Path, progress: Progress | None = None) -> Trajectory:
-    """Go on with a run that was killed or stopped, from its last checkpoint to its end, and return all of it.
-
-    The files in ``directory`` then are those of a run that was never stopped, to the last bit. Raises as
-    `last_checkpoint` and `run` do.
-    """
-    start = last_checkpoint(directory)
-    with FileRecorder(start.scene, RunDirectory(directory), start.interval) as recorder:
-        run(start.scene, recorder, progress, seconds=start.seconds, start=start)
-    return load_trajectory(directory)
+    with Simulation(scene, recorder, upper=upper, lower=lower) as simulation:
+        return simulation.finish(progress)
 
 
 def simulate(
@@ -296,16 +216,6 @@ def _refuse_accuracy(scene: Scene) -> None:
             "run once; run springbeam.run.accuracy.pick(scene).scene, or give coupling.scheme, degree and "
             "macro_step instead"
         )
-
-
-def _refuse_checkpoints(scene: Scene) -> None:
-    """Raise SceneError if a foreign FMU of ``scene`` cannot write its state."""
-    for table, found in findings(scene).items():
-        if not found.abilities.serialized:
-            raise ArgumentError(
-                f"[{table}] fmu: its state cannot be written to a file (canSerializeFMUstate = false), which "
-                "--checkpoint needs; leave it out"
-            )
 
 
 def _without_own(scene: Scene, **own: Body | None) -> Scene:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from math import inf
 
 from ..bodies import force
 from ..bodies.elements import RigidWall
-from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Memory
+from ..bodies.protocol import NO_FORCE, Body, Ends, Force
 from ..contact.laws import law_of
 from ..contact.phases import Joint, Phase
 from ..coupling import coupling_of
@@ -24,12 +25,13 @@ _MOST_IN_A_ROW = 20_000
 _REACH_OF_FORCE = 4.0
 
 
-class State(Memory):
+@dataclass
+class State:
     """Where the run is, and what of the steps so far the next one needs."""
 
     time: float
     ends: Ends  #: after the last event
-    phase: Phase = Phase()
+    phase: Phase = field(default_factory=Phase)
     contact: Force = NO_FORCE  #: C of the last step, continued
     last_size: float = 0.0  #: of the last step [s]
     foundation: Force = NO_FORCE  #: N of the last step, continued

@@ -2,8 +2,8 @@
 
 * The columns of a case are its **axes**: keys of a scene, as ``spring.mass``, with their values, or labels. Its record
   adds columns: how the run ended, **metrics** of it, ``error_…`` beside a **reference**, ``cost_…``.
-* A `Study` holds what was asked for as plain values. They alone decide its cases, so `springbeam resume` needs no more
-  than the results to go on.
+* A `Study` holds what was asked for as plain values. They alone decide its cases, so the same command
+  goes on with what is in the results.
 * A case is computed by itself, in any order, in this process or by workers. Each record is in ``study.jsonl`` of the
   results as soon as its case is done. The first line there says which study it is, with which version and which FMUs.
   Nothing is written before the FMUs are found, and nothing stays where no case was done.
@@ -25,7 +25,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import closing, contextmanager
-from importlib import import_module, metadata
+from importlib import metadata
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -33,7 +33,7 @@ from time import perf_counter
 from typing import Any, ClassVar
 
 from pebble import ProcessExpired, ProcessPool
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 from pydantic_core import from_json, to_json
 
 from ..bodies.factory import fingerprints
@@ -47,16 +47,8 @@ from .metrics import Metric, costs
 from .tables import Findings, Row
 
 FILE = "study.jsonl"
-#: Where `study_in` finds each kind.
-_STUDIES = {
-    "sweep": ".sweep:Sweep",
-    "tradeoff": ".tradeoff:Tradeoff",
-    "converge": ".converge:Converge",
-    "stability": ".stability.grid:Grid",
-    "crosscheck": ".crosscheck:Crosscheck",
-    "orders": ".crosscheck:Orders",
-    "fit": ".fit:Fit",
-}
+#: How the files of studies begin.
+_KINDS = ("sweep", "tradeoff", "converge", "stability", "crosscheck", "orders", "fit")
 #: ``report(record)``, called for each record that is new.
 Report = Callable[[Row], None]
 #: Cases under way: on a cluster, and for each process here.
@@ -194,7 +186,7 @@ class Records:
             self._file.truncate(self._whole)  # without a line that was cut short
             if not self._whole:
                 for stale in self.path.parent.iterdir():
-                    if re.split(r"[.-]", stale.name)[0] in _STUDIES:
+                    if re.split(r"[.-]", stale.name)[0] in _KINDS:
                         stale.unlink()
                 self._write(self._settings)
         self._write({"case": name, "record": record})
@@ -216,30 +208,6 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Row], int]:
         return settings, {entry["case"]: entry["record"] for entry in entries}, sum(map(len, lines))
     except (ValueError, KeyError, TypeError) as error:
         raise ResultsUnreadable(f"{path}: not a file of records: {error}") from error
-
-
-def study_in(directory: Path) -> Study | None:
-    """Return the study that ``directory`` holds, ``None`` if it holds none.
-
-    Raises
-    ------
-    ResultsUnreadable
-        If it cannot be read, or cannot go on with this springbeam and these FMUs.
-    """
-    first, _, _ = _read(directory / FILE)
-    if not first:
-        return None
-    try:
-        module, name = _STUDIES[first["study"]].split(":")
-        study: Study = getattr(import_module(module, __package__), name).model_validate(first["settings"])
-        same = first == study.settings()
-    except (KeyError, ValidationError):
-        same = False
-    if not same:
-        raise ResultsUnreadable(
-            f"{directory}: was begun with another springbeam or other FMUs; the first command with --force begins anew"
-        )
-    return study
 
 
 def troubles(records: Mapping[str, Row]) -> list[str]:
