@@ -5,6 +5,7 @@ from __future__ import annotations
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -14,7 +15,7 @@ from ..bodies.fmu_bodies import FmuBody
 from ..bodies.protocol import Body
 from ..results.recording import MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
-from ..scene import ArgumentError, Scene, SceneError, as_scene, suspicions
+from ..scene import Scene, SceneError, as_scene, suspicions
 from .equilibrium import contact_at_rest
 from .master import Master
 from .outcome import Progress, RunStopped
