@@ -100,7 +100,7 @@ def test_every_panel_is_in_one_picture():
 def written(figure):
     """What is written but numbers at axes: title, mark, keys and quantities."""
     keys = [legend for legend in (*figure.legends, *(ax.get_legend() for ax in figure.axes)) if legend is not None]
-    quantities = [label for ax in figure.axes for label in (ax.xaxis.label, ax.yaxis.label)]
+    quantities = [axis.label for ax in figure.axes for axis in (ax.xaxis, ax.yaxis) if axis.get_visible()]
     found = [*figure.texts, *(text for key in keys for text in key.get_texts()), *quantities]
     return [text for text in found if text.get_text()]
 

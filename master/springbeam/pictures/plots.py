@@ -31,7 +31,7 @@ from .drawing import (
     readable_unit,
 )
 from .panels import panels
-from .timeline import DPI, REMARK, STYLE, figure_for, line_style, timeline
+from .timeline import COMPRESSION, DPI, REMARK, STYLE, figure_for, line_style, timeline
 
 _SHAPES_EARLY, _SHAPES_LATER = 20, 24
 #: Of the heights of panels, in the overview.
@@ -62,7 +62,7 @@ def plot_run(trajectory: Trajectory, directory: str | Path, names: Iterable[str]
     for name in names:
         if (figure := _drawn(trajectory, name)) is not None:
             written.append(Path(directory) / PICTURES[name])
-            figure.savefig(written[-1], dpi=DPI)
+            figure.savefig(written[-1], dpi=DPI, pil_kwargs=COMPRESSION)
     return written
 
 
