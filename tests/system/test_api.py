@@ -273,3 +273,21 @@ def test_a_script_that_asks_for_processes_outside_of_its_guard_is_refused(tmp_pa
     assert done.stderr.splitlines()[-1].endswith(said)
     script.write_text("\n".join(lines).format('if __name__ == "__main__": '))
     assert ran(sys.executable, script) == "2\n"
+
+
+def test_a_simulation_gives_its_fmus_back_once_and_steps_no_more():
+    """Closed twice, its instances served two later runs at once, each of which moved the other's."""
+    scene = with_changes(load_scene("soft"), time={"t_end": 0.1}, beam={"n_elements": 8})
+    alone = springbeam.simulate(scene)
+    first = springbeam.Simulation(scene)
+    first.step()
+    first.close()
+    for makes_steps in (first.step, first.finish):
+        with pytest.raises(ValueError, match="is closed"):
+            makes_steps()
+    second = springbeam.Simulation(scene)
+    first.close()
+    with second, springbeam.Simulation(scene) as third:
+        while second.step():
+            third.step()
+        assert second.run.steps.tobytes() == alone.steps.tobytes()

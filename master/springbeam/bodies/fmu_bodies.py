@@ -224,7 +224,10 @@ class OwnBody(FmuBody):
     _loads: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
 
     def __init__(self, parameters: dict[str, Value], start_time: float) -> None:
-        self.fmu, self.state, self._shares = Fmu.of(self.NAMES.fmu, parameters, start_time), FmuState(), {}
+        self.fmu = Fmu.of(self.NAMES.fmu, parameters, start_time)
+        self._leased: Fmu | None = self.fmu  #: until it is given back, once
+        self.state = FmuState()
+        self._shares = {}
         try:
             self._connect()
             self._begin(*self.fmu.once(Fmu.reading, (self.NAMES.mass,))())
@@ -282,7 +285,9 @@ class OwnBody(FmuBody):
         return made_of(Energies, (kinetic, potential, dissipated, of_loads))
 
     def close(self) -> None:
-        self.fmu.give_back()
+        fmu, self._leased = self._leased, None
+        if fmu is not None:  # it may be another body's by now
+            fmu.give_back()
 
 
 class FmuBeam(OwnBody, BeamBody):
