@@ -7,6 +7,7 @@ import pytest
 from bodies import DuffingBody, Upper, simulate, stopping
 from scenes import kinds, scene_from_dict
 
+import springbeam
 from springbeam import SpringDamper
 from springbeam.bodies.gate import admit
 from springbeam.bodies.protocol import NO_FORCE, Abilities, Body, StepRefused
@@ -300,3 +301,35 @@ def test_a_body_of_ones_own_that_cannot_be_is_refused():
         SpringDamper(0.0)
     with pytest.raises(NotImplementedError, match="Body has neither mark nor state"):
         Body().mark()
+
+
+class Rigid(Upper):
+    """One that steps by one size alone."""
+
+    abilities = Abilities(any_size=False)
+
+
+def test_a_body_of_the_callers_starts_at_0_with_steps_that_are_counted_from_there():
+    """The beam of its scene would arrive at 0.1501 s, between two steps; 0.3 s are 30 whole ones from 0 on."""
+    scene = with_changes(
+        load_scene("soft"),
+        time={"t_end": 0.3},
+        beam={"initial_deflection_slope": 0.1501},
+        contact={"law": "compliance", "stiffness": 10.0, "exponent": 1.0},
+        coupling={"macro_step": 0.01},
+        stop=None,
+    )
+    run = springbeam.simulate(scene, upper=Rigid(1.0, 0.0, 0.0, y=0.1501, z=-1.0))
+    assert run.time[0] == 0.0
+    assert run.steps["size"][1:] == pytest.approx(np.full(30, 0.01), rel=1e-12)
+
+
+@pytest.mark.parametrize("law", ["compliance", "link"])
+@pytest.mark.parametrize("place", ["upper", "lower"])
+def test_an_end_without_inertia_is_refused_where_no_force_can_be_found(law, place):
+    """A lower one ended in a division by 0."""
+    scene = with_changes(load_scene("soft"), beam={"n_elements": 4}, contact={"law": law, "stiffness": 9.0}, stop=None)
+    body = DuffingBody(1.0, 3.0, 0.0)
+    body.mass = 0.0
+    with pytest.raises(SceneError, match=r"mass = 0: only an upper end can be without inertia"):
+        springbeam.simulate(scene, **{place: body})

@@ -172,6 +172,12 @@ def admit(scene: Scene, start_time: float, upper: Body | None, lower: Body | Non
     """
     bodies = {name: body for name, body in (("beam", upper), ("spring", lower)) if body is not None}
     lines = refusals(scene, {table: _abilities(body) for table, body in bodies.items()})
+    lines += [
+        f"the body in [{table}]: mass = 0: only an upper end can be without inertia, tied by a rigid law to one that "
+        "has some; give it a mass greater than 0 [kg]"
+        for table, body in bodies.items()
+        if body.massless and (table == "spring" or lower is None or scene.contact.soft)
+    ]
     if scene.stop is not None and (bodies.keys() & {"spring"} or not scene.static):  # else the stop holds the tip up
         table, end = list(bodies.items())[-1]
         w, floor = end.motion().displacement, scene.stop.position

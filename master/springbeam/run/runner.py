@@ -56,7 +56,9 @@ class Simulation(AbstractContextManager["Simulation"]):
         _refuse_accuracy(scene)
         self.scene, self.recorder = scene, recorder or MemoryRecorder(scene)
         of_scene = _without_own(scene, upper=upper, lower=lower)
-        start_time = 0.0 if upper is not None else scene.contact_time or 0.0
+        if upper is not None and scene.beam is not None:  # it moves from the start on, as an elastic approach does
+            scene = scene.model_copy(update={"upper": scene.beam.model_copy(update={"approach": "elastic"})})
+        start_time = scene.contact_time or 0.0
         contact = contact_at_rest(of_scene)
         self._bodies = beam, spring = load_bodies(of_scene, start_time, contact)
         try:
@@ -67,12 +69,14 @@ class Simulation(AbstractContextManager["Simulation"]):
         self._loaded = perf_counter()
         self._setup_time = self._loaded - began
         self._summary: dict[str, Any] = {}  #: of the run when it has ended
+        self._closed = False
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
-        """Release the FMUs; what was computed stays."""
+        """Release the FMUs; what was computed stays, and no step can be made any more."""
+        self._closed = True
         for body in self._bodies:
             if body is not None:
                 body.close()
@@ -102,8 +106,14 @@ class Simulation(AbstractContextManager["Simulation"]):
     def step(self) -> bool:
         """Make one step, to the next macro point or event, and return whether there are more to come.
 
-        Raises RunStopped if the run ends early; what was computed is in its ``run``.
+        Raises
+        ------
+        RunStopped
+            If the run ends early; what was computed is in its ``run``.
+        ValueError
+            After `close`.
         """
+        self._refuse_closed()
         with self._ending():
             self._master.step()
         if self.done:
@@ -111,7 +121,8 @@ class Simulation(AbstractContextManager["Simulation"]):
         return not self.done
 
     def finish(self, progress: Progress | None = None) -> dict[str, Any]:
-        """Make all steps that are left and return the summary. Raises RunStopped; parameters as of `run`."""
+        """Make all steps that are left and return the summary; parameters as of `run`, errors as of `step`."""
+        self._refuse_closed()
         master = self._master
         with self._ending():
             while not master.done:
@@ -119,6 +130,10 @@ class Simulation(AbstractContextManager["Simulation"]):
                 if progress is not None:
                     progress(master.state.time, master.state.phase.name, master.state.macro_steps)
         return self._end({"status": "done"})
+
+    def _refuse_closed(self) -> None:
+        if self._closed:
+            raise ValueError("the simulation is closed, and its bodies with it; make another one")
 
     @contextmanager
     def _ending(self) -> Iterator[None]:
