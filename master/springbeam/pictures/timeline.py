@@ -69,7 +69,7 @@ def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Fig
     _title(figure, heading, trajectory)
     shade(axes[0], trajectory, _reach(axes, 0)[0])
     shades = [Patch(facecolor=look.colour, edgecolor=GREY, linewidth=0.5, label=look.words) for look in phases]
-    keys = [*shades, *_mark_events(axes, marks, trajectory)]
+    keys = [*shades, *_mark_events(figure, axes, marks, trajectory)]
     # Legends fill column by column; these read row by row.
     keys = [key for column in range(_KEY_COLUMNS) for key in keys[column::_KEY_COLUMNS]]
     if keys:
@@ -108,13 +108,13 @@ def _reach(axes: Sequence[Axes], k: int) -> tuple[float, float]:
     return (axes[-1].get_position().y0 - own.y0) / own.height, (axes[0].get_position().y1 - own.y0) / own.height
 
 
-def _mark_events(axes: list[Axes], marks: Sequence[EventMark], trajectory: Trajectory) -> list[Line2D]:
+def _mark_events(figure: Figure, axes: list[Axes], marks: Sequence[EventMark], trajectory: Trajectory) -> list[Line2D]:
     """Mark events above the first panel, in a row for each kind, and by lines through all unless they are many.
 
     Returns what the key shows.
     """
     factor = time_unit(trajectory).factor
-    inch = axes[0].figure.get_figheight() * axes[0].get_position().height
+    inch = figure.get_figheight() * axes[0].get_position().height
     handles: list[Line2D] = []
     across = axes[0].get_xaxis_transform()
     for row, event in enumerate(marks):
@@ -169,10 +169,10 @@ def paint(ax: Axes, panel: Panel, clock: Unit) -> None:
     elif ax.get_ylim()[0] < 0.0 < ax.get_ylim()[1]:
         ax.axhline(0.0, color=GREY, lw=0.5, zorder=1)
     # The key stands beside the panel.
-    handles, words = ax.get_legend_handles_labels()
+    handles, labels = ax.get_legend_handles_labels()
     ax.legend(
         handles,
-        [textwrap.fill(text, _KEY_WIDTH) for text in words],
+        [textwrap.fill(label, _KEY_WIDTH) for label in labels],
         loc="upper left",
         bbox_to_anchor=(1.005, 1.0),
         frameon=False,
