@@ -66,7 +66,7 @@ def compared(beam: Any, spring: Any, contact: dict[str, Any]) -> tuple[Trajector
         bodies = [place[kind] if isinstance(place, tuple) else place for place in (beam, spring)]
         if kind == 0 and "fmu" in bodies[1]:
             bodies[1] = {**bodies[1], "force_sign": -1}
-        data = {"time": {"t_end": 1.5}, "coupling": {"macro_step": 1e-3}, "contact": contact}
+        data = {"time": {"t_end": 1.5}, "coupling": {"macro_step": 1e-3, "degree": 0}, "contact": contact}
         runs.append(simulate(scene_from_dict({**data, "beam": bodies[0], "spring": bodies[1]})))
     fmu, element = runs
     return fmu, element, max(float(np.abs(fmu[name] - element[name]).max()) for name in ("u_tip", "y"))

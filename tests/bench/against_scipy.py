@@ -50,9 +50,8 @@ def accuracy(effort):
         exact = event_driven.simulate(soft, sample_times=TIMES).y
         scale = float(np.abs(exact).max())
         families = [
-            [_candidate(soft, exact, scheme, steps, *tolerances) for steps in (STEPS[-2:] if effort.quick else STEPS)]
+            [_candidate(soft, exact, steps, *tolerances) for steps in (STEPS[-2:] if effort.quick else STEPS)]
             for tolerances in (TOLERANCES[2:3] if effort.quick else TOLERANCES)
-            for scheme in ("energy", "hermite")
         ]
         rival = Rival(soft)
         theirs = []
@@ -80,10 +79,10 @@ def accuracy(effort):
         methods = list(dict.fromkeys(m for seconds, _, m, _ in theirs if seconds <= _HOPELESS * best))
 
 
-def _candidate(soft, exact, scheme, steps, tolerance, ida):
+def _candidate(soft, exact, steps, tolerance, ida):
     scene = with_changes(
         soft,
-        coupling={"scheme": scheme, "degree": 2, "macro_step": UNTIL / steps, "tolerance": tolerance},
+        coupling={"degree": 2, "macro_step": UNTIL / steps, "tolerance": tolerance},
         spring={"relative_tolerance": ida, "absolute_tolerance": 1e-2 * ida},
     )
     error = float(np.abs(simulate(scene).at(TIMES).y - exact).max())

@@ -20,8 +20,6 @@ WAYS = {
     "energy 2": {"scheme": "energy", "degree": 2},
     "energy 0, H/4": {"scheme": "energy", "degree": 0, "finer": 4.0},
     "energy 2, H/4": {"scheme": "energy", "degree": 2, "finer": 4.0},
-    "hermite 2": {"scheme": "hermite", "degree": 2},
-    "auto": {"scheme": "auto"},
 }
 #: What a run at a fixed step may be wrong by.
 FIXED = 1e-2

@@ -30,11 +30,12 @@ from springbeam.studies.stability.predict import impulse_integrals
 class Double(Body):
     """Counts its steps; `CHANGES` names the attributes that a step changes."""
 
-    CHANGES = ("_integrals", "_dissipated", "_work")
+    CHANGES = ("_integrals", "_dissipated", "_work", "_acting")
 
     def __init__(self):
         self._integrals = (0.0, 0.0)
         self._dissipated = self._work = 0.0
+        self._acting = None  #: at the end of the last step, on the modes or the mass [N]
         self.steps = 0
 
     def mark(self):
@@ -42,6 +43,12 @@ class Double(Body):
 
     def rewind(self):
         vars(self).update(self._marked)
+
+    def _trial(self, time, size):
+        before = {name: getattr(self, name) for name in self.CHANGES}
+        end, self.steps = self.advance_alone(time, size), self.steps - 1
+        vars(self).update(before)
+        return end
 
 
 class ModalBody(Double, BeamBody):
@@ -90,6 +97,7 @@ class ModalBody(Double, BeamBody):
         self.a, i1, i2 = map(integral, range(3))
         self.v = S[0] * v - self.omega**2 * S[1] * a + (f * S[1:4]).sum(axis=0)
         self._integrals = (float(self.b @ i1), float(self.b @ i2))
+        self._acting = f[0] + size * (f[1] + 0.5 * size * f[2])
         once, twice = i1 - a * size, i2 - a * (0.5 * size * size)
 
         def work(force):
@@ -101,6 +109,9 @@ class ModalBody(Double, BeamBody):
         if self._damping.any():
             self._dissipated += work(f) - (sum(self.energies()[:2]) - stored)
         return self.motion()
+
+    def acceleration(self):
+        return float(self.b @ (self._acting - self._damping * self.v - self.omega**2 * self.a))
 
     def motion(self):
         return Motion(float(self.b @ self.a), float(self.b @ self.v), *self._integrals)
@@ -165,6 +176,7 @@ class DuffingBody(Double, EndLoaded):
             i1 += _value(once, h)
             self.y, self.z = _value(y, h), _value(z, h)
         self._integrals = (i1, i2)
+        self._acting = shifted(force, size)[0]
         self._work += work_on(self._on_end, start, self.motion(), size)
         return self.motion()
 
@@ -190,6 +202,10 @@ class DuffingBody(Double, EndLoaded):
                 return h
             h *= 0.75
         raise AssertionError(f"no step: {y}")
+
+    def acceleration(self):
+        elastic = self.k1 * self.y + self.k2 * self.y**3
+        return (self._acting + self.external - self.damping * self.z - elastic) / self.mass
 
     def motion(self):
         return Motion(self.y, self.z, *self._integrals)

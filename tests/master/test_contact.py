@@ -23,19 +23,16 @@ def transitions_of(scene="soft", tip_mass=0.01, mass=1.0, equilibrium=0.0, **tab
 
 
 @pytest.mark.parametrize("kind", [EventKind.RELEASE, EventKind.SEPARATION])
-@pytest.mark.parametrize(("v", "one_velocity"), [(0.5, True), (0.69, True), (0.71, False), (-3.0, True)])
-def test_ends_that_are_let_go_have_one_velocity_but_where_they_vibrate(kind, v, one_velocity):
-    """Parting by 20 % of the largest speed, here 1 m/s, and more is no error of the scheme."""
+@pytest.mark.parametrize("v", [0.5, 3.0, -3.0])
+def test_ends_that_part_have_one_velocity(kind, v):
+    """That of their momentum."""
     z, tip_mass, mass = 0.5, 0.01, 1.0
     ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, z, 0.0, 0.0)
     _, phase, impact = transitions_of().after(kind, Phase(Joint.TIED), ends, 0.0, ends, 0.0, 1e-17)
     assert phase.joint is Joint.FREE
     v_after, z_after = v + impact.on_beam / tip_mass, z + impact.on_spring / mass
-    if one_velocity:
-        assert v_after == pytest.approx(z_after, rel=1e-14)
-        assert tip_mass * v_after + mass * z_after == pytest.approx(tip_mass * v + mass * z, rel=1e-14)
-    else:
-        assert (v_after, z_after) == (v, z)
+    assert v_after == pytest.approx(z_after, rel=1e-14)
+    assert tip_mass * v_after + mass * z_after == pytest.approx(tip_mass * v + mass * z, rel=1e-14)
 
 
 @pytest.mark.parametrize("seated", [False, True])
@@ -94,9 +91,9 @@ def test_a_phase_has_its_name_in_a_record(joint, seated):
     assert PHASE_NAMES[int(phase.number)] == phase.name == ("seated" if seated else joint.value)
 
 
-@pytest.mark.parametrize(("v", "left"), [(0.19, 0.0), (-3.0, 0.0), (0.21, 0.21)])
+@pytest.mark.parametrize("v", [0.19, -3.0])
 @pytest.mark.parametrize(("kind", "mass"), [("separation", inf), ("separation", 1.0), ("unseated", 1.0)])
-def test_a_tip_that_the_foundation_lets_go_leaves_at_rest_but_where_it_vibrates(kind, mass, v, left):
+def test_a_tip_that_leaves_the_foundation_leaves_at_rest(kind, mass, v):
     """It rests on the stop, or on a seated spring top, which stays or leaves with it: the foundation gives the impulse.
 
     A tip that leaves tied to the top with another velocity would strike the foundation at once, or fly higher.
@@ -109,8 +106,8 @@ def test_a_tip_that_the_foundation_lets_go_leaves_at_rest_but_where_it_vibrates(
     assert (found, phase) == (kind, opened)
     assert impact.on_spring == 0.0
     assert impact.of_foundation == impact.on_beam
-    assert v + impact.on_beam / tip_mass == pytest.approx(left, abs=1e-15)
-    assert impact.energy_loss == pytest.approx(0.5 * tip_mass * (v**2 - left**2), rel=1e-12)
+    assert v + impact.on_beam / tip_mass == pytest.approx(0.0, abs=1e-15)
+    assert impact.energy_loss == pytest.approx(0.5 * tip_mass * v**2, rel=1e-12)
 
 
 @pytest.mark.parametrize(("speed", "tolerance", "kind"), [

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from bodies import DuffingBody, Upper
 
-from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Motion, StepRefused
 from springbeam.contact.events import EventFunctions, locate, no_dip, position_tolerance
 from springbeam.contact.laws import law_of
@@ -16,8 +15,7 @@ from springbeam.coupling.protocol import Step
 from springbeam.results.paths import Path
 from springbeam.run.detection import Detector
 from springbeam.run.macro_steps import MacroGrid
-from springbeam.run.separation import first_by_force
-from springbeam.run.stepping import Pair
+from springbeam.run.stepping import Pair, Present
 from springbeam.scene import load_scene, with_changes
 
 SIZE = 0.02
@@ -142,39 +140,44 @@ def test_a_motion_that_jumps_with_the_size_of_the_step_has_no_event(jump, refuse
 
 
 def pushing(monkeypatch, push, seated=False):
-    """A pair whose ends touch, and its state: in a step of H, ``push(H)`` [N] is what may end.
+    """Return a detector of ends that touch, their state, and a step of H = 1 ms.
 
-    A force that turns a mismatch round, 3 N of the contact's, is no part of it.
+    After ``size`` [s] the force is ``push(size)`` [N]; its mean is that of the parabola through ends and middle.
     """
-    scene = with_changes(load_scene("soft"), coupling={"degree": 1})
+    scene = load_scene("soft")
     pair = Pair(scene, Upper(2.0), DuffingBody(1.0))
-
-    def attempt(state, size, start, phase=None):
-        own, other = push(size), (3.0, 0.0, 0.0)
-        contact, foundation = (other, force.combined((1.0, 1.0), (own, other))) if seated else (own, NO_FORCE)
-        return Step(0.0, size, contact, foundation, start, start)
-
-    monkeypatch.setattr(pair, "attempt", attempt)
-    monkeypatch.setattr(pair, "force_without_mismatch", lambda phase, step: NO_FORCE if seated else step.contact)
     state = pair.initial_state(0.0)
     state.enter(Phase(Joint.TIED if seated else Joint.TOUCH, seated))
-    return pair, state
+    state.present = Present(push(0.0), push(0.0))
+
+    def attempt(state, size, start):
+        pair._last = Step(0.0, size, NO_FORCE, NO_FORCE, start, start)
+        return pair._last
+
+    monkeypatch.setattr(pair, "attempt", attempt)
+    monkeypatch.setattr(pair, "present", lambda phase, step, H: Present(*[push(step.size)] * 2))
+    monkeypatch.setattr(pair, "rewind", lambda: None)
+    mean = lambda kind, phase, step: (push(0.0) + 4.0 * push(0.5 * step.size) + push(step.size)) / 6.0  # noqa: E731
+    monkeypatch.setattr(pair, "mean_of", mean)
+    return Detector(scene, pair, MacroGrid(0.0, 1.0, 1e-3)), state, attempt(state, 1e-3, pair.ends())
 
 
 @pytest.mark.parametrize("seated", [False, True])
-def test_the_zero_of_a_force_is_where_the_step_that_tells_it_best_has_it(monkeypatch, seated):
-    """0.5 N + 100 N/s · H − 1 kN/s · τ in a step of H: with H = τ/s its zero is at 0.5/(1000 − 100/s) s."""
-    pair, state = pushing(monkeypatch, lambda size: (0.5 + 100.0 * size, -1000.0, 0.0), seated)
-    step, event = first_by_force(pair, state, pair.attempt(state, 1e-3, pair.ends()), 1e-3)
-    assert event == ("unseated" if seated else "separation")
-    assert step.size == pytest.approx(0.5 / (1000.0 - 100.0 / pair.joined.sharpest), abs=1e-11)
-
-
-def test_a_force_that_longer_trial_steps_know_nothing_of_vanishes_where_its_own_step_has_it(monkeypatch):
-    """A step of 0.1 H, in which it falls to 0 in the middle; steps of 0.25 H begin below 0. It did so at the start."""
-    pair, state = pushing(monkeypatch, lambda size: (0.05 if size <= 1e-4 else -0.01, -1000.0, 0.0))
-    step, event = first_by_force(pair, state, pair.attempt(state, 1e-4, pair.ends()), 1e-3)
-    assert (event, step.size) == ("separation", pytest.approx(5e-5, abs=1e-15))
+@pytest.mark.parametrize(
+    ("push", "zero"),
+    [
+        (lambda t: np.cos(2e3 * t), 0.25e-3 * np.pi),
+        (lambda t: 1.0 - 1e3 * t + 30.0 * (1e3 * t) ** 3, None),  # dips, but not so far
+        (lambda t: (1e3 * t - 0.3) * (1e3 * t - 0.6), 0.3e-3),  # pulls inside the step alone
+        (lambda t: -1.0, 0.0),
+    ],
+)
+def test_ends_part_and_a_seat_is_left_where_the_force_between_them_vanishes(monkeypatch, push, zero, seated):
+    detector, state, step = pushing(monkeypatch, push, seated)
+    found, kind = detector.first_event(state, step)
+    expected = None if zero is None else "unseated" if seated else "separation"
+    assert kind == expected
+    assert found.size == pytest.approx(1e-3 if zero is None else zero, abs=1e-11)
 
 
 @pytest.mark.parametrize(

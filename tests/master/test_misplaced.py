@@ -72,7 +72,7 @@ def test_ends_are_as_far_off_as_is_said(case):
 TIED = {
     "hard and damped spring": (
         {**CASES["hard and damped spring"], "contact": {"law": "tie"}, "time": {"t_end": 0.6}},
-        (0.1, 1.2),
+        (0.15, 1.35),
     ),
     "ends that part and meet": ({"stop": None, "time": {"t_end": 0.8}}, (0.35, 0.25)),
     "strokes on the foundation": (
@@ -94,8 +94,7 @@ def test_tied_ends_are_as_far_off_as_is_said(case):
 
 
 def test_ends_that_part_with_different_velocities_are_said_to_be_off():
-    """A light tip and a spring of 113 g, which the foundation has struck, part by 0.05 m/s, more than they
-    may part by for an error of the scheme."""
+    """A light tip and a spring of 113 g, which the foundation has struck, by 0.05 m/s: they take one velocity."""
     tables = {
         "time": {"t_end": 0.0123},
         "beam": {
@@ -122,12 +121,12 @@ def test_ends_that_part_with_different_velocities_are_said_to_be_off():
         simulate(scene_from_dict({**tables, "coupling": {"degree": 2, "macro_step": H}})) for H in (2.5e-4, 2e-5)
     )
     said, off = both_ends(coarse, fine)
-    assert off > 0.01
-    assert off < said < 4.0 * off
+    assert off > 2e-3
+    assert said == pytest.approx(off, rel=0.4)
 
 
 def test_ends_that_are_let_go_while_they_pull_are_off_by_the_time_of_it():
-    """The tie pulls by 100 N where y passes Ψ: y is 1.6 µm off, so it is let go 3 µs late, which both ends keep."""
+    """The tie pulls by 100 N where y passes Ψ: y is off, so it is let go late, which both ends keep."""
     tables = {
         "time": {"t_end": 0.38},
         "beam": {
@@ -146,8 +145,8 @@ def test_ends_that_are_let_go_while_they_pull_are_off_by_the_time_of_it():
         "stop": {"position": -0.0654413},
     }
     exact, run = (
-        simulate(scene_from_dict({**tables, "coupling": {"scheme": scheme, "degree": 2, **steps}}))
-        for scheme, steps in (("energy", {"macro_step": 1e-4}), ("hermite", {"relative_tolerance": 1e-5}))
+        simulate(scene_from_dict({**tables, "coupling": {"degree": degree, "macro_step": H}}))
+        for degree, H in ((2, 1e-4), (0, 2e-3))
     )
     said, off = both_ends(run, exact)
     assert said == pytest.approx(off, rel=0.4)

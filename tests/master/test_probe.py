@@ -105,7 +105,7 @@ def stepped(start):
     (LINKED, SLOW, []),
     *(({"coupling": {"scheme": scheme, "degree": degree}}, {"integrals": integrals}, ["[coupling] degree"] * lacking)
       for scheme, degree, integrals, lacking in (
-          ("energy", 1, 1, 0), ("energy", 2, 1, 1), ("hermite", 1, 0, 0), ("hermite", 2, 1, 0), ("hermite", 2, 0, 1))),
+          ("energy", 1, 1, 0), ("energy", 2, 1, 1), ("energy", 2, 0, 1))),
     *((stepped(start), {"any_size": False}, ["[[loads]]"] * apart)
       for start, apart in ((0.6026, 0), (0.602725, 1), (1.700225, 0))),
 ])  # fmt: skip

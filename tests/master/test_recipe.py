@@ -94,7 +94,3 @@ def test_pictures_report_and_messages_call_it_what_it_is():
         SceneError, match=r'damping = 1.0: \[contact\] law = "stiffening" has none; use 0.0, "compliance" or "link"'
     ):
         with_changes(bumper(), contact={"damping": 1.0})
-    with pytest.raises(
-        SceneError, match=r'needs a rigid law; with \[contact\] law = "stiffening" use scheme = "energy"'
-    ):
-        with_changes(bumper(), coupling={"scheme": "hermite"})

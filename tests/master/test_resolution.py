@@ -74,27 +74,14 @@ def test_one_radian_of_the_slowest_oscillation_is_the_limit(turn, resolved):
     assert (not_resolved(driven) is None) is resolved
 
 
-@pytest.mark.parametrize("damped", [1.0, 2.0])
-@pytest.mark.parametrize(("turn", "resolved"), [(2.98, True), (3.02, False)])
-def test_three_radians_of_the_fastest_mode_are_the_limit_of_hermite(turn, resolved, damped):
-    """Damping lets waves last up to ω α = 0.15; only these count."""
-    omega = fastest_frequency(PAIR.beam) / damped
-    beam = {} if damped == 1.0 else {"alpha_b": 0.15 / omega}
-    told = not_resolved(
-        with_changes(PAIR, beam=beam, coupling={"scheme": "hermite", "degree": 2, "macro_step": turn / omega})
-    )
-    assert told is None if resolved else f"a macro_step of {3.0 / omega:.2g} s" in told
-
-
 @pytest.mark.parametrize("degree", [0, 1, 2])
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
 def test_the_shortest_contact_of_a_tie_has_a_limit_from_degree_1_on(degree, share, resolved):
     """At degree 0 the steps themselves tell how far the ends are off."""
-    agreeing = {"coupling": {"scheme": "hermite", "degree": 2}}, {"beam": {"fidelity": "quasi_static"}}
-    for tables in ({"coupling": {"degree": degree}}, *agreeing):
-        given = with_changes(PAIR, **tables)
+    for tables in ({}, {"beam": {"fidelity": "quasi_static"}}):
+        given = with_changes(PAIR, coupling={"degree": degree}, **tables)
         told = not_resolved(given, shortest_contact=PAIR.coupling.H / share)
-        assert (told is None) is (resolved or given.coupling.degree == 0)
+        assert (told is None) is (resolved or degree == 0)
 
 
 def test_what_alternates_while_ends_are_tied_matters_where_they_part():
@@ -102,13 +89,14 @@ def test_what_alternates_while_ends_are_tied_matters_where_they_part():
     strikes the foundation and parts."""
     coarse = with_changes(PAIR, coupling={"degree": 0, "macro_step": 4e-3})
     run, whole = (simulate(with_changes(coarse, time={"t_end": t_end})) for t_end in (0.06, 0.6))
-    assert run.summary["max_velocity_mismatch"] > 0.15
+    tied = run.steps["phase"] == 1.0
+    assert np.abs(run.steps["v_tip_after"] - run.steps["z_after"])[tied].max() > 0.15
     assert [event.kind for event in run.events] == ["impact"]
     assert run.summary["resolved"] is True
     exact = event_driven.simulate(run.scene, sample_times=run.time)
     assert np.abs(run.y[1:] - exact.y[-len(run) + 1 :]).max() < 1e-3 * np.ptp(exact.y)
     assert whole.summary["resolved"] is False
-    assert "moves an end by about 2.9 %" in whole.summary["warnings"][0]
+    assert "moves an end by about 2.1 %" in whole.summary["warnings"][0]
 
 
 def test_a_soft_contact_within_a_macro_step_is_lost_to_an_exchange_alone():
@@ -182,8 +170,9 @@ def test_what_resolves_ends_that_are_elsewhere_is_said():
     adaptive, off = {"coupling": {"relative_tolerance": 1e-3}}, 0.012
     for scene in (STIFF, PAIR):
         assert not_resolved(with_changes(scene, **adaptive), off).endswith("; smaller tolerances resolve it")
+    low = with_changes(STIFF, coupling={"degree": 0})
     for seen, share in (({"misplaced": 4.0 * 0.006}, 0.25), ({"left_out": 0.08}, 0.5), ({"between_rows": 0.02}, 0.25)):
-        told = not_resolved(STIFF, **seen)
+        told = not_resolved(low, **seen)
         named = float(told.split("coupling.macro_step <= ")[1].split()[0])
         assert named == pytest.approx(0.95 * share * STIFF.coupling.H, rel=0.03)
         assert told.endswith("a higher coupling.degree allows longer ones") is ("misplaced" in seen)

@@ -25,7 +25,7 @@ def soft(n=6, **tables):
     """The scene `soft` on a coarse beam, for a tie, a foundation impact, a release and a second meeting."""
     tables["beam"] = {"n_elements": n, **tables.get("beam", {})}
     tables.setdefault("time", {"t_end": 0.3})
-    coupling = {"scheme": "hermite", "degree": 2, "macro_step": 1e-3}
+    coupling = {"degree": 2, "macro_step": 1e-3}
     return with_changes(load_scene("soft"), **{**tables, "coupling": {**coupling, **tables.get("coupling", {})}})
 
 
@@ -43,8 +43,8 @@ def test_a_damped_contact_that_opens_fast_pushes_only(degree):
     rows = np.arange(2, len(run), 10)
     exact = event_driven.simulate(scene, sample_times=run.time[rows])
     touches = run.gap < 0.0
-    assert (20.0 * run.velocity_mismatch[touches]).max() > 1.0
-    assert run.contact_force.min() >= (-1e-12 if degree == 0 else -1e-3)
+    assert (20.0 * (run.v_tip - run.z)[touches]).max() > 1.0
+    assert run.contact_force.min() == 0.0
     assert run.compliance_force.min() == 0.0
     for name in ("u_tip", "y"):
         apart = run[name][rows] - exact[name][np.searchsorted(exact.time, run.time[rows])]
@@ -236,15 +236,12 @@ def test_a_looser_tolerance_may_change_more_of_the_energy(tolerance, warns):
         ("energy", 0, 2e-8, True, False),
         ("energy", 0, 5e-4, True, False),
         ("energy", 0, 2e-3, True, True),
-        ("hermite", 2, 5e-4, False, False),
-        ("hermite", 2, 0.02, True, False),
-        ("hermite", 2, 0.3, True, True),
     ],
 )
 def test_energy_that_appears_is_named(scheme, degree, share, warns, stops):
     """A spring that reports more kinetic energy than it has: a warning and a stop from the scheme's bounds on.
 
-    1e-8 and 1e-3 where the coupling creates no energy, 1e-3 and 0.1 where it does.
+    1e-8 and 1e-3 where the coupling creates no energy.
     """
     scene = soft(time={"t_end": 0.05}, coupling={"scheme": scheme, "degree": degree})
     total = simulate(scene).e_total[0]

@@ -184,9 +184,9 @@ def installed(monkeypatch, *faults):
     def watch(owner, name, where):
         function = getattr(owner, name)
 
-        def watched(*arguments):
+        def watched(*arguments, **options):
             with script.at(where(*arguments)):
-                return function(*arguments)
+                return function(*arguments, **options)
 
         monkeypatch.setattr(owner, name, watched)
 

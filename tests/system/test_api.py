@@ -108,9 +108,7 @@ def test_a_run_shows_itself(run):
 
 # -- bodies of one's own --------------------------------------------------------------------------------------------
 
-HITS = with_changes(
-    load_scene("soft"), coupling={"scheme": "hermite", "degree": 2, "macro_step": 5e-4}, time={"t_end": 0.14}
-)
+HITS = with_changes(load_scene("soft"), coupling={"degree": 2, "macro_step": 5e-4}, time={"t_end": 0.14})
 
 
 mass = partial(DuffingBody, 1.0, 0.0, 0.0)
@@ -141,7 +139,6 @@ def test_a_body_need_not_tell_its_shape_or_energies():
         ({}, 1.0, TypeError, r"in place of the spring is a float, not a springbeam\.Body"),
         ({}, DuffingBody(-1.0), SceneError, r"of the spring: mass = -1\.0; give its end a mass of 0 or more"),
         ({"spring": None}, DuffingBody(), SceneError, r"\[spring\]: missing"),
-        ({"coupling": {"scheme": "auto", "degree": 0}}, mass(), SceneError, 'coupling.scheme = "auto"'),
         (
             {"beam": {"fidelity": "quasi_static"}, "coupling": {"scheme": "energy"}},
             *(mass(), SceneError, 'beam.fidelity = "quasi_static"'),

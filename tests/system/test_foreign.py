@@ -116,9 +116,9 @@ def test_without_integrals_the_force_has_degree_0(fmu):
     spring = {"integral": None, "integral_2": None}
     run, exact = (simulate(pair(fmu(), spring=s, contact=TIE, coupling={"degree": 0})) for s in (spring, ELEMENT))
     assert np.abs(run.y - exact.y).max() < 1e-13
-    for scheme, degree, may_be in (("energy", 1, 0), ("hermite", 2, 0)):
-        with pytest.raises(SceneError, match=f"degree = {degree}: .* integral and integral_2; use degree = {may_be}"):
-            simulate(pair(fmu(), spring=spring, contact=TIE, coupling={"scheme": scheme, "degree": degree}))
+    for degree in (1, 2):
+        with pytest.raises(SceneError, match=f"degree = {degree}: .* integral and integral_2; use degree = 0"):
+            simulate(pair(fmu(), spring=spring, contact=TIE, coupling={"degree": degree}))
 
 
 BEAM_NAMES = {
@@ -203,11 +203,6 @@ REFUSED = {
     "impulse": (
         {}, {"spring": {"impulse": None}, "contact": {"law": "transmission", "damping": 0.0}},
         'law = "transmission"', "no impulse", 'use "compliance", "link" or "tie"',
-    ),
-    "velocity": (
-        {},
-        {"spring": {"velocity": None}, "contact": {"law": "tie", "damping": 0.0}, "coupling": {"scheme": "hermite"}},
-        '"hermite"', "no velocity",
     ),
 }  # fmt: skip
 
@@ -529,7 +524,7 @@ def test_a_number_that_does_not_fit_its_variable_is_refused(fmu_folder):
 
 
 def test_events_are_those_of_the_element(fmu):
-    """A mass falls on a foreign oscillator above a lossy foundation."""
+    """A mass falls on a foreign oscillator above a lossy foundation; trial steps of H/256 show when they part."""
     tables = {
         "beam": {"displacement": 0.01, "velocity": -1.0, "external_force": -5.0},
         "stop": {"position": -0.05, "restitution": 0.6},
@@ -541,7 +536,7 @@ def test_events_are_those_of_the_element(fmu):
     run, exact = simulate(scene), simulate(pair(fmu(), spring={**ELEMENT, "stiffness": 400.0}, **tables))
     assert kinds(run) == kinds(exact)
     assert {"impact", "stop_impact", "release", "separation"} <= set(kinds(run))
-    assert [e.time for e in run.events] == pytest.approx([e.time for e in exact.events], abs=1e-10)
+    assert [e.time for e in run.events] == pytest.approx([e.time for e in exact.events], abs=5e-9)
     assert exact.summary["max_energy_residual"] < 1e-11
     assert run.summary["max_interface_residual"] < 1e-12
 

@@ -43,7 +43,7 @@ def planned(*texts, scene=None, **options):
         ("spring.mass=0.01:100:5:log", (0.01, 0.1, 1.0, 10.0, 100.0)),
         ("beam.n_elements=10:40:4", (10, 20, 30, 40)),
         ("beam.n_elements=1:6:4", (1, 3, 4, 6)),  # 2.67 and 4.33 between
-        ("coupling.scheme=energy,hermite", ("energy", "hermite")),
+        ("coupling.scheme=energy,jacobi", ("energy", "jacobi")),
         ("beam.reduced_integration=true,false", (True, False)),
         ("spring.force_sign=1,-1", (1, -1)),
     ],

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..scene import Load
-from .force import combined, work_on
+from .force import combined, value, work_on
 from .protocol import NO_FORCE, SIZES_REMEMBERED, Body, Energies, Force, Motion
 
 
@@ -40,6 +40,7 @@ class MassState(NamedTuple):
     motion: Motion
     dissipated: float = 0.0  #: so far [J]
     load_work: float = 0.0  #: of the loads so far [J]
+    force: float = 0.0  #: of other body, foundation and loads at the end of the last step [N]
 
 
 class SpringDamper(EndLoaded):
@@ -82,8 +83,9 @@ class SpringDamper(EndLoaded):
         self._sign = 1.0 if upper else -1.0
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        (before, dissipated, load_work), on_end = self.state, self._on_end
+        (before, dissipated, load_work, _), on_end = self.state, self._on_end
         forces = [self._sign * c + n + q for c, n, q in zip(contact, foundation, on_end, strict=True)]
+        at_end = value((forces[0], forces[1], forces[2]), size)
         forces[0] += self._load + self._stiffness * self._rest
         start = np.array([*before[:2], *forces, 0.0, 0.0])
         end = Motion(*(self._maps(size) @ start).tolist())
@@ -91,7 +93,7 @@ class SpringDamper(EndLoaded):
             forces[0] -= self._stiffness * self._rest
             work = work_on((forces[0], forces[1], forces[2]), before, end, size)
             dissipated += work + sum(self._stored(before)) - sum(self._stored(end))
-        self.state = MassState(end, dissipated, load_work + work_on(on_end, before, end, size))
+        self.state = MassState(end, dissipated, load_work + work_on(on_end, before, end, size), at_end)
         return end
 
     def _map(self, size: float) -> np.ndarray:
@@ -107,8 +109,12 @@ class SpringDamper(EndLoaded):
     def motion(self) -> Motion:
         return self.state.motion
 
+    def acceleration(self) -> float:
+        motion = self.state.motion
+        return (self.state.force - self.holding_force(motion.displacement, motion.velocity)) / self.mass
+
     def energies(self) -> Energies:
-        motion, dissipated, load_work = self.state
+        motion, dissipated, load_work, _ = self.state
         return Energies(*self._stored(motion), dissipated, -self._load * motion.displacement - load_work)
 
     def _stored(self, motion: Motion) -> tuple[float, float]:

@@ -66,10 +66,10 @@ def _beam(scene: Scene, spec: Beam, start_time: float, contact: float) -> Body:
 def _massless_beam(scene: Scene, spec: Beam, start_time: float, contact: float) -> Body:
     if (start := scene.at_start("beam")) is None:  # at rest under the loads and the contact force
         tip = tip_load_deflection(spec) + contact * tip_compliance(spec)
-        return QuasiStaticBeam(spec, scene.coupling.degree, tip, 0.0)
+        return QuasiStaticBeam(spec, scene.degree, tip, 0.0)
     rate = spec.initial_velocity_slope
     tip, velocity = start.value + start_time * rate * spec.length, rate * spec.length
-    beam = QuasiStaticBeam(spec, scene.coupling.degree, tip, velocity)
+    beam = QuasiStaticBeam(spec, scene.degree, tip, velocity)
     if spec.approach == "elastic":
         beam.release()
     return beam

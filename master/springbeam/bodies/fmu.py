@@ -122,8 +122,8 @@ class Fmu:
         self._message = ""  #: the last that the FMU has logged
         self._worst = 0  #: status of the calls that have failed
         self._closed = False
-        #: The state as marked, and as initialised, of our own FMUs.
-        self._state, self._start = c_void_p(), None
+        #: The state as marked, before a trial step, and as initialised, of our own FMUs.
+        self._state, self._before_trial, self._start = c_void_p(), c_void_p(), None
         self._key: Hashable = None  #: what the instance was made of, of those of `of`
         #: Parameters by how FMPy sets them and by value reference.
         self._parameters: dict[str, dict[int, Value]] = {}
@@ -210,10 +210,10 @@ class Fmu:
         function.restype = c_int
         return partial(function, c_void_p.from_param(self._slave.component), *arguments)
 
-    def of_state(self) -> tuple[Call, Call]:
-        """Return what saves the state and what restores it."""
-        name = self._slave.STATE
-        return self.bound(f"Get{name}", byref(self._state)), self.bound(f"Set{name}", self._state)
+    def of_state(self, *, of_trial: bool = False) -> tuple[Call, Call]:
+        """Return what saves the state and what restores it: that of the mark, or that before a trial step."""
+        name, state = self._slave.STATE, self._before_trial if of_trial else self._state
+        return self.bound(f"Get{name}", byref(state)), self.bound(f"Set{name}", state)
 
     def reading(self, names: Sequence[str], size: int = 1) -> Callable[[], tuple[float, ...]]:
         """Return what reads variables of ``size`` real numbers each; it has read them once.
@@ -261,6 +261,11 @@ class Fmu:
         )  # fmt: skip
         library = self._asked("cannot be used", advances)
         return partial(library[f"advance{self.version[0]}"], byref(advance)), given, told
+
+    @property
+    def variables(self) -> list[Any]:
+        """What the FMU says of its variables."""
+        return list(self._variables.values())
 
     def unit(self, name: str, key: str) -> Unit:
         """Return the unit of a variable that is a scene's ``key``. Raises FmuError if it is none, or not known."""
@@ -356,7 +361,7 @@ class Fmu:
         if self._closed:
             return
         self._closed = True
-        for state in (self._state, self._start):
+        for state in (self._state, self._before_trial, self._start):
             if state and self._worst < FATAL:
                 with suppress(FmuError):
                     self._asked("cannot free a state", self._slave.freeFMUState, state)

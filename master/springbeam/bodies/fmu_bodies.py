@@ -5,7 +5,7 @@ One module, though longer than others: every step of a run passes through all of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from math import isfinite
 from struct import Struct
@@ -33,6 +33,8 @@ from .protocol import (
     made_of,
 )
 
+#: Length of a trial step of our own bodies over a macro step: what they tell after it is what they would tell before.
+_INSTANT = 1e-8
 #: The numbers by which the beam FMU knows its alternatives.
 _INTEGRATORS = {"modal": 1, "midpoint": 2}
 _MASS_MATRICES = {"consistent": 1, "averaged": 2}
@@ -51,6 +53,8 @@ _ASKED = {
 }
 
 
+#: Reads variables of an FMU.
+Reading = Callable[[], tuple[float, ...]]
 #: What it means that a call for the state fails.
 CANNOT = {"get_state": "cannot save the state", "set_state": "cannot restore the state"}
 
@@ -87,6 +91,8 @@ class Port:
         self._told = partial(Struct(f"{len(told)}d").unpack, told)
         #: Save the state, and return to it; both return their status.
         self.get_state, self.set_state = fmu.of_state() if repeats else (lambda: OK, self._refuse_to_repeat)
+        if repeats:
+            self._before_trial, self._after_trial = fmu.of_state(of_trial=True)
 
     def read(self) -> tuple[float, ...]:
         """Return the outputs. Raises StepRefused if one is not finite."""
@@ -104,6 +110,17 @@ class Port:
         if code := self._advance():
             self._stop(*divmod(code, 16))
         return self._told()
+
+    def trial(self, given: Sequence[float], read: Reading | None = None) -> tuple[float, ...]:
+        """Step by what is ``given``, return the outputs or what ``read`` reads, and undo the step."""
+        if (status := self._before_trial()) > WARNING:
+            raise self.failed(status, CANNOT["get_state"])
+        try:
+            told = self.step(*given)
+            return told if read is None else read()
+        finally:
+            if (status := self._after_trial()) > WARNING:
+                raise self.failed(status, CANNOT["set_state"])
 
     def _stop(self, failure: int, status: int) -> NoReturn:
         """Say why a step was not made."""
@@ -140,6 +157,7 @@ class Names(NamedTuple):
     fmu: str
     mass: str
     motion: tuple[str, str, str, str]
+    acceleration: str
     energies: tuple[str, ...]
     impulse: str
     forces: tuple[str, ...]
@@ -240,6 +258,7 @@ class OwnBody(FmuBody):
         names, loads = self.NAMES, self._shares
         energies = (*names.energies[:3], "load_work") if loads else names.energies
         self._port = self.fmu.once(Port, (*names.forces, *loads), (names.impulse,), (*names.motion, *energies))
+        self._acceleration: Reading = self.fmu.once(Fmu.reading, (names.acceleration,))
 
     def expect_loads(self, loads: Sequence[Load]) -> None:
         for number, load in enumerate(loads):
@@ -260,6 +279,18 @@ class OwnBody(FmuBody):
             values.append(f + self._constants.get(name, 0.0))
             slopes += [df, ddf]
         self._loads = (tuple(values), tuple(slopes))
+
+    def acceleration(self) -> float | None:
+        """See `Body.acceleration`; the FMU does not know of an impulse before its next step."""
+        return self._acceleration()[0] if self.state.pending == 0.0 else None
+
+    def trial_acceleration(self, time: float, size: float) -> float:
+        values, slopes = self._loads
+        forces = (0.0,) * len(self.NAMES.forces)
+        given = (time, _INSTANT * size, *forces, *values, self.state.pending, *(2 * forces), *slopes)
+        self.steps += 1
+        self.rewinds += 1
+        return self._port.trial(given, self._acceleration)[0]
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         (c, dc, ddc), (n, dn, ddn), (values, slopes) = contact, foundation, self._loads
@@ -297,6 +328,7 @@ class FmuBeam(OwnBody, BeamBody):
         "beam",
         "tip_mass",
         ("tip_displacement", "tip_velocity", "tip_displacement_integral", "tip_displacement_integral_2"),
+        "tip_acceleration",
         ("kinetic_energy", "strain_energy", "dissipated_energy", "load_potential"),
         "tip_impulse",
         ("tip_force",),
@@ -357,6 +389,7 @@ class FmuSpring(OwnBody, EndLoaded):
         "spring",
         "mass",
         ("displacement", "velocity", "displacement_integral", "displacement_integral_2"),
+        "acceleration",
         ("kinetic_energy", "potential_energy", "dissipated_energy"),
         "impulse",
         ("contact_force", "foundation_force"),

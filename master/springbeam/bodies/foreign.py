@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from operator import mul, truediv
 from pathlib import Path
@@ -38,6 +39,7 @@ class Findings:
     H: float = 0.0  #: a macro step, for trial steps [s]
     faults: tuple[str, ...] = ()  #: what it says, or a scene says of it, and is not so
     units: Mapping[str, Unit] = field(default_factory=dict)  #: of the variables that the scene names, by key
+    acceleration: str | None = None  #: the variable that tells it
 
 
 def _promised(spec: ForeignFmu, says: Any) -> Abilities:
@@ -47,7 +49,7 @@ def _promised(spec: ForeignFmu, says: Any) -> Abilities:
         state=state,
         any_size=bool(says.canHandleVariableCommunicationStepSize),
         velocity=spec.velocity is not None,
-        integrals=0 if spec.integral is None else 1 if spec.integral_2 is None else 2,
+        integrals=spec.integrals,
         slopes=2 if says.canInterpolateInputs else 0,
         impulse=spec.impulse is not None,
         energies=None not in (spec.kinetic_energy, spec.potential_energy),
@@ -65,7 +67,7 @@ def opened(spec: ForeignFmu, times: tuple[float, float], found: Findings | None)
         for key, name in spec.named.items():
             _check(fmu, name, key, "input" if key in spec.INPUTS else "output")
         units = {"time": fmu.time_unit, **{key: fmu.unit(name, key) for key, name in spec.named.items()}}
-        found = replace(found, units=units)
+        found = replace(found, units=units, **_acceleration(spec, fmu, units))
         return ForeignPort(fmu, spec, found), found
     except BaseException:
         fmu.close()
@@ -108,10 +110,27 @@ def _check(fmu: Fmu, name: str, key: str, wanted: str) -> None:
         raise FmuError(f"{fmu.path}: variable {name!r} is {causality}, and {key} must be an {wanted}")
 
 
+def _acceleration(spec: ForeignFmu, fmu: Fmu, units: dict[str, Unit]) -> dict[str, Any]:
+    """Return the variable that tells the acceleration of the end, that of the scene or the velocity's derivative.
+
+    Its unit is added to ``units``.
+    """
+    rates = (variable for variable in fmu.variables if variable.derivative is not None)
+    of_velocity = (variable.name for variable in rates if variable.derivative.name == spec.velocity)
+    name = spec.acceleration or next(of_velocity, None)
+    if name is None:
+        return {}
+    with suppress(FmuError):
+        units["acceleration"] = fmu.unit(name, "acceleration")
+        return {"acceleration": name}
+    return {}
+
+
 def _told(spec: ForeignFmu, found: Findings) -> dict[str, str]:
     """Return the names of what an FMU tells after a step by their keys: first of its motion, then of its energies."""
     keys = (*spec.MOTION, *(spec.ENERGIES if found.abilities.energies else ()))
-    return {key: name for key, name in spec.named.items() if key in keys}
+    names = {key: name for key, name in spec.named.items() if key in keys}
+    return names if found.acceleration is None else names | {"acceleration": found.acceleration}
 
 
 class ForeignState(NamedTuple):
@@ -181,6 +200,20 @@ class ForeignBody(FmuBody, EndLoaded):
         received = self.state.received + force.work_on(exchanged, start, end, size)
         load_work = self.state.load_work + force.work_on(load, start, end, size)
         self.state = self.state._replace(received=received, load_work=load_work, time=time + size, size=size)
+        return end
+
+    def acceleration(self) -> float | None:
+        told = dict(zip(self._keys, self.state.told, strict=True))
+        return told.get("acceleration") if self.state.pending == 0.0 else None
+
+    def _trial(self, time: float, size: float) -> Motion:
+        load = self._followed(force.combined((self._spec.force_sign * self._upward,), (self._on_end,)), size)
+        impulse = () if self._spec.impulse is None else (self.state.pending,)
+        self.steps += 1
+        self.rewinds += 1
+        given, before = (time, size, load[0], *impulse, *load[1 : 1 + self.abilities.slopes]), self.state
+        end = self._take(self._port.trial(given), size)
+        self.state = before
         return end
 
     def _followed(self, given: Force, size: float) -> Force:

@@ -67,8 +67,7 @@ LACKING: tuple[Rule, ...] = (
         'use scheme = "jacobi" or "gauss_seidel" with [contact] law = "link" or "compliance", without [stop]',
         "state",
     ),
-    *_needs("{coupling.scheme}", lambda s: s.coupling.scheme == "hermite", 'use scheme = "energy"', "velocity"),
-    *_needs("{coupling.degree}", lambda s: _exchanges(s) and s.coupling.degree > 0, _LEFT_OUT, "velocity"),
+    *_needs("{coupling.degree}", lambda s: _exchanges(s) and s.degree > 0, _LEFT_OUT, "velocity"),
     *_needs("{contact.damping}", lambda s: _exchanges(s) and s.contact.damping > 0.0, _LEFT_OUT, "velocity"),
     *_needs(
         "{contact.law}",
@@ -84,15 +83,13 @@ LACKING: tuple[Rule, ...] = (
         *("any_size", "velocity", "integrals"),
     ),
     Rule(
-        lambda s, body, table: s.coupling.degree > body.slopes,
+        lambda s, body, table: s.degree > body.slopes,
         "{coupling.degree}: the body in [{table}] cannot do that, its input takes derivatives of order {slopes} at "
         "most (canInterpolateInputs; FMI 3.0 has none); use degree = {followed}",
         _followed,
     ),
     Rule(  # of so many integrals of the gap that the scheme sets to 0
-        lambda s, body, table: (
-            not _exchanges(s) and s.coupling.degree - (s.coupling.scheme == "hermite") > body.integrals
-        ),
+        lambda s, body, table: not _exchanges(s) and s.degree > body.integrals,
         f"{{coupling.degree}}: the body in [{{table}}] cannot do that, {_LACKS['integrals']}; "
         "use degree = {followed}",
         _followed,
@@ -118,7 +115,7 @@ OFFERED = (
     ("any_size", "canHandleVariableCommunicationStepSize", "events, adaptive steps", "equal macro steps only"),
     ("slopes", "canInterpolateInputs", "degree 1, 2", "degree 0"),
     ("integrals", "integral, integral_2", "degree 1, 2; adaptive steps", "degree 0"),
-    ("velocity", "velocity", "events, hermite, adaptive steps", "the mean over a step in its place"),
+    ("velocity", "velocity", "events, adaptive steps, the force at an instant", "the mean over a step in its place"),
     ("impulse", "impulse", "rigid impacts, foundation", '"compliance", "link", "tie" of equal velocities'),
     ("energies", "kinetic_energy, potential_energy", "the whole ledger", "the ledger of the interface"),
 )
@@ -196,6 +193,15 @@ def admit(scene: Scene, start_time: float, upper: Body | None, lower: Body | Non
             lines += _joined(scene, upper, lower)
     if lines:
         raise SceneError("\n".join(lines))
+
+
+def with_degree(scene: Scene, *bodies: Body | None) -> Scene:
+    """Return ``scene`` with the highest degree that its bodies allow, where it asks for none."""
+    if scene.coupling.degree is not None:
+        return scene
+    allowed = [min(body.abilities.integrals, body.abilities.slopes) for body in bodies if body is not None]
+    coupling = scene.coupling.model_copy(update={"degree": min(scene.degree, *allowed)})
+    return scene.model_copy(update={"coupling": coupling})
 
 
 def _abilities(body: Body) -> Abilities:

@@ -202,6 +202,9 @@ class RemotePort(Port):
     def step(self, *given: float) -> Any:
         return self._ask(f"its step at t = {given[0]:.9g} s", "step", *given)
 
+    def trial(self, given: Sequence[float], read: Any = None) -> Any:
+        return self._ask(f"a trial step at t = {given[0]:.9g} s", "trial", given)
+
     def get_state(self) -> int:
         self._waiting.append(("get_state",))
         return OK

@@ -18,6 +18,8 @@ SIZES_REMEMBERED = 64
 ROUNDED_IMPULSE = 1e-12
 #: No force over the whole step.
 NO_FORCE: Force = (0.0, 0.0, 0.0)
+#: Length of a trial step that tells an acceleration, over a macro step.
+_TRIAL = 2.0**-8
 
 
 class StepRefused(RuntimeError):
@@ -128,6 +130,34 @@ class Body:
 
     def motion(self) -> Motion:
         raise NotImplementedError
+
+    def acceleration(self) -> float | None:
+        """Return ẅ of the end [m/s²] in its present state, under the forces at the end of its last step.
+
+        ``None`` if the body cannot tell: `trial_acceleration` then may.
+        """
+        return None
+
+    def trial_acceleration(self, time: float, size: float) -> float | None:
+        """Return ẅ of the end [m/s²] in its present state at ``time`` [s], with the loads but no other force on it.
+
+        A trial step of a small share of ``size`` [s] tells it, to second order; the body stays where it is. ``None`` if
+        the body makes no such step.
+        """
+        if not (self.abilities.state and self.abilities.any_size and self.abilities.velocity):
+            return None
+        h, (w, v, _, _) = _TRIAL * size, self.motion()
+        end = self._trial(time, h)
+        return None if end is None else 6.0 * (end.displacement - w - h * v) / (h * h) - 2.0 * (end.velocity - v) / h
+
+    def _trial(self, time: float, size: float) -> Motion | None:
+        """Return the motion after a step with nothing at the end, which is then undone; ``None`` if it cannot be."""
+        if self.state is None:
+            return None
+        before = self.state
+        end = self.advance_alone(time, size)
+        self.state = before
+        return end
 
     def energies(self) -> Energies:
         """Return what the body stores and has dissipated; a body that cannot tell stores nothing."""

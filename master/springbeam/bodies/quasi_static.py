@@ -11,7 +11,7 @@ rule). Since ẇ is such a polynomial, the work of C is accounted for exactly,
 
     ∫ C ẇ dτ = ½ k Δ(w²) + α_b k ∫ ẇ² dτ,
 
-at any step and any α_b ≥ 0: what the conditions of scheme `energy` need (`springbeam.coupling.tie`). (The exact
+at any step and any α_b ≥ 0: what the conditions of scheme `energy` need (`springbeam.coupling.solver`). (The exact
 response to a polynomial force would not do: without damping it jumps whenever C does.) Nothing at its end,
 w = w₀ e^{−τ/α_b}.
 """

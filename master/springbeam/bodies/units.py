@@ -13,6 +13,7 @@ _SI: dict[str, tuple[str, tuple[int, int, int]]] = {
     "impulse": ("N.s", (1, 1, -1)),
     "displacement": ("m", (0, 1, 0)),
     "velocity": ("m/s", (0, 1, -1)),
+    "acceleration": ("m/s2", (0, 1, -2)),
     "integral": ("m.s", (0, 1, 1)),
     "integral_2": ("m.s2", (0, 1, 2)),
     "kinetic_energy": ("J", (1, 2, -2)),

@@ -126,9 +126,6 @@ def predict(
         names = ("scheme", "degree:", "spectral radius − 1:.1e", "critical H [s]:.3g", "")
         shown.append(table(names, [_scheme(**s, threshold=p["threshold"]) for s in p["schemes"]]))
     shown += [f"note      {note}" for note in p["notes"]]
-    if p["auto"] is not None:
-        scheme, degree, because = p["auto"]
-        shown.append(f'fits      {scheme} {degree}, which coupling.scheme = "auto" takes: {because}')
     return Findings(p, shown)
 
 

@@ -314,7 +314,7 @@ def crosscheck(
 
     Exit code 1 if they differ, 4 if they cannot be compared over the run that was asked for.
 
-    Example: springbeam crosscheck soft --set coupling.scheme=hermite --set coupling.degree=2 --orders
+    Example: springbeam crosscheck soft --set coupling.degree=2 --orders
     """
     from ..studies.crosscheck import Crosscheck, Orders
 

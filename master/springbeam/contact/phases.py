@@ -14,7 +14,6 @@ from math import inf
 from ..bodies.protocol import Ends, Motion
 from ..results.trajectory import EventKind
 from ..scene import Scene
-from ..scene.resolution import VIBRATION
 from ..scene.statics import tip_compliance, tip_load_deflection
 from .laws import SoftLaw
 
@@ -218,13 +217,11 @@ class Transitions:
         return EventKind.STOP_IMPACT, phase, foundation_impact(v, z, *masses, restitution=e)
 
     def _part(self, held: Phase, tip: Motion, low: Motion) -> Impact:
-        """Ends that a tie or the foundation lets go have one velocity; where a scheme has let it differ, they take it.
+        """Ends that part take the velocity that they have in common, where those of steps differ by more than rounding.
 
-        Unless it differs by rounding, or they part by so much that it is no error but a vibration that the macro step
-        does not follow. A lower end that the foundation holds in the phase ``held`` is at rest.
+        A lower end that the foundation holds in the phase ``held`` is at rest.
         """
-        parting, fastest = tip.velocity - low.velocity, self._fastest()
-        if abs(parting) <= VELOCITY_ROUNDING * fastest or parting > VIBRATION * fastest:
+        if abs(tip.velocity - low.velocity) <= VELOCITY_ROUNDING * self._fastest():
             return Impact()
         if self._alone or held.seated:
             on_beam, loss = rebound(tip.velocity, self._tip_mass, restitution=0.0)

@@ -26,7 +26,7 @@ from ..contact.laws import SoftLaw
 from ..results.paths import EPS, sign_changes
 from .protocol import Booking, Counts, Coupling, Step
 from .small import Matrix, Vector, transposed
-from .solver import SCHEMES
+from .solver import CONDITIONS
 
 #: p̃ by its coefficients in powers of s, up to degree 3.
 _Path = tuple[float, float, float, float]
@@ -60,7 +60,7 @@ class Projection:
     """Projects ``law`` onto polynomials of ``degree`` over a step.
 
     A step is told by the penetration at its start [m] and the penetration's numbers x [m]: its value at the end of the
-    step, its mean, and the mean of s p, the first d + 1 of them: minus the conditions of scheme ``energy``.
+    step, its mean, and the mean of s p, the first d + 1 of them: minus the conditions of a tie.
     """
 
     def __init__(self, law: SoftLaw, degree: int) -> None:
@@ -147,17 +147,6 @@ class Projection:
             total += weight * self.law.resistance(p, rate)[0] * rate
         return 0.5 * size * total
 
-    def next_coefficient(self, start: float, x: Vector) -> float:
-        """Return the Legendre coefficient of F(p̃) of degree d + 1 [N], the first that C leaves out."""
-        path = _path(start, x)
-        k = self.degree + 1
-        polynomial = ([0.0, 1.0], [-0.5, 0.0, 1.5], [0.0, -1.5, 0.0, 2.5])[self.degree]
-        total = 0.0
-        for s, weight in self._quadrature(path, start, x[0]):
-            value = sum(c * s**i for i, c in enumerate(polynomial))
-            total += weight * value * self.law.force(_at(path, s)[0])
-        return (k + 0.5) * total
-
     def _missing(self, path: _Path, moments: tuple[float, float, float], start: float, end: float) -> float:
         """Return by how much of p̃′ C is to be corrected for ∫ C p̃′ = ΔΦ: quadrature of a power is not exact."""
         _, b1, b2, b3 = path
@@ -220,7 +209,7 @@ def _at(path: _Path, s: float, size: float = 2.0) -> tuple[float, float]:
 def penetration(step: Step, degree: int) -> tuple[float, Vector]:
     """Return the penetration at the start of ``step`` [m], and its numbers over the step as `Projection` takes them."""
     tip, low = step.start
-    conditions = SCHEMES["energy"][degree]
+    conditions = CONDITIONS[degree]
     x = list(map(sub, conditions(step.end[1], step.size), conditions(step.end[0], step.size)))
     return low.displacement - tip.displacement, x
 
@@ -238,5 +227,5 @@ class Booked(Coupling):
             self.state.dissipated += self._projection.dissipated(start, step.size, x)
 
     def booking(self, ends: Ends) -> Booking:
-        (u, v, _, _), (y, z, _, _) = ends
-        return Booking(self.law.force(y - u, z - v), self.law.potential(y - u), self.state.dissipated)
+        tip, low = ends
+        return Booking(self.law.potential(low.displacement - tip.displacement), self.state.dissipated)

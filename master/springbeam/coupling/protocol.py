@@ -10,8 +10,6 @@ from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Motion, StepRefused
 
 #: Conditions on the gap over a step of size H as a linear map of an end's motion, each in metres.
 Conditions = Callable[[Motion, float], tuple[float, ...]]
-#: A relative error of a step, and the order in which it falls with the step's size.
-ErrorEstimate = tuple[float, int]
 
 
 class Step(NamedTuple):
@@ -26,23 +24,13 @@ class Step(NamedTuple):
 
 
 class Booking(NamedTuple):
-    """What a coupling adds to a record: the force of its law [N], and energies beside those of the bodies [J]."""
+    """What a coupling adds to a record: energies beside those of the bodies [J]."""
 
-    law_force: float = 0.0
     stored: float = 0.0  #: in the contact law
     dissipated: float = 0.0  #: by the contact law since the start
 
 
 NOTHING_BOOKED = Booking()
-
-
-class Scales(NamedTuple):
-    """What the errors of a step are relative to."""
-
-    span: float  #: the shorter of the lengths over which the ends have moved [m]
-    speed: float  #: the largest of an end [m/s]
-    energy: float  #: the largest so far [J]
-    reduced_mass: float  #: of both ends [kg]
 
 
 @dataclass
@@ -58,8 +46,6 @@ class Coupling:
 
     #: Degree of the contact force over a step.
     degree: int = 0
-    #: Share of a step at which `force_without_mismatch` has one order more than elsewhere.
-    sharpest: float = 1.0
     #: Whether the force does no net work but what is booked, at any step.
     energy_exact: bool = True
     state: Counts
@@ -91,17 +77,6 @@ class Coupling:
     def booking(self, ends: Ends) -> Booking:
         """Return the energies at the ``ends``."""
         return NOTHING_BOOKED
-
-    def local_errors(self, step: Step, scales: Scales) -> list[ErrorEstimate]:
-        """Return estimates of the step's error that its motion does not show by itself."""
-        return []
-
-    def force_without_mismatch(self, step: Step, reduced_mass: float) -> Force:
-        """Return C of ``step`` without what the scheme adds to turn a mismatch of the ends' velocities round.
-
-        ``reduced_mass`` is that of both ends [kg].
-        """
-        return step.contact
 
 
 class Uncoupled(Coupling):

@@ -19,10 +19,10 @@ import numpy as np
 
 from ..bodies.protocol import Ends
 from ..contact.laws import SoftLaw
-from .projection import Booked, penetration
-from .protocol import ErrorEstimate, NotConverged, Scales, Step
+from .projection import Booked
+from .protocol import NotConverged
 from .small import Matrix, Vector, inverse, less, times
-from .solver import SCHEMES, Aim, Responses, StepSolver
+from .solver import Aim, Responses, StepSolver
 
 _MAX_NEWTON, _MAX_DAMPING = 60, 8
 #: A correction smaller than this share of the penetration's numbers changes nothing.
@@ -59,17 +59,9 @@ class SoftSolver(Booked, StepSolver):
     state: SoftState
 
     def __init__(self, law: SoftLaw, degree: int, tolerance: float) -> None:
-        StepSolver.__init__(self, SCHEMES["energy"][degree], degree, tolerance)
+        StepSolver.__init__(self, degree, tolerance)
         Booked.__init__(self, law, degree)
         self.state = SoftState()
-
-    def local_errors(self, step: Step, scales: Scales) -> list[ErrorEstimate]:
-        """Estimate from the part of the law's force that the polynomial leaves out: it changes velocities."""
-        start, x = penetration(step, self.degree)
-        neglected = abs(self._projection.next_coefficient(start, x))
-        if neglected == 0.0 or scales.reduced_mass == 0.0:
-            return []
-        return [(step.size * neglected / (6.0 * scales.reduced_mass * scales.speed), self.degree + 2)]
 
     def no_contact(self, gap: Vector, size: float, start: Ends) -> bool:
         tip, low = start

@@ -1,7 +1,16 @@
 """Find the contact force of a step: predict, correct, verify, with responses of the bodies that are remembered.
 
-Unknowns are the Legendre coefficients a of C; the conditions on the gap over the step (`SCHEMES`), in metres, should be
-what the law wants them to be (`StepSolver.aim`: zero, where the ends are tied). Both bodies advance under the force
+Unknowns are the Legendre coefficients a of C; the conditions on the gap over the step (`CONDITIONS`), in metres, should
+be what the law wants them to be (`StepSolver.aim`: zero, where the ends are tied). With g = 0 at the step's start and
+g(H) = 0, the work of C(τ) = Σ c_j τʲ on both bodies together is, by parts,
+
+    ∫ C ġ dτ = [C g]₀ᴴ − Σ j c_j ∫ τ^{j−1} g dτ = 0    if    ∫ τ^{j−1} g dτ = 0,  j = 1 … d,
+
+whatever the coefficients, the step and the bodies. The moments are taken against Legendre polynomials of s = 2τ/H − 1,
+which spans the same space and keeps the system well conditioned: ∫ g dτ = I₁ and ∫ s g dτ = I₁ − 2 I₂/H, with
+I₁ = ∫ g dτ and I₂ = ∫∫ g dτ dτ = ∫ (H − τ) g dτ.
+
+Both bodies advance under the force
 that the last step tells. Corrections follow from responses: B of the upper body's conditions to a is measured once for
 each size of step and remembered, for the beam is linear. S of the lower body's starts as that of a free mass, and
 Broyden's rank-one updates make it follow. Under a corrected force the lower body advances and the end of the upper one
@@ -45,19 +54,8 @@ def _end_and_moments(m: Motion, size: float) -> tuple[float, ...]:
     return (m.displacement, m.integral / size, (m.integral - 2.0 * m.integral_2 / size) / size)
 
 
-def _end_and_rate(m: Motion, size: float) -> tuple[float, ...]:
-    return (m.displacement, size * m.velocity)
-
-
-def _end_rate_and_mean(m: Motion, size: float) -> tuple[float, ...]:
-    return (m.displacement, size * m.velocity, m.integral / size)
-
-
-#: The conditions of each scheme on the gap over a step, by degree; `springbeam.coupling.tie` says what follows of them.
-SCHEMES: dict[str, dict[int, Conditions]] = {
-    "energy": {0: _end, 1: _end_and_mean, 2: _end_and_moments},
-    "hermite": {1: _end_and_rate, 2: _end_rate_and_mean},
-}
+#: The conditions on the gap over a step, by degree.
+CONDITIONS: tuple[Conditions, ...] = (_end, _end_and_mean, _end_and_moments)
 #: Where a correction leads: the conditions there [m], ``None`` if zero; the correction of the coefficients [N], and the
 #: coefficients there [N].
 Aim = tuple[Vector | None, Vector, Vector]
@@ -76,12 +74,10 @@ class Responses(Counts):
 
 
 class StepSolver(Coupling):
-    """Solver of one set of conditions; keeps the responses of the bodies between steps.
+    """The tie: both ends move together. Keeps the responses of the bodies between steps.
 
     Parameters
     ----------
-    conditions
-        On the gap over a step.
     degree
         Degree of the contact force.
     tolerance
@@ -92,8 +88,8 @@ class StepSolver(Coupling):
 
     state: Responses
 
-    def __init__(self, conditions: Conditions, degree: int, tolerance: float, expected: float = 0.0) -> None:
-        self._conditions = conditions
+    def __init__(self, degree: int, tolerance: float, expected: float = 0.0) -> None:
+        self._conditions = CONDITIONS[degree]
         self.degree = degree
         self._tolerance = tolerance
         self._expected = expected

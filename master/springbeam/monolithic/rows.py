@@ -68,8 +68,6 @@ def finished(
     """
     if scene.coupled:
         columns["gap"] = columns["u_tip"] - columns["y"]
-        together = columns["phase"] != "free"
-        columns["velocity_mismatch"] = np.where(together, columns["v_tip"] - columns["z"], 0.0)
         columns["tie_reaction"] = columns["contact_force"] - columns["compliance_force"]
     elif scene.stop is not None and shapes is not None:
         columns["gap"] = columns["u_tip"] - scene.stop.position

@@ -71,7 +71,6 @@ def result(
     summary
         What only one of the two programs can say.
     """
-    columns["contact_force_smoothed"] = columns["contact_force"]
     columns |= {name: np.zeros(len(columns["time"])) for name in ("e_contact", "e_impact_loss")}
     unresolved = not_resolved(scene)
     warnings = ["Algorithm 1 overwrites the tip's position, which changes the energy by energy_residual"]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..scene import Scene, Spring
-from .steps import BEAM_TELLS, PHASE_NAMES, SPRING_TELLS, STEP_COLUMNS, force, joined
+from .steps import BEAM_TELLS, PHASE_NAMES, SPRING_TELLS, STEP_COLUMNS, common, joined
 from .trajectory import TOLD, Event, Trajectory, columns_of
 
 #: Largest value of a column that the motion does not depend on [N]; pictures multiply two of them.
@@ -36,8 +36,9 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     """
     u, v, y, z = (steps[f"{name}_after"] for name in ("u_tip", "v_tip", "y", "z"))
     apart, rigid, zeros = ~joined(steps), scene.contact.rigid, np.zeros(len(steps))
-    contact = np.where(apart & rigid, 0.0, force(steps, steps["size"]))
-    inside = steps["law_force"]
+    contact, inside = steps["contact_force_after"], steps["contact_force_after"]
+    if rigid:
+        v, z = (np.where(apart, own, common(steps, steps["phase"] >= 3.0, "v_tip_after", "z_after")) for own in (v, z))
     if scene.coupled and rigid and not scene.contact.lasting:
         inside = np.minimum(normal_compliance(scene, u, first), MOST_SHOWN)
     energies = ledger(scene, steps)
@@ -48,12 +49,10 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
         "y": y,
         "z": z,
         "contact_force": contact,
-        "contact_force_smoothed": np.where(apart, contact, steps["smoothed"]),
         "compliance_force": inside,
         "tie_reaction": contact - inside if rigid else zeros,
-        "foundation_force": np.where(steps["phase"] < 3.0, 0.0, force(steps, steps["size"], "foundation_force")),
+        "foundation_force": steps["foundation_force_after"],
         "gap": u - y,
-        "velocity_mismatch": np.where(apart, 0.0, v - z),
         "phase": PHASE_NAMES[steps["phase"].astype(int)],
         **energies,
         "energy_residual": energies["e_total"] - steps["energy_at_start"],

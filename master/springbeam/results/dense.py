@@ -5,11 +5,11 @@ record as at a row, and its columns follow from that (`springbeam.results.column
 
 * positions and velocities of ends that move apart follow the path of order 6 through both ends of the step with its two
   moments (`springbeam.results.paths`), velocities its slope (order 5);
-* ends that a rigid law joins move together: the tip takes the path of the lower end, which is smoother than its own,
-  with what the rows say of the gap and of the mismatch, linear between them; so does a tip that the foundation holds;
-* contact and foundation force are the polynomials applied;
-* the force of a soft law, the smoothed force and the energies are linear between the rows (order 2; the smoothed force,
-  which belongs to the start of its row's step, 1); what an event takes is taken at its row.
+* ends that a rigid law joins move together: both take the path of what they have in common, free of the mismatch of
+  their velocities, with what the rows say of the gap, linear between them; so does a tip that the foundation holds;
+* contact and foundation force are those of both rows and, between them, the polynomials applied, without what turns
+  the mismatch (`forces`: order 6 for a rigid law, d + 3 for a soft one; of an exchange, linear);
+* the energies are linear between the rows (order 2); what an event takes is taken at its row.
 
 At the time of a row the values are the row's, at an event those after it. Orders are those of the polynomials: values
 between rows are no more accurate than the rows.
@@ -25,17 +25,18 @@ from math import comb
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial.legendre import legval
 from numpy.polynomial.polynomial import polyval
 
 from ..scene import Scene
 from .columns import columns
 from .paths import LAST_MOMENT, Path, derivative, sign_changes, value
-from .steps import joined
+from .steps import common, joined
 from .trajectory import Event, Trajectory
 
 #: Fields that are linear between rows, and do not change with an event.
 _LINEAR = (
-    *("law_force", "law_stored", "law_dissipated", "beam_received", "spring_received"),
+    *("law_stored", "law_dissipated", "beam_received", "spring_received"),
     *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress"),
     *(f"{body}_{what}" for body in ("beam", "spring") for what in ("potential", "dissipated", "load")),
 )
@@ -51,8 +52,8 @@ _DEGREE = 5
 _BERNSTEIN = np.array(
     [[comb(i, k) / comb(_DEGREE, k) if k <= i else 0.0 for k in range(_DEGREE + 1)] for i in range(_DEGREE + 1)]
 )
-#: Position and velocity of each end.
-_ENDS = (("u_tip", "v_tip"), ("y", "z"))
+#: Positions and velocities of both ends.
+_PLACES, _SPEEDS = ("u_tip", "y"), ("v_tip", "z")
 #: Share of the largest position that the rounding of a step's moments may add to its curve.
 _ROUNDING = 1e-13
 #: Values that differ by less than this share of the largest one are alike: well above what rounding leaves.
@@ -174,20 +175,66 @@ def motion(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
     """
     found: dict[str, np.ndarray] = {}
     size: Any = steps["size"]
-    for position, velocity in _ENDS:
-        begin: Any = (before[f"{position}_after"], before[f"{velocity}_after"])
-        end: Any = (steps[position], steps[velocity])
-        means: Any = (steps[f"{position}_integral"] / size, steps[f"{position}_integral_2"] / size**2)
-        powers = found[position] = np.array(Path.through(begin, end, size, means).powers)
-        found[velocity] = np.vstack([np.arange(1.0, 6.0)[:, None] * powers[1:] / size, np.zeros_like(size)])
-    together = scene.contact.rigid & joined(before)
-    for of_tip, of_low in (("u_tip", "y"), ("v_tip", "z")):
-        held = found[of_low].copy()
-        apart = before[f"{of_tip}_after"] - before[f"{of_low}_after"]
-        held[:2] += apart, steps[of_tip] - steps[of_low] - apart
-        found[of_tip] = np.where(together, held, found[of_tip])
+    together, held = scene.contact.rigid & joined(before), before["phase"] >= 3.0
+
+    def of(end: int, records: np.ndarray, field: str) -> Any:
+        """Return a field of an end; of ends that are together what they have in common."""
+        names = [name + field for name in (_PLACES if field.startswith("_integral") else _SPEEDS)]
+        return np.where(together, common(records, held, *names), records[names[end]])
+
+    for end, position in enumerate(_PLACES):
+        begins: Any = (before[f"{position}_after"], of(end, before, "_after"))
+        ends: Any = (steps[position], of(end, steps, ""))
+        means: Any = (of(end, steps, "_integral") / size, of(end, steps, "_integral_2") / size**2)
+        found[position] = np.array(Path.through(begins, ends, size, means).powers)
+    gap = before["u_tip_after"] - before["y_after"]
+    tip = found["y"].copy()
+    tip[:2] += gap, steps["u_tip"] - steps["y"] - gap
+    found["u_tip"] = np.where(together, tip, found["u_tip"])
+    for position, velocity in zip(_PLACES, _SPEEDS, strict=True):
+        rate = np.arange(1.0, 6.0)[:, None] * found[position][1:] / size
+        found[velocity] = np.vstack([rate, np.zeros_like(size)])
+    found["v_tip"] = np.where(together, found["z"], found["v_tip"])
     found["gap"] = found["u_tip"] - found["y"]
     return found
+
+
+def forces(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
+    """Return C and N over ``steps`` [N] as Legendre series of 2τ/H − 1, shape (6, n); parameters as of `motion`.
+
+    They are the polynomials applied less a defect D. Of a soft law D has no part of a degree up to d; of a tie it is
+    μ g̈, whose parts up to degree 3 follow from the rates and the moments of the gap. The parts of the next two degrees
+    bring both forces to what they are at the ends of the step. Between two exchanges of values they are linear.
+    """
+    size, together = steps["size"], scene.contact.rigid & joined(before) & (steps["reduced_mass"] > 0.0)
+    found = {}
+    for name in ("contact_force", "foundation_force"):
+        c, dc, ddc = steps[name], size * steps[f"{name}_rate"], size**2 * steps[f"{name}_rate_2"]
+        series = np.zeros((6, len(steps)))
+        if scene.coupling.scheme == "energy":
+            series[:3] = c + dc / 2.0 + ddc / 6.0, dc / 2.0 + ddc / 4.0, ddc / 12.0
+            series[:4] -= np.where(together, _turning(before, steps), 0.0)
+            first = np.where(together, 4, steps["degree"].astype(int) + 1)
+        else:
+            first = np.zeros(len(steps), int)
+        signs, each = (-1.0) ** np.arange(6), np.arange(len(steps))
+        at_start = signs[first] * (before[f"{name}_after"] - signs @ series)
+        at_end = steps[f"{name}_end"] - series.sum(axis=0)
+        series[first, each] += 0.5 * (at_end + at_start)
+        series[first + 1, each] += 0.5 * (at_end - at_start)
+        found[name] = series
+    return found
+
+
+def _turning(before: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return μ g̈ [N] of ends that are joined, by parts: Legendre coefficients of degrees 0 to 3, shape (4, n)."""
+    size, held, free = steps["size"], before["phase"] >= 3.0, 1.0 - steps["tip_share"]
+    mass = np.where(held & (free > 0.0), steps["reduced_mass"] / np.where(free > 0.0, free, 1.0), steps["reduced_mass"])
+    rate, rate_after = before["v_tip_after"] - before["z_after"], steps["v_tip"] - steps["z"]
+    once, twice = (steps[f"u_tip_{name}"] - steps[f"y_{name}"] for name in ("integral", "integral_2"))
+    even, odd = 0.5 * size * (rate_after - rate), 0.5 * size * (rate_after + rate)
+    moments = [even, odd, even + 6.0 * once / size, odd + 30.0 * (once - 2.0 * twice / size) / size]
+    return np.array([mass / size**2 * (4.0 * k + 2.0) * moment for k, moment in enumerate(moments)])
 
 
 def _between(
@@ -201,16 +248,15 @@ def _between(
         return np.asarray((1.0 - share) * before[name] + share * end)
 
     found["time"], found["size"] = times, share * after["size"]
-    for force in ("contact_force", "foundation_force"):
-        for name in (force, f"{force}_rate", f"{force}_rate_2"):
-            found[name] = after[name]
+    for name, series in forces(scene, before, after).items():
+        found[f"{name}_after"] = legval(2.0 * share - 1.0, series, tensor=False)
+        if name == "contact_force" and scene.contact.facts.opens and not scene.contact.rigid:
+            found[f"{name}_after"] = np.maximum(found[f"{name}_after"], 0.0)
     curves = {name: polyval(share, powers, tensor=False) for name, powers in motion(scene, before, after).items()}
     for name in ("u_tip", "v_tip", "y", "z"):
         found[f"{name}_after"] = curves[name]
     if scene.coupled and not (scene.contact.rigid or scene.contact.lasting):
         found["phase"] = np.where(before["phase"] >= 3.0, before["phase"], np.where(curves["gap"] < 0.0, 2.0, 0.0))
-    same = after["phase"] == before["phase"]
-    found["smoothed"] = linear("smoothed", np.where(same, after["smoothed"], before["smoothed"]))
     for name in _LINEAR:
         found[name] = linear(name, after[name])
     # What the event at the end of the step moves and takes is kinetic, or springs back with a massless tip. Where ends

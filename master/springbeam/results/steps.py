@@ -19,10 +19,11 @@ STEP_COLUMNS = (
     # Contact force and foundation force with two derivatives at its start; where it has no size, at the row.
     *("contact_force", "contact_force_rate", "contact_force_rate_2"),
     *("foundation_force", "foundation_force_rate", "foundation_force_rate_2"),
-    # The row: the ends after its event, the phase (`PHASE_NAMES`), and the number of events up to here.
-    *("u_tip_after", "v_tip_after", "y_after", "z_after", "phase", "events"),
-    # Mean of the contact force's two limits at the start of the step, and the force of a soft law at the row [N].
-    *("smoothed", "law_force"),
+    # Contact force and foundation force at the end of the step [N], whatever the polynomials are there.
+    *("contact_force_end", "foundation_force_end"),
+    # The row: the ends and both forces after its event, the phase (`PHASE_NAMES`), and the number of events up to here.
+    *("u_tip_after", "v_tip_after", "y_after", "z_after", "contact_force_after", "foundation_force_after"),
+    *("phase", "events"),
     # Energies of the bodies after the event [J], as of `springbeam.bodies.protocol.Energies`.
     *("beam_kinetic", "beam_potential", "beam_dissipated", "beam_load"),
     *("spring_kinetic", "spring_potential", "spring_dissipated", "spring_load"),
@@ -35,6 +36,9 @@ STEP_COLUMNS = (
     # What the beam tells at the end of the step, before the event, as of `springbeam.bodies.protocol.Felt`; and which
     # bodies tell, `BEAM_TELLS` and `SPRING_TELLS` added up, the same in all records of a run.
     *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress", "told"),
+    # The same in all records: the degree of the contact force, the tip's part in the velocity that joined ends have in
+    # common, m_tip/(m_tip + m), and their reduced mass, 1/(1/m_tip + 1/m) [kg].
+    *("degree", "tip_share", "reduced_mass"),
 )
 #: The contact force of a step: C and its two derivatives at the step's start.
 FORCE_COLUMNS = ("contact_force", "contact_force_rate", "contact_force_rate_2")
@@ -69,6 +73,14 @@ def steps_of(content: bytes | bytearray) -> np.ndarray:
 def joined(steps: np.ndarray) -> np.ndarray:
     """Return whether the ends are joined from each row on."""
     return ~np.isin(steps["phase"], _APART)
+
+
+def common(steps: np.ndarray, held: np.ndarray, of_tip: str, of_low: str) -> np.ndarray:
+    """Return what joined ends have in common of a field of the tip and that of the lower end, as of their velocities.
+
+    ``held`` says where the foundation holds the lower end.
+    """
+    return np.asarray(steps[of_low] + np.where(held, 0.0, steps["tip_share"]) * (steps[of_tip] - steps[of_low]))
 
 
 def impulse(steps: np.ndarray, name: str = "contact_force") -> np.ndarray:

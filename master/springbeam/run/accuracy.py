@@ -20,7 +20,7 @@ from ..results.distance import distance
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, as_scene, with_changes
 from ..scene.linearised import contact_energy
-from ..scene.resolution import STABLE, TURN, choice, joined_frequency, lasting_frequency, slow_oscillations
+from ..scene.resolution import TURN, joined_frequency, lasting_frequency, slow_oscillations
 from . import runner
 from .ledger import CHANGED
 from .outcome import Progress, RunStopped
@@ -29,6 +29,8 @@ from .outcome import Progress, RunStopped
 _FEWEST, _MOST = 8.0, 50_000
 #: Angle that a soft contact may turn in a macro step of degree 2 [rad].
 _CONTACT_TURN = 2.0
+#: Angle that the fastest lasting wave may turn in a macro step of the first run that may do [rad].
+_WAVE_TURN = 3.0
 #: An estimate of the error is to be so many times smaller than the accuracy.
 _SAFETY = 1.5
 #: The coupling's and IDA's relative tolerance over the accuracy.
@@ -141,7 +143,7 @@ def _first(scene: Scene) -> float:
         elif scene.coupled and not scene.contact.rigid:
             rates.append(_contact_frequency(scene) / _CONTACT_TURN)
         elif scene.coupled or scene.stop is not None:
-            rates.append(lasting_frequency(scene.beam) / STABLE)
+            rates.append(lasting_frequency(scene.beam) / _WAVE_TURN)
     return max(_FEWEST, math.ceil(0.5 * max(rates, default=0.0) * scene.duration))
 
 
@@ -161,9 +163,8 @@ def _contact_frequency(scene: Scene) -> float:
 def _prepared(scene: Scene, macro_step: float) -> Scene:
     """Return ``scene`` with a macro step [s] and the scheme and tolerances that go with its accuracy."""
     assert scene.accuracy is not None
-    resolved = {"scheme": "auto", "degree": 0, "macro_step": 1e-9 * scene.duration}
-    taken, tolerance = choice(with_changes(scene, accuracy=None, coupling=resolved)), _TOLERANCE * scene.accuracy
-    coupling = {"scheme": taken.scheme, "degree": taken.degree, "macro_step": macro_step, "tolerance": tolerance}
+    tolerance = _TOLERANCE * scene.accuracy
+    coupling = {"macro_step": macro_step, "tolerance": tolerance}
     if scene.spring is None:
         return with_changes(scene, accuracy=None, coupling=coupling)
     ida = {"relative_tolerance": tolerance, "absolute_tolerance": 1e-30}
@@ -176,7 +177,7 @@ def _told(run: Trajectory, asked: float, errors: dict[str, float], pilots: list[
     What a scheme has changed of the energy is a doubt about the motion; runs that agree have settled it.
     """
     coupling, spring = run.scene.coupling, run.scene.spring
-    picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": coupling.degree, "macro_step": coupling.H}
+    picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": run.summary["degree"], "macro_step": coupling.H}
     if spring is not None:
         picked["ida_relative_tolerance"] = spring.relative_tolerance
     accuracy = {

@@ -1,6 +1,7 @@
 """Which event comes first inside a step: the step is repeated until it ends on it.
 
-Positions tell of meeting, release and the foundation (`springbeam.contact.events`), forces of separation and unseating.
+Positions tell of meeting, release and the foundation (`springbeam.contact.events`). Ends part, and a seat is left,
+where a force that can only push would pull: C or N at the end of a trial step (`Pair.present`).
 """
 
 from __future__ import annotations
@@ -16,19 +17,20 @@ from ..contact.events import (
     no_dip,
     position_tolerance,
 )
-from ..contact.phases import VELOCITY_ROUNDING, Joint, common_velocity
+from ..contact.phases import VELOCITY_ROUNDING, Joint
 from ..coupling.protocol import Step
-from ..results.paths import Path, Place, Sample
+from ..results.paths import Path, Place, Sample, sign_changes
 from ..results.trajectory import Event, EventKind
 from ..scene import SAME, Scene
 from .macro_steps import AdaptiveSteps, MacroGrid
-from .separation import first_by_force, no_step
-from .stepping import Pair, State
+from .stepping import Pair, Present, State
 
 #: Trial steps to the bottom of a dip.
 _MAX_DIP_TRIALS = 8
 #: Position tolerances by which the motion at a located event may be off before it is none.
 _JUMP = 1e5
+#: How well the zero of a force is found, over the force at the ends of the step.
+_SHARP = 1e-9
 
 
 class Detector:
@@ -36,8 +38,7 @@ class Detector:
 
     def __init__(self, scene: Scene, pair: Pair, steps: MacroGrid | AdaptiveSteps) -> None:
         self._pair, self._steps = pair, steps
-        tip_share = common_velocity(1.0, 0.0, pair.upper.mass, pair.lower.mass)
-        self._functions = EventFunctions(scene, pair.law, tip_share, pair.equilibrium)
+        self._functions = EventFunctions(scene, pair.law, pair.tip_share, pair.equilibrium)
 
     def tolerance(self, ends: Ends) -> float:
         """What positions can be told apart to [m]."""
@@ -67,7 +68,7 @@ class Detector:
                 return kind
             if kind is EventKind.SEPARATION and value < -self.simultaneity_tolerance(start):
                 return kind
-        return None
+        return self._pulled(state, state.present, start)
 
     def first_event(self, state: State, step: Step) -> tuple[Step, EventKind | None]:
         """The step, cut to its first event, and the kind of that; ``None`` if nothing happens in it."""
@@ -79,10 +80,11 @@ class Detector:
                 step, found = self._first_by_position(state, touched)
         if step.size == 0.0:
             return step, found
-        unilateral = first_by_force(self._pair, state, step, self._steps.size)
-        if unilateral is None:
+        step = self._pair.repeated(state, step)
+        pulled = self._first_by_force(state, step)
+        if pulled is None:
             return self._pair.repeated(state, step), found
-        cut, kind = unilateral
+        cut, kind = pulled
         if 0.0 < cut.size < step.size:
             # Under the force of the shorter step the ends move differently: they may strike something before.
             cut, found = self._first_by_position(state, cut)
@@ -118,8 +120,65 @@ class Detector:
             step = self._located(state, function, bracket, guess)
             if step.size < SAME * self._steps.size:
                 # Too short for a contact force: velocities that differ would be turned round by an infinite one.
-                return no_step(self._pair, step), found
+                return self._no_step(step), found
         return step, found
+
+    def _no_step(self, step: Step) -> Step:
+        """Return no step at all, the bodies back at the mark."""
+        self._pair.rewind()
+        return step._replace(size=0.0, end=step.start)
+
+    # -- events told by forces --------------------------------------------------------------------------------------
+
+    def _pulled(self, state: State, present: Present, ends: Ends) -> EventKind | None:
+        """Return the event that is due where a force that can only push would pull by more than rounding."""
+        kind, pair, H = self._pair.let_go_by(state.phase), self._pair, self._steps.size
+        if kind is None:
+            return None
+        pull = -present.held_by(kind)
+        if pull <= 0.0:
+            return None
+        mass = pair.lower.mass if kind is EventKind.UNSEATED else pair.reduced_mass(state.phase)
+        seen = pull * H > mass * VELOCITY_ROUNDING * state.fastest and pull * H * H > 2.0 * mass * self.tolerance(ends)
+        return kind if seen else None
+
+    def _first_by_force(self, state: State, step: Step) -> tuple[Step, EventKind] | None:
+        """Return ``step``, cut to where a force that can only push vanishes, and the event; the bodies are at its end.
+
+        ``None`` if it pushes all the time; of size 0 if it pulls from the start.
+        """
+        pair, H = self._pair, self._steps.size
+        kind = pair.let_go_by(state.phase)
+        if kind is None:
+            return None
+        start, last = max(state.present.held_by(kind), 0.0), step
+
+        def pushes(size: float) -> float:
+            nonlocal last
+            last = pair.attempt(state, size, step.start)
+            return pair.present(state.phase, last, H).held_by(kind)
+
+        present = pair.present(state.phase, step, H)
+        size, end = step.size, present.held_by(kind)
+        mean = pair.mean_of(kind, state.phase, step)
+        bend = 3.0 * (start + end - 2.0 * mean)
+        slope = end - start - bend  # of the parabola through both ends with the mean of the step
+        if self._pulled(state, present, step.end) is None:
+            if not (0.0 < -slope < 2.0 * bend and start < 0.25 * slope * slope / bend):
+                return None
+            size *= -0.5 * slope / bend
+            if (end := pushes(size)) >= 0.0:
+                return None
+        scale = max(start, -end)
+        falling = [s for s in sign_changes((start, slope, bend), 0.0, 1.0) if slope + 2.0 * bend * s < 0.0]
+        guess = min([size, *(s * step.size for s in falling)])
+
+        def evaluate(size: float) -> Sample:
+            force = pushes(size)
+            return force, -scale / size
+
+        locate(evaluate, guess, size, _SHARP * scale, state.time)
+        return (last if last.size >= SAME * H else self._no_step(last)), kind
 
     # -- events told by positions -----------------------------------------------------------------------------------
 

@@ -27,7 +27,7 @@ _TOLERANCES = EXACT / 1e-12
 def bounds(scene: Scene) -> tuple[float, float]:
     """Relative energy residuals above which a run warns, and above which it stops."""
     coupling = scene.coupling
-    if coupling.scheme == "hermite" or coupling.scheme in ORDINARY_SCHEMES:
+    if coupling.scheme in ORDINARY_SCHEMES:
         return APPROXIMATE, 0.1
     tolerance = max(coupling.tolerance, 0.0 if scene.spring is None else scene.spring.relative_tolerance)
     return min(max(EXACT, _TOLERANCES * tolerance), APPROXIMATE), APPROXIMATE
@@ -106,7 +106,7 @@ class Balance:
         coupling = self._scene.coupling
         causes, remedies = [], []
         if not self._pair.joined.energy_exact:
-            causes.append(f"{coupling.scheme} of degree {coupling.degree}")
+            causes.append(f"{coupling.scheme} of degree {self._scene.degree}")
             or_else = ", or coupling.scheme = 'energy'" if self._pair.repeatable else ""
             H = coupling.macro_step or steps["size"].max()
             remedies.append(f"the macro step {H:g} s is too large for it; take a smaller one{or_else}")

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..bodies.gate import admit
+from ..bodies.gate import admit, with_degree
 from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, Ends, StepRefused
 from ..contact.laws import stiffest
 from ..contact.phases import Impact, Joint, Phase, Transitions
@@ -26,15 +26,15 @@ from ..results.steps import BEAM_TELLS, SPRING_TELLS, STEP, packed
 from ..results.totals import totals
 from ..results.trajectory import Event, EventKind
 from ..scene import SAME, Scene
-from ..scene.resolution import force_window, peak_force_doubt, with_scheme_chosen
+from ..scene.resolution import force_window, peak_force_doubt
 from .detection import Detector
 from .ledger import Balance
 from .log import TOGETHER, Log
 from .macro_steps import AdaptiveSteps, MacroGrid
 from .misplaced import misplaced
-from .observed import mismatch, not_shown, why_not_resolved
+from .observed import not_shown, why_not_resolved
 from .outcome import RunStopped, cause_of
-from .stepping import SIMULTANEOUS, Pair, State
+from .stepping import Pair, Present, State
 
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
@@ -74,7 +74,7 @@ class Master:
         recorder: Recorder,
         contact: float = 0.0,
     ) -> None:
-        scene, self._choice = with_scheme_chosen(scene)
+        scene = with_degree(scene, beam, spring)
         self._scene, self._recorder = scene, recorder
         admit(scene, start_time, beam, spring)
         self._pair = Pair(scene, beam, spring)
@@ -145,11 +145,10 @@ class Master:
             state.macro_steps += 1
             if pair.opens_softly:
                 self._note_soft_contact(step)
-        if event is None:
-            self._record(step, step.end)
-        else:
-            self._act(event, step)
-            self._record(step, pair.ends())
+        before = pair.present(state.phase, step, steps.size) if step.size > 0.0 else state.present
+        if event is not None:
+            self._act(event, step, before.contact)
+        self._record(step, pair.ends(), before, changed=event is not None or (whole and target == kink))
 
     def _advance(self, size: float, *, to_kink: bool) -> tuple[Step, EventKind | None]:
         """The next step and the event it ends on, the bodies left at its end."""
@@ -187,7 +186,7 @@ class Master:
         start = pair.ends()
         step = Step(state.time, 0.0, NO_FORCE, NO_FORCE, start, start)
         # The ledger starts with the bodies as they arrive, before an impact.
-        arriving = np.frombuffer(self._packed(step, start), STEP)
+        arriving = np.frombuffer(self._packed(step, start, state.present), STEP)
         state.energy_at_start = float(ledger(self._scene, arriving)["e_total"][0])
         if self._adaptive is not None:
             self._adaptive.note(abs(state.energy_at_start))
@@ -196,8 +195,8 @@ class Master:
             self._happened(EventKind.IMPACT, Impact(), 0.0)
         if self._in_contact(start) or (pair.law is None and state.contact[0] != 0.0):
             pair.mark()
-            self._act(EventKind.IMPACT if self._scene.coupled else EventKind.STOP_IMPACT, step)
-        self._record(step, pair.ends())
+            self._act(EventKind.IMPACT if self._scene.coupled else EventKind.STOP_IMPACT, step, state.contact[0])
+        self._record(step, pair.ends(), state.present, changed=True)
         state.begun = True
 
     def _in_contact(self, start: Ends) -> bool:
@@ -210,36 +209,25 @@ class Master:
         parting = tip.velocity - low.velocity > 0.0 and not pair.lasting
         return abs(tip.displacement - low.displacement) <= tolerance and not parting
 
-    def _act(self, kind: EventKind, step: Step) -> None:
-        """The event at the end of ``step`` happens.
-
-        Nothing strikes where ends part: what gives them one velocity is what the forces of the steps have left over.
-        """
+    def _act(self, kind: EventKind, step: Step, contact: float) -> None:
+        """The event at the end of ``step`` happens, where the contact force is ``contact`` [N]."""
         state, pair = self.state, self._pair
         ends = pair.ends()
         meets = kind in (EventKind.IMPACT, EventKind.SEPARATION)  # at Ψ, where it means something else
         tolerance = self._detector.simultaneity_tolerance(ends) if meets else self._detector.tolerance(ends)
         kind, phase, impact = self._transitions.after(
-            kind, state.phase, step.start, step.size, ends, pair.end_force(state, step), tolerance
+            kind, state.phase, step.start, step.size, ends, contact, tolerance
         )
-        if kind.opens or kind is EventKind.UNSEATED:
-            state.last_opening = state.time
-        if kind in (EventKind.IMPACT, EventKind.SEATED):
-            state.reclosed = state.time - state.last_opening <= SIMULTANEOUS * self._steps.size
         # Another event at the time of an impact settles what that has begun.
         state.struck = state.time if kind.collision and pair.divides else -inf
         pair.apply_impulses(impact.on_beam, impact.on_spring)
         lost = impact.energy_loss + pair.follow_phase(phase)
         state.lost += lost
         state.enter(phase)
-        if kind.opens:
-            on_tip, of_foundation = state.left_over
-            state.left_over = on_tip + impact.on_beam, of_foundation + impact.of_foundation
-            impact = Impact()
         self._happened(kind, impact, lost)
 
     def _happened(self, kind: EventKind, impact: Impact, lost: float) -> None:
-        tip, low = self._pair.ends()
+        tip, low = self._pair.ends_together(self.state.phase)
         y, z = (None, None) if self._scene.lower is None else low[:2]
         u, v = (None, None) if self._scene.upper is None else tip[:2]
         self.state.events += 1
@@ -254,30 +242,30 @@ class Master:
 
     # -- what is left of a step ---------------------------------------------------------------------------------------
 
-    def _record(self, step: Step, ends: Ends) -> None:
-        """Leave the record of ``step`` with the ``ends`` after its event, and now and then the beam's shape."""
+    def _record(self, step: Step, ends: Ends, before: Present, *, changed: bool) -> None:
+        """Leave the record of ``step``, and now and then the beam's shape.
+
+        ``ends`` are those after its event, ``before`` the forces before it; ``changed`` says whether others are next.
+        """
         state, (tip, low) = self.state, step.end  # no event makes an end faster than both were
         state.ends = ends
+        state.present = before
+        if changed:
+            state.present = self._pair.present(state.phase, step, self._steps.size, changed=True)
         speed = max(tip[1], -tip[1], low[1], -low[1])
         if speed > state.fastest:
             state.fastest = speed
-        self._log.records.append(self._packed(step, ends))
+        self._log.records.append(self._packed(step, ends, before))
         if self._pictured is not None:
             early = state.shapes_left > 0 and state.phase.joint is not Joint.FREE
             if early or state.time >= state.next_shape:
                 self._shape(self._pictured, early)
 
-    def _packed(self, step: Step, ends: Ends) -> bytes:
+    def _packed(self, step: Step, ends: Ends, forces: Present) -> bytes:
         state, pair = self.state, self._pair
         _, size, contact, foundation, _, before = step
         if size == 0.0:
             contact, foundation = state.contact, state.foundation
-        elif any(state.left_over):
-            contact, foundation = (
-                (force[0] + impulse / size, *force[1:])
-                for force, impulse in zip((contact, foundation), state.left_over, strict=True)
-            )
-            state.left_over = (0.0, 0.0)
         (u, v, _, _), (y, z, _, _) = ends
         of_upper, of_lower, booked = pair.upper.energies(), pair.lower.energies(), pair.joined.booking(ends)
         if self._adaptive is not None:
@@ -285,18 +273,18 @@ class Master:
             self._adaptive.note(energies + booked.stored)
         return packed(
             *(state.time, size, *before[0], *before[1], *contact, *foundation),
-            *(u, v, y, z, state.phase.number, state.events, state.smoothed, booked.law_force),
+            *(*forces, u, v, y, z, *state.present, state.phase.number, state.events),
             *(
                 *of_upper,
                 *of_lower,
-                *booked[1:],
+                *booked,
                 state.lost,
                 pair.upper.received,
                 pair.lower.received,
                 state.energy_at_start,
             ),
             *(pair.upper.felt() if self._told & BEAM_TELLS else _NOTHING_FELT),
-            self._told,
+            *(self._told, pair.joined.degree, pair.tip_share, pair.reduced_mass(Phase())),
         )
 
     def _shape(self, beam: BeamBody, early: bool) -> None:
@@ -324,7 +312,7 @@ class Master:
         ruled_out = contradictions(scene, steps, events, amounts.get("contact_duration_total", 0.0))
         warnings += [f"not resolved: {what}: an event was missed; {_SHORTER}" for what in ruled_out]
         return {
-            **({} if self._choice is None else {"coupling": self._choice._asdict()}),
+            "degree": scene.degree,
             "time": float(steps["time"][-1]) if len(steps) else self.state.time,
             "macro_steps": made,
             "events": len(events),
@@ -334,6 +322,5 @@ class Master:
             "resolved": unresolved is None and not changed and not ruled_out,
             "misplaced_ends": off,
             "warnings": warnings,
-            **({"max_velocity_mismatch": mismatch(self._pair, steps)} if len(steps) else {}),
             **amounts,
         }

@@ -55,7 +55,7 @@ def misplaced(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Even
         stiffness = ends.per_mass * (scene.spring.linear_stiffness + 3.0 * scene.spring.cubic_stiffness * y**2)
     follow = _along_tie if pair.law is None else partial(_along_soft_law, pair.law)
     found = 0.0
-    for u, y in follow(scene.coupling.degree, ends, steps, stiffness, _after_events(scene, steps, events)):
+    for u, y in follow(scene.degree, ends, steps, stiffness, _after_events(scene, steps, events)):
         found = max(found, abs(u) / ways[0], abs(y) / ways[1])
         if found > _LOST:
             break

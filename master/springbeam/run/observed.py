@@ -9,7 +9,6 @@ import numpy as np
 
 from ..results.columns import MOST_SHOWN, normal_compliance
 from ..results.dense import between_rows
-from ..results.steps import joined
 from ..results.totals import shortest_contact
 from ..results.trajectory import Event
 from ..scene import Load, Scene
@@ -34,13 +33,6 @@ _NEGLIGIBLE = 1e-3
 _MODES = 20
 #: ∫ φ over length and tip value of the lowest mode of a slender beam; one that shears alone has 0.64.
 _MEAN = 0.4
-
-
-def mismatch(pair: Pair, steps: np.ndarray) -> float:
-    """Return the largest |v_tip − z| [m/s] of ends that a rigid law joins."""
-    if pair.law is not None:
-        return 0.0
-    return float(np.abs(steps["v_tip_after"] - steps["z_after"])[joined(steps)].max(initial=0.0))
 
 
 def not_shown(scene: Scene, pair: Pair, steps: np.ndarray) -> str | None:

@@ -251,7 +251,6 @@ def _without_own(scene: Scene, **own: Body | None) -> Scene:
             raise SceneError(f"[{name}]: missing; a body of your own takes the place of one that the scene has")
     asked = {
         'time.initial_state = "static"': scene.static,
-        'coupling.scheme = "auto"': scene.coupling.scheme == "auto",
         'beam.fidelity = "quasi_static"': scene.massless,
     }
     for what in (what for what, is_so in asked.items() if is_so):

@@ -4,25 +4,39 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import inf
+from typing import NamedTuple
 
 from ..bodies import force
 from ..bodies.elements import RigidWall
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force
 from ..contact.laws import law_of
-from ..contact.phases import Joint, Phase
+from ..contact.phases import Joint, Phase, common_velocity
 from ..coupling import coupling_of
-from ..coupling.protocol import Coupling, Step, Uncoupled
+from ..coupling.protocol import Step, Uncoupled
+from ..results.trajectory import EventKind
 from ..scene import Scene
 from .loads import Loads
 from .outcome import RunStopped
 
-#: Events closer than this fraction of H are at once.
-SIMULTANEOUS = 1e-6
 #: Events in a row, each within H of the one before; more of them and the contact is said to chatter. Impacts that die
 #: out are up to 18,000 (e = 0.999); those of a lossy body on a lossless stop are without end.
 _MOST_IN_A_ROW = 20_000
 #: The force of a step is continued over at most this many times its size; beyond, its end value is held.
 _REACH_OF_FORCE = 4.0
+
+
+class Present(NamedTuple):
+    """Contact force C and foundation force N [N] at an instant."""
+
+    contact: float = 0.0
+    foundation: float = 0.0
+
+    def held_by(self, kind: EventKind) -> float:
+        """Return the force that vanishes where the ends part, or a seat is left [N]."""
+        return self.foundation if kind is EventKind.UNSEATED else self.contact
+
+
+NOTHING = Present()
 
 
 @dataclass
@@ -35,18 +49,11 @@ class State:
     contact: Force = NO_FORCE  #: C of the last step, continued
     last_size: float = 0.0  #: of the last step [s]
     foundation: Force = NO_FORCE  #: N of the last step, continued
-    smoothed: float = 0.0  #: mean of C's two limits at the start of the last step [N]
-    steps_in_phase: int = 0
-    #: Middle [s] of the last step, at degree 0, and the force that could only push [N]; none in another phase.
-    pushed: tuple[float, float] | None = None
-    reclosed: bool = False  #: contact or rest had opened and closed at once: its next step does not open it again
+    present: Present = NOTHING  #: C and N here, after the last event
     lost: float = 0.0  #: by events so far [J]
-    #: Impulses by which ends have parted, on the tip and of the foundation [N·s]: the next step that is told has them.
-    left_over: tuple[float, float] = (0.0, 0.0)
     fastest: float = 0.0  #: the largest speed of an end at a row so far [m/s]
     begun: bool = False  #: whether the row of the start is made
     energy_at_start: float = 0.0  #: before an impact there [J]
-    last_opening: float = -inf  #: when a contact or a rest was last let go [s]
     struck: float = -inf  #: when ends have met, if that was the last event [s]: they may part again soon
     #: Events in a row, each within a macro step of the one before: how many, and when the last was [s].
     in_a_row: tuple[int, float] = (0, -inf)
@@ -60,11 +67,8 @@ class State:
         """The step that ends at ``time`` is made."""
         _, size, contact, foundation, _, _ = step
         self.time, self.last_size = time, size
-        # At the macro point between two steps both forces are wrong by nearly the same, one up, one down.
-        self.smoothed = 0.5 * (contact[0] + self.contact[0]) if self.steps_in_phase else contact[0]
         self.contact = force.shifted(contact, size)
         self.foundation = force.shifted(foundation, size)
-        self.steps_in_phase += 1
 
     def count_event(self, time: float, macro_step: float) -> None:
         """Count an event at ``time`` [s]. Raises RunStopped if they crowd."""
@@ -82,8 +86,6 @@ class State:
         if phase == self.phase:
             return
         self.phase = phase
-        self.steps_in_phase = 0
-        self.pushed = None
         if phase.joint is Joint.FREE:
             self.contact = NO_FORCE
         if not phase.seated:
@@ -115,9 +117,12 @@ class Pair:
         self.repeatable = all(body.abilities.state for body in self.bodies)
         #: Ψ: where the ends of a rigid law are tied below [m].
         self.equilibrium = scene.spring.equilibrium if scene.spring is not None else self.lower.motion().displacement
+        #: The tip's part in the velocity with which joined ends go on.
+        self.tip_share = common_velocity(1.0, 0.0, self.upper.mass, self.lower.mass)
         #: Where the ends are; looked up once, since every step asks a few times.
         self._tip, self._low = self.upper.motion, self.lower.motion
         self._last: Step | None = None  #: at whose end the bodies are
+        self._holding = 0.0  #: what holds a seated lower end, without loads and contact [N]
         #: The soft law between the ends; a rigid one has no force of its own, and ties them while they are joined.
         self.law = law_of(scene)
         #: Whether they are joined for good.
@@ -138,14 +143,10 @@ class Pair:
         tip, low = ends = self.ends()
         if self.law is None:
             held = (contact, 0.0, 0.0)
-            return State(time, ends, contact=held, smoothed=contact, foundation=held if self.alone else NO_FORCE)
+            return State(time, ends, contact=held, foundation=held if self.alone else NO_FORCE)
         at_start = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
         phase = Phase(Joint.TIED) if self.lasting else Phase()
-        return State(time, ends, phase, (at_start, 0.0, 0.0), smoothed=at_start)
-
-    def coupling(self, phase: Phase) -> Coupling:
-        """What couples the bodies in ``phase``: a soft law acts wherever the ends are."""
-        return self._uncoupled if phase.joint is Joint.FREE else self.joined
+        return State(time, ends, phase, (at_start, 0.0, 0.0))
 
     def mark(self) -> None:
         """Remember the bodies' states as those that steps start from."""
@@ -181,8 +182,8 @@ class Pair:
         if self.alone:
             return step._replace(foundation=contact)
         assert self.stop is not None
-        static, (load, slope, bend) = self.lower.holding_force(self.stop, 0.0), self.lower.load_on_end()
-        bearing = (static - load, -slope, -bend)
+        self._holding, (load, slope, bend) = self.lower.holding_force(self.stop, 0.0), self.lower.load_on_end()
+        bearing = (self._holding - load, -slope, -bend)
         self.lower.rewind()
         # C and the part of N that bears it cancel: together, rounding of a large C would move a light top.
         low = self.lower.advance(time, size, NO_FORCE, bearing)
@@ -210,18 +211,81 @@ class Pair:
         """(tip, lower end)."""
         return self._tip(), self._low()
 
-    def end_force(self, state: State, step: Step) -> float:
-        """C at the end of the step as well as the degree tells; exactly, where the tip has no mass [N]."""
-        if self.upper.massless:
-            low = self.lower.motion()
-            return self.upper.holding_force(low.displacement, low.velocity)
-        if self.joined.degree == 0:
-            return state.smoothed
-        return force.value(self.force_without_mismatch(state.phase, step), step.size)
+    def ends_together(self, phase: Phase) -> Ends:
+        """Return (tip, lower end); where a rigid law joins them, with the velocity that they have in common."""
+        tip, low = ends = self.ends()
+        if phase.joint is Joint.FREE or self.law is not None:
+            return ends
+        share = 0.0 if phase.seated else self.tip_share
+        common = low.velocity + share * (tip.velocity - low.velocity)
+        return tip._replace(velocity=common), low._replace(velocity=common)
 
-    def force_without_mismatch(self, phase: Phase, step: Step) -> Force:
-        """Return C of a step of ``phase`` [N], without what turns a mismatch of the ends' velocities round."""
-        return self.coupling(phase).force_without_mismatch(step, self.reduced_mass(phase))
+    def present(self, phase: Phase, step: Step, macro_step: float, *, changed: bool = False) -> Present:
+        """Return C and N at the end of ``step``, where the bodies are, in ``phase``.
+
+        C of a soft law is the law's. Of ends that a rigid law joins it is what gives them one acceleration: no mismatch
+        of their velocities is in it, which the forces of steps turn round.
+
+        Parameters
+        ----------
+        macro_step
+            H, for trial steps [s].
+        changed
+            Whether an event or a load has changed the motion since the step was made.
+        """
+        time, size, contact, _, _, _ = step
+        tip, low = self.ends()
+        if changed and self.loads.any:
+            self.loads.act(time + size, macro_step)
+        if self.law is not None:
+            C = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
+        elif phase.joint is Joint.FREE:
+            C = 0.0
+        elif self.upper.massless:
+            C = self.upper.holding_force(low.displacement, low.velocity)
+        else:
+            C = self._multiplier(phase, time + size, macro_step, force.value(contact, size), changed=changed)
+        if not phase.seated:
+            return Present(C)
+        if self.alone:
+            return Present(C, C)
+        if changed:
+            assert self.stop is not None
+            self.mark()  # from where a body may try which force holds it
+            self._holding = self.lower.holding_force(self.stop, 0.0)
+        return Present(C, self._holding - force.value(self.lower.load_on_end(), 0.0 if changed else size) + C)
+
+    def let_go_by(self, phase: Phase) -> EventKind | None:
+        """Return the event that ends ``phase`` where a force that can only push would pull; ``None`` if all may."""
+        if phase.seated and not self.alone:
+            return EventKind.UNSEATED
+        touches = phase.joint is Joint.TOUCH and self.law is None and not self.upper.massless
+        return EventKind.SEPARATION if phase.seated or touches else None
+
+    def mean_of(self, kind: EventKind, phase: Phase, step: Step) -> float:
+        """Return the mean of C or N over ``step`` [N] without what turns a mismatch of velocities round."""
+        (tip, low), (tip_after, low_after) = step.start, step.end
+        turned = tip_after.velocity - low_after.velocity - tip.velocity + low.velocity
+        joined = phase.joint is not Joint.FREE and self.law is None
+        applied = force.mean(step.foundation if kind is EventKind.UNSEATED else step.contact, step.size)
+        return applied - self.reduced_mass(phase) * turned / step.size * joined
+
+    def _multiplier(self, phase: Phase, time: float, macro_step: float, acting: float, *, changed: bool) -> float:
+        """Return C = −μ (ü − ÿ) of joined ends [N], ü and ÿ without it; ``acting`` [N] where a body cannot tell.
+
+        1/μ = 1/m_tip + 1/m; an end that does not move has an infinite mass.
+        """
+        apart, mobility = 0.0, 0.0
+        for body, sign in ((self.upper, 1.0), (self.lower, -1.0)):
+            if body.mass == inf or (phase.seated and body is self.lower):
+                continue
+            told = None if changed else body.acceleration()
+            free = body.trial_acceleration(time, macro_step) if told is None else told - sign * acting / body.mass
+            if free is None:
+                return acting
+            apart += sign * free
+            mobility += 1.0 / body.mass
+        return -apart / mobility if mobility > 0.0 else acting
 
     def reduced_mass(self, phase: Phase) -> float:
         """Reduced mass of both ends [kg]; the tip's mass while the lower end is seated."""

@@ -137,6 +137,8 @@ def beginning(title: str) -> str:
 
 #: Keys and values that scenes had once, as ``[table] key`` or ``[table] key = value``, and what to do instead.
 GONE: dict[str, str] = {
+    '[coupling] scheme = "hermite"': 'is gone; use "energy", whose velocities now agree at every row',
+    '[coupling] scheme = "auto"': "is gone; leave scheme and degree out: the highest degree that fits is the default",
     '[beam] integrator = "generalized_alpha"': 'is gone; use "midpoint", which is what it was with rho_inf = 1',
     "[beam] rho_inf": 'is gone; leave it out: integrator = "midpoint" is rho_inf = 1, alpha_b > 0 damps',
     '[contact] law = "paper"': "is no law of a run; springbeam paper 2, 3, 4 or 5 runs Algorithm 1",

@@ -31,6 +31,9 @@ class ForeignFmu(Table):
     velocity: str | None = key("m/s", "output", None)
     integral: str | None = key("m·s", "output: ∫ x dτ over the last step, 0 at its start", None)
     integral_2: str | None = key("m·s²", "output: ∫∫ x dτ dτ over the last step", None)
+    acceleration: str | None = key(
+        "m/s²", "output, upward", None, otherwise="the derivative of the velocity, or a trial step, tells it"
+    )
     impulse: str | None = key("N·s", "input, upward, applied at the start of the next step", None)
     mass: float | None = key(
         "kg", "what an impulse or a force meets at first", None, gt=0.0, otherwise="it is measured"
@@ -46,8 +49,13 @@ class ForeignFmu(Table):
     @property
     def named(self) -> dict[str, str]:
         """The variables that have names, by key."""
-        keys = (*self.INPUTS, *self.MOTION, *self.ENERGIES)
+        keys = (*self.INPUTS, *self.MOTION, *self.ENERGIES, "acceleration")
         return {key: name for key in keys if (name := getattr(self, key)) is not None}
+
+    @property
+    def integrals(self) -> int:
+        """How many integrals of its displacement it tells."""
+        return 0 if self.integral is None else 1 if self.integral_2 is None else 2
 
 
 class PointMass(Table):

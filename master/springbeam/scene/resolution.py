@@ -1,4 +1,4 @@
-"""Judge whether the macro step resolves the motion, say what would, and choose for ``coupling.scheme = "auto"``.
+"""Judge whether the macro step resolves the motion, and say what would.
 
 When a run is called *not resolved*, and why, is in ``docs/coupling.md``, "Is the motion resolved?"; the constants are
 its limits. Frequencies are those of the beam, not of its mesh, so that asking costs next to nothing;
@@ -11,8 +11,7 @@ from math import inf, pi, sqrt
 from typing import Any, NamedTuple
 
 from .linearised import bent_energy, spring_frequency, spring_stiffness
-from .messages import Rule, filled, told
-from .reading import with_changes
+from .messages import Rule, told
 from .scene import Scene
 from .statics import bending_stiffness, initial_kinetic_energy, locking, lowest_frequency, tip_compliance, tip_inertia
 from .tables import ORDINARY_SCHEMES, Beam
@@ -32,9 +31,6 @@ MISPLACED, MISPLACED_TIED = (0.006, 0.002, 0.001), (0.004, 0.002, 0.001)
 LEFT_OUT = 0.01
 #: Share of its way by which an end may be off between the rows, as `springbeam.results.dense.between_rows` tells it.
 BETWEEN_ROWS = 0.01
-#: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
-#: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
-STABLE = 3.0
 #: By which angle the midpoint rule may let waves lag at the end of the run [rad]: the fastest ones that an impact sets
 #: off; where nothing strikes, those of a few times the beam's lowest frequency, or of a load, which move the tip more.
 WAVE_LAG, SMOOTH_LAG, SMOOTH_WAVES = 1.0, 0.01, 5.0
@@ -46,8 +42,6 @@ DIES_OUT = 0.15
 SHORT = 1.0
 #: Share of the smaller momentum of both bodies that the force of a short contact may pass on: it is none to speak of.
 SHORT_IMPULSE = 0.1
-#: Velocity mismatch above which it is a vibration and no error.
-VIBRATION = 0.2
 #: Periods of the fastest wave of the mesh that a window must hold for the mean of a rigid force to be settled to 5 %.
 SETTLED = 2.5
 #: Share of the slowest period over which the contact force is averaged.
@@ -104,7 +98,7 @@ def lateness(scene: Scene, turn: float) -> float:
 
 def _force_degree(scene: Scene) -> int:
     """Return the degree of a contact force that is as accurate as its degree allows; exchanges are no better than 0."""
-    return scene.coupling.degree if scene.coupling.scheme == "energy" else 0
+    return scene.degree if scene.coupling.scheme == "energy" else 0
 
 
 def _too_fast(scene: Scene, seen: _Seen) -> dict[str, Any]:
@@ -128,7 +122,7 @@ def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
     excess = seen.misplaced / limits[_force_degree(scene)]
     if excess <= 1.0:
         return {}
-    raises = coupling.scheme == "energy" and coupling.degree < 2
+    raises = coupling.scheme == "energy" and scene.degree < 2
     raises &= scene.beam is None or scene.beam.integrator == "modal"
     remedy = _shorter(scene, 2.0 * sqrt(excess)) + (_HIGHER if raises and not coupling.adaptive else "")
     far = f"about {100.0 * seen.misplaced:.2g} %" if seen.misplaced <= 1.0 else "more than all"
@@ -155,14 +149,6 @@ def _struck(scene: Scene) -> Beam | None:
     """Return our beam if it has inertia and something, whatever body, is there for its tip to meet."""
     meets = scene.lower is not None or scene.stop is not None
     return scene.beam if meets and not scene.massless else None
-
-
-def _unstable(scene: Scene, seen: _Seen) -> dict[str, Any]:
-    """Return what the fastest mode turns where steps are too long for `hermite`, as far as is known; nothing if not."""
-    beam, H = _struck(scene), scene.coupling.H
-    fastest = 0.0 if beam is None else lasting_frequency(beam)  # damped waves are stable in far longer steps
-    beyond = scene.coupling.scheme == "hermite" and fastest * H > STABLE
-    return {"turn": fastest * H, "size": STABLE / fastest} if beyond else {}
 
 
 def _waves_lag(scene: Scene, seen: _Seen) -> dict[str, Any]:
@@ -265,12 +251,6 @@ _OF_EQUAL_STEPS = (
         "not resolved: tip and lower end together turn {turn:.3g} rad in a macro step, and lag by {lag:.2g} rad at the "
         "end; coupling.macro_step <= {size} resolves it{higher}",
     ),
-    Rule(
-        _unstable,
-        "not resolved: with {coupling.scheme} the fastest mode of the beam turns {turn:.3g} rad in a macro step. Above "
-        f"{STABLE:g} rad the scheme may be unstable and miss short contacts; take a macro_step of {{size:.2g}} s, or "
-        'scheme = "energy"',
-    ),
 )
 #: How steps may fail, also those that follow from tolerances: these are judged by what they add up to, since by their
 #: own error they follow the ends.
@@ -298,7 +278,7 @@ _OF_ALL_STEPS = (
     Rule(  # a force that does not see the contact end
         lambda s, seen: (
             not s.coupling.adaptive
-            and (s.coupling.degree > 0 if s.contact.rigid else s.coupling.scheme in ORDINARY_SCHEMES)
+            and (s.degree > 0 if s.contact.rigid else s.coupling.scheme in ORDINARY_SCHEMES)
             and seen.shortest_contact < SHORT * s.coupling.H
         ),
         "not resolved: a contact lasts {steps:.2g} macro steps only, so that the force of one or two steps decides "
@@ -396,74 +376,3 @@ def modes_below(beam: Beam, omega: float) -> int:
     apart = omega * sqrt((0.5 * omega * (a - b)) ** 2 + beam.density * beam.area / bending_stiffness(beam))
     number = beam.length / pi * (sqrt(middle + apart) + sqrt(max(middle - apart, 0.0)))
     return int(number + 0.5)
-
-
-# -- the scheme that fits ----------------------------------------------------------------------------------------------
-
-
-class Choice(NamedTuple):
-    """The scheme and degree that couple a scene, and the reason."""
-
-    scheme: str
-    degree: int
-    because: str
-
-
-def _turns(scene: Scene) -> dict[str, float]:
-    """Return what the fastest and the slowest oscillation turn in a macro step [rad]."""
-    beam, H = scene.beam, scene.coupling.H
-    assert beam is not None
-    fastest = max(mesh_frequency(beam), 0.0 if scene.spring is None else spring_frequency(scene))
-    return {"fastest": fastest * H, "slowest": slowest_frequency(beam) * H}
-
-
-#: What decides, the first rule that holds: the reason, and the scheme and degree for it.
-_DECIDED: tuple[tuple[Rule, str, int], ...] = (
-    (
-        Rule(
-            lambda s: any(not body.integral or not body.integral_2 for body in s.foreign.values()),
-            "a body that is not our own",
-        ),
-        "energy",
-        0,
-    ),
-    (Rule(lambda s: s.partners, "a body that is not our own"), "energy", 2),
-    (Rule(lambda s: s.beam is None, "one body"), "energy", 0),
-    (Rule(lambda s: s.beam.integrator != "modal", "{beam.integrator}"), "energy", 0),
-    (Rule(lambda s: s.massless, "{beam.fidelity}"), "energy", 2),
-    (Rule(lambda s: not s.contact.rigid, "{contact.law}"), "energy", 2),
-    (Rule(lambda s: s.coupling.adaptive, "the steps follow from tolerances"), "hermite", 2),
-    (
-        Rule(
-            lambda s: _turns(s)["fastest"] <= STABLE,
-            f"the whole mesh's ω_max H = {{fastest:.3g}} <= {STABLE:g}",
-            _turns,
-        ),
-        "hermite",
-        2,
-    ),
-    (
-        Rule(
-            lambda s: _turns(s)["slowest"] <= TURN,
-            f"the whole mesh's ω_max H = {{fastest:.3g}} > {STABLE:g}",
-            _turns,
-        ),
-        "energy",
-        2,
-    ),
-    (Rule(lambda s: True, f"ω₁H = {{slowest:.3g}} > {TURN:g}", _turns), "energy", 0),
-)
-
-
-def choice(scene: Scene) -> Choice:
-    """Return the scheme and degree that fit ``scene``, whatever it asks for."""
-    rule, scheme, degree = next(row for row in _DECIDED if row[0].when(scene))
-    return Choice(scheme, degree, filled(scene, rule.text, **rule.numbers(scene)))
-
-
-def with_scheme_chosen(scene: Scene) -> tuple[Scene, Choice | None]:
-    """Return the scene with a scheme and a degree in place of ``"auto"``, and the choice; ``None`` if it has one."""
-    if scene.coupling.scheme != "auto":
-        return scene, None
-    taken = choice(scene)
-    return with_changes(scene, coupling={"scheme": taken.scheme, "degree": taken.degree}), taken

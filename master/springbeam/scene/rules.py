@@ -224,33 +224,16 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     # Schemes
     Rule(
-        lambda s: s.coupling.scheme == "hermite" and s.coupling.degree == 0,
-        "{coupling.degree}: {coupling.scheme} needs degree 1 or 2",
-    ),
-    Rule(
-        lambda s: s.coupling.scheme == "auto" and s.coupling.degree > 0,
-        "{coupling.degree}: {coupling.scheme} picks the degree; leave it out",
-    ),
-    Rule(
-        lambda s: s.coupling.scheme in ORDINARY_SCHEMES and s.coupling.degree > 1,
+        lambda s: s.coupling.scheme in ORDINARY_SCHEMES and s.degree > 1,
         "{coupling.degree}: {coupling.scheme} extrapolates with degree 0 or 1",
     ),
     Rule(
         lambda s: s.coupling.scheme in ORDINARY_SCHEMES and not s.contact.soft,
         f"{{coupling.scheme}}: needs [contact] law = {laws_that(lambda law: law.soft)}; "
-        'use scheme = "energy" or "hermite" with {contact.law}',
+        'use scheme = "energy" with {contact.law}',
     ),
     Rule(
-        lambda s: s.coupling.scheme == "hermite" and s.contact.soft,
-        '{coupling.scheme}: needs a rigid law; with {contact.law} use scheme = "energy", "gauss_seidel" or "jacobi"',
-    ),
-    Rule(
-        lambda s: _averages(s) and s.coupling.scheme == "hermite",
-        '{coupling.scheme}: {beam.integrator} sees only the mean of the contact force; use "modal", or '
-        'scheme = "energy"',
-    ),
-    Rule(
-        lambda s: _averages(s) and s.coupling.scheme != "hermite" and s.coupling.degree > 0,
+        lambda s: _averages(s) and s.degree > 0,
         '{coupling.degree}: {beam.integrator} sees only the mean of the contact force; use "modal", or degree = 0',
     ),
     # A beam without inertia
@@ -267,11 +250,6 @@ FORBIDDEN: tuple[Rule, ...] = (
         lambda s: s.massless and s.contact.facts.opens,
         "{beam.fidelity}: the tip between the beam and {contact.law} would have no inertia; use "
         'law = "transmission" or fidelity = "dynamic"',
-    ),
-    Rule(
-        lambda s: s.massless and s.coupling.scheme == "hermite",
-        "{beam.fidelity}: {coupling.scheme} sets the velocity of the tip, which without inertia is the spring's; "
-        'use scheme = "energy"',
     ),
     Rule(
         lambda s: _let_go(s) and s.beam is not None and s.beam.initial_velocity_slope != 0.0,

@@ -11,7 +11,7 @@ from pydantic import Field
 from .loads import Load
 from .partners import ForeignFmu, LowerBody, Partner, UpperBody
 from .statics import tip_load_deflection
-from .tables import Beam, Contact, Coupling, Spring, Stop, Table, Time, key
+from .tables import ORDINARY_SCHEMES, Beam, Contact, Coupling, Spring, Stop, Table, Time, key
 
 #: Times closer than the first of these fractions of H are one; a step shorter than the second would drown in rounding.
 SAME, SHORTEST_STEP = 1e-9, 1e-6
@@ -102,6 +102,20 @@ class Scene(Table):
     def massless(self) -> bool:
         """Whether the upper body is our beam without inertia."""
         return self.beam is not None and self.beam.fidelity == "quasi_static"
+
+    @property
+    def degree(self) -> int:
+        """Degree of the contact force over a step: what is asked for, else the highest that the bodies allow.
+
+        What FMUs of others and bodies of the caller's allow is known to a run alone.
+        """
+        if self.coupling.degree is not None:
+            return self.coupling.degree
+        if self.coupling.scheme in ORDINARY_SCHEMES:
+            return 0
+        if self.beam is not None and self.beam.integrator != "modal" and not self.massless:
+            return 0
+        return min((body.integrals for body in self.foreign.values()), default=2)
 
     @property
     def elastic_stop(self) -> bool:

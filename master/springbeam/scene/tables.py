@@ -370,10 +370,11 @@ ORDINARY_SCHEMES = ("gauss_seidel", "jacobi")
 class Coupling(Table):
     """How the force of a step is found, and how long steps are (``docs/coupling.md``)."""
 
-    scheme: Literal["energy", "hermite", "auto", "gauss_seidel", "jacobi"] = key(
-        "–", "coupling scheme; auto picks scheme and degree", "energy"
-    )
-    degree: int = key("–", "degree of the contact force over a step: hermite 1, 2; exchanges 0, 1", 0, ge=0, le=2)
+    scheme: Literal["energy", "gauss_seidel", "jacobi"] = key("–", "coupling scheme", "energy")
+    degree: int | None = key(
+        "–", "degree of the contact force over a step; exchanges 0, 1", None, ge=0, le=2,
+        otherwise="the highest that both bodies allow; of exchanges 0",
+    )  # fmt: skip
     macro_step: float | None = key("s", "length H of a macro step", None, gt=0.0, otherwise="0.004 without tolerances")
     relative_tolerance: float | None = key(
         "–", "largest error of a step, relative to the motion so far", None, gt=0.0, le=0.1

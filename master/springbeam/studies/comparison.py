@@ -30,7 +30,7 @@ from ..results.distance import apart
 from ..results.trajectory import TOLD, Trajectory, columns_of
 from ..run.runner import simulate
 from ..scene import Scene, SceneError, with_changes
-from ..scene.resolution import mesh_frequency, slowest_frequency, with_scheme_chosen
+from ..scene.resolution import mesh_frequency, slowest_frequency
 from .tables import Row
 
 Verdict = Literal["agrees", "differs", "not comparable"]
@@ -187,7 +187,6 @@ def _compare_events(
     scene: Scene, found: Row, coarse: list[ContactChange], fine: list[ContactChange], reference: list[ContactChange]
 ) -> None:
     size, start = scene.coupling.H, found["from"]
-    by_means = with_scheme_chosen(scene)[0].coupling.degree == 0
     moved = 0.0
     for i, (kind, time) in enumerate(change for change in reference if change.time <= found["horizon"]):
         row: dict[str, Any] = {"kind": kind, "time": None, "reference": time, "bound": 0.0, "passed": False}
@@ -200,8 +199,6 @@ def _compare_events(
         steps = (time - start) / size + 1.0
         # The unit of time in which the state changes as a whole is what the events so far have taken.
         bound = _SAFETY * moved + _step_error(scene) * steps * found["growth"] * max(time - start, size)
-        if kind in ("opens", "leaves") and by_means:
-            bound += 0.5 * size  # a force known by its means tells no better when it vanishes
         row |= {"time": ours, "bound": bound, "passed": abs(ours - time) <= bound}
 
 
@@ -266,10 +263,9 @@ def quantities(scene: Scene) -> list[str]:
 
 
 def sample(run: Trajectory, times: np.ndarray, name: str) -> np.ndarray:
-    """Return a quantity at macro points [s]; of the contact force the mean of both limits, the next row's smoothed."""
+    """Return a quantity at macro points [s]."""
     H, rows = run.scene.coupling.H, run.time
-    wanted = times + H * (name == "contact_force")
-    nearest = rows[np.searchsorted(rows, wanted - 1e-9 * H).clip(max=len(rows) - 1)]  # what is known at rows alone
-    wanted = np.where(np.abs(nearest - wanted) <= 1e-9 * H, nearest, wanted)
-    found = run.at(np.minimum(wanted, rows[-1]))[name if name != "contact_force" else "contact_force_smoothed"]
+    nearest = rows[np.searchsorted(rows, times - 1e-9 * H).clip(max=len(rows) - 1)]  # what is known at rows alone
+    wanted = np.where(np.abs(nearest - times) <= 1e-9 * H, nearest, times)
+    found = run.at(np.minimum(wanted, rows[-1]))[name]
     return np.where(wanted <= rows[-1], found, np.nan)

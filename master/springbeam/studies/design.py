@@ -14,8 +14,8 @@ from ..scene import ArgumentError, SceneError, key_kind, parse_value
 from ..scene.scene import split_key
 
 #: The couplings that studies run: scheme and degree, of rigid and of soft laws.
-RIGID = (("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2))
-SOFT = (*RIGID[:3], ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1))
+RIGID = (("energy", 0), ("energy", 1), ("energy", 2))
+SOFT = (*RIGID, ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1))
 Sampling = Literal["random", "latin_hypercube"]
 #: Values of a grid; more are a mistyped count.
 _MOST = 10_000_000

@@ -227,11 +227,10 @@ def _configurations(scene: Scene) -> Iterator[Row]:
         f"{scheme} {degree}": {"coupling.scheme": scheme, "coupling.degree": degree}
         for scheme, degree in (RIGID if scene.contact.rigid else SOFT)
     }
-    best = {name: schemes[name] for name in ("energy 2", "hermite 2") if name in schemes}
+    best = {"energy 2": schemes["energy 2"]}
     looser = {f"{name}, IDA 1e-04": keys | _LOOSER for name, keys in best.items() if scene.spring is not None}
-    auto = {"auto": {"coupling.scheme": "auto", "coupling.degree": 0}}
     sizes = [scene.coupling.H * share for share in _STEPS]
-    for family, keys in (schemes | looser | auto).items():
+    for family, keys in (schemes | looser).items():
         for H in (H for H in sizes if _FEWEST_STEPS <= scene.duration / H <= _MOST_STEPS):
             yield {"family": family, "setting": f"H = {H:.3g}", **keys, "coupling.macro_step": H}
     turns = 0.0 if scene.beam is None or scene.massless else slowest_frequency(scene.beam) * scene.duration

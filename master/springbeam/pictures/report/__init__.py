@@ -19,7 +19,6 @@ from ...results.totals import in_words
 from ...results.trajectory import Event, Trajectory, rounded
 from ...scene import Scene
 from ...scene.partners import kind_of
-from ...scene.resolution import with_scheme_chosen
 from ...scene.statics import bending_stiffness, shear_stiffness
 from ..drawing import (
     EVENT_LOOKS,
@@ -47,7 +46,6 @@ _NUMBERS = {
     "iterations": ("iterations for the contact force", "{:.0f}"),
     "wall_time": ("wall time", "{:.3g} s"),
     "max_energy_residual": ("largest energy residual, relative", "{:.2g}"),
-    "max_velocity_mismatch": ("largest difference of joined velocities", "{:.4g} m/s"),
 }
 #: So many events of a kind in succession are a cascade.
 _CASCADE = 4
@@ -135,7 +133,7 @@ def _numbers(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
     """Return words and values for the table of numbers."""
     summary = trajectory.summary
     for key, (words, form) in _NUMBERS.items():
-        if key in summary and (summary[key] or key != "max_velocity_mismatch"):
+        if key in summary:
             yield words, form.format(float(summary[key]))
     for body in ("beam", "spring"):
         if f"{body}_steps" in summary:
@@ -217,6 +215,4 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
         yield f"load_{i}", what + (f", in {load.duration:.4g} s" if load.duration else "")
     H = scene.coupling.macro_step
     length = "macro steps that follow from tolerances" if H is None else f"macro step {H:.4g} s"
-    ran, picked = with_scheme_chosen(scene)
-    scheme = f"{ran.coupling.scheme} of degree {ran.coupling.degree}" + ("" if picked is None else ", picked by auto")
-    yield "steps", f"{scheme}, {length}, to {scene.time.t_end:.4g} s"
+    yield "steps", f"{scene.coupling.scheme} of degree {scene.degree}, {length}, to {scene.time.t_end:.4g} s"

@@ -16,13 +16,12 @@ from ..design import RIGID, SOFT, Axis, design
 
 #: Radians of the spring's own motion in one macro step, and in a cell: IDA takes some hundred steps for each.
 _MOST_PHASE_PER_STEP, _MOST_PHASE = 30.0, 1000.0
-_AUTO = ("auto", 0)
 #: law, scheme, degree: all that a scene may ask for.
 COUPLINGS = (
-    *(("transmission", *scheme) for scheme in (*RIGID, _AUTO)),
-    *(("compliance", *scheme) for scheme in (*SOFT, _AUTO)),
-    *(("tie", *scheme) for scheme in (*RIGID, _AUTO)),
-    *(("link", *scheme) for scheme in (*SOFT, _AUTO)),
+    *(("transmission", *scheme) for scheme in RIGID),
+    *(("compliance", *scheme) for scheme in SOFT),
+    *(("tie", *scheme) for scheme in RIGID),
+    *(("link", *scheme) for scheme in SOFT),
 )
 
 #: What varies, over its range; a share of the cells has none of what may be 0.
@@ -105,7 +104,7 @@ UNITS = {
 SLICES: dict[str, tuple[str, str, dict[str, Any]]] = {
     "energy 0": ("macro_step", "stiffness", {}),
     "energy 2": ("macro_step", "stiffness", {"coupling": ("transmission", "energy", 2)}),
-    "hermite 2": ("macro_step", "mass", {"coupling": ("transmission", "hermite", 2)}),
+    "energy 2, mass": ("macro_step", "mass", {"coupling": ("transmission", "energy", 2)}),
     "jacobi 0": ("macro_step", "contact_stiffness", {"coupling": ("compliance", "jacobi", 0)}),
     "compliance energy": ("macro_step", "contact_stiffness", {"coupling": ("compliance", "energy", 0)}),
     "compliance energy 2": ("macro_step", "contact_stiffness", {"coupling": ("compliance", "energy", 2)}),

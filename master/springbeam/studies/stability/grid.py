@@ -36,7 +36,6 @@ from ...run.ledger import EXACT, bounds
 from ...run.outcome import RunStopped
 from ...run.runner import Simulation
 from ...scene import SceneError, scene_from_dict
-from ...scene.resolution import with_scheme_chosen
 from ..comparison import PERTURBATION, perturbed
 from ..picture import Scale, cells, column
 from ..study import Study
@@ -238,7 +237,7 @@ def judged(run: Trajectory, cause: str = "") -> Row:
 
 def _class(run: Trajectory, cause: str, relative: np.ndarray, scale: np.ndarray, overlap: float) -> tuple[str, str]:
     """Return the class of a run and why, by its relative residuals, the scale of its energy and its overlap."""
-    scene, _ = with_scheme_chosen(run.scene)
+    scene = run.scene
     residual = float(np.abs(relative).max())
     keeps = scene.coupling.scheme == "energy"
     if keeps and residual > _GUARANTEED:

@@ -1,4 +1,4 @@
-"""Predict a scene's coupling before it runs: is it stable, is the motion resolved, which scheme fits.
+"""Predict a scene's coupling before it runs: is it stable, is the motion resolved.
 
 The scene is linearised where it is stiffest: the hardening spring at the largest deflection and the contact law at the
 largest penetration that the energy at first contact allows; a softening spring at rest.
@@ -29,12 +29,11 @@ from ...bodies import force
 from ...bodies.protocol import Motion
 from ...contact.laws import depth, law_of
 from ...coupling.projection import penetration_series
-from ...coupling.solver import SCHEMES
+from ...coupling.solver import CONDITIONS
 from ...monolithic.oscillators import GAUSS, Oscillators
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
 from ...scene import Beam, Scene, suspicions
 from ...scene.linearised import contact_energy, spring_frequency, spring_stiffness
-from ...scene.resolution import STABLE, choice
 from ...scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
 from ..design import RIGID, SOFT
 
@@ -46,8 +45,8 @@ MOST_MODES = 128
 _UNMOVED = 1e-12
 #: ωH up to which a mode is called resolved: 2π steps a period.
 RESOLVED = 1.0
-#: The search for a critical macro step begins here, in units of 1/(highest frequency), and goes up by these factors.
-_SEARCH = {"hermite": (STABLE / 1.2, 1.03), "jacobi": (1e-3, 2.0), "gauss_seidel": (1e-3, 2.0)}
+#: The search for a critical macro step begins here, in units of 1/(highest frequency), and goes up by this factor.
+_SEARCH = 1e-3, 2.0
 
 
 def predict(scene: Scene) -> dict[str, Any]:
@@ -68,7 +67,7 @@ def predict(scene: Scene) -> dict[str, Any]:
         * ``modes`` of the beam, ``resolved_modes`` among them, with ωH ≤ `RESOLVED`, and ``static_shapes`` that are
           kept beside them where not all modes are;
         * ``schemes``: a row each, with ``spectral_radius`` at H and ``critical_step``, the smallest unstable H [s];
-        * ``auto``: the scheme that fits, which ``scheme = "auto"`` takes; ``notes``.
+        * ``notes``.
     """
     H, beam, modal, pair = scene.coupling.H, scene.beam, None, None
     names = ("omega_1", "omega_max", "tip_mass", "resolved_modes", "modes", "static_shapes", "contact_frequency")
@@ -80,7 +79,6 @@ def predict(scene: Scene) -> dict[str, Any]:
         "spring_frequency": None if scene.spring is None else spring_frequency(scene),
         "impedance": None if beam is None else math.sqrt(shear_stiffness(beam) * beam.density * beam.area),
         "schemes": [],
-        "auto": None,
     } | dict.fromkeys(names)
     notes = suspicions(scene)
     notes += [f"[{table}] is not our own body: its frequencies are not known beforehand" for table in scene.partners]
@@ -106,18 +104,12 @@ def predict(scene: Scene) -> dict[str, Any]:
         pair = linear_pair(scene, modal)
     if pair is not None:
         found["contact_frequency"] = pair.contact_frequency if pair.soft else None
-        found["auto"] = choice(scene)
         found["schemes"] = [
             {"scheme": scheme, "degree": degree, "spectral_radius": spectral_radius(pair, scheme, degree, H),
              "critical_step": critical_step(pair, scheme, degree)}
             for scheme, degree in (SOFT if pair.soft else RIGID)
             if beam is None or beam.integrator == "modal" or degree == 0
         ]  # fmt: skip
-        if any(s["scheme"] == "hermite" and s["critical_step"] is not None for s in found["schemes"]):
-            notes.append(
-                "hermite is unstable in bands of H: some narrower than 3 % may lie below its critical H, none has been "
-                f"seen below ω_max H = {STABLE:g}, {STABLE / _frequencies(pair)[0]:.3g} s here"
-            )
     elif not notes:
         notes.append("nothing to couple: a scene with one body and no stop under its tip")
     notes += [
@@ -194,24 +186,21 @@ def _frequencies(pair: LinearPair) -> tuple[float, float]:
     return max(highest, pair.contact_frequency), lowest
 
 
-def critical_step(
-    pair: LinearPair, scheme: str, degree: int, threshold: float = THRESHOLD, factor: float | None = None
-) -> float | None:
+def critical_step(pair: LinearPair, scheme: str, degree: int, threshold: float = THRESHOLD) -> float | None:
     """Return the smallest H [s] with a spectral radius above 1 + ``threshold``, to 1e-3 of itself; None without one.
 
-    Searched upwards by factors of 1.03 (``hermite``, from 2.5/ω_max; narrower bands may be missed) or 2 (``jacobi``,
-    ``gauss_seidel``, from 1e-3/ω_max), or of ``factor``, until the slowest mode turns 10 rad in a step. Not for
+    Searched upwards by factors of 2 from 1e-3/ω_max on, until the slowest mode turns 10 rad in a step. Not for
     ``energy``, which changes no energy at any H.
     """
     if scheme == "energy":
         return None
-    start, usual = _SEARCH[scheme]
+    start, factor = _SEARCH
     fast, slow = _frequencies(pair)
 
     def excess(size: float) -> float:
         return spectral_radius(pair, scheme, degree, size) - 1.0 - threshold
 
-    H, factor = start / fast, usual if factor is None else factor
+    H = start / fast
     while H * slow <= 10.0:
         if excess(H) > 0.0:
             return float(brentq(excess, H / factor, H, xtol=1e-6 * H, rtol=4e-4)) * 1.0005  # where it is unstable
@@ -313,14 +302,14 @@ def amplification(pair: LinearPair, scheme: str, degree: int, h: float) -> np.nd
         at_end = pair.stiffness * (expected - tip[0]) + pair.damping * (ends[3] - tip[1])
         other = np.array([C[0], (at_end - C[0]) / h, 0.0 * p] if degree else [at_end, 0.0 * p, 0.0 * p])
     if not exchanged:
-        C = other = _solved(pair, scheme, degree, h, moved, u_of_C + y_of_force, p)
+        C = other = _solved(pair, degree, h, moved, u_of_C + y_of_force, p)
     return np.asarray(block_diag(A, B) + np.vstack([of_C @ C, -of_force @ other]))
 
 
 def _solved(
-    pair: LinearPair, scheme: str, degree: int, h: float, moved: np.ndarray, by_force: np.ndarray, p: np.ndarray
+    pair: LinearPair, degree: int, h: float, moved: np.ndarray, by_force: np.ndarray, p: np.ndarray
 ) -> np.ndarray:
-    """Return C, Ċ, C̈ of a step by ``energy`` or ``hermite``, in closed form what the solvers of `coupling` find.
+    """Return C, Ċ, C̈ of a step by ``energy``, in closed form what the solvers of `coupling` find.
 
     Of a soft law C has the first Legendre coefficients of k p̃ + c p̃′. Of a tie, its limit for k → ∞, the numbers that
     p̃ is made of are zero. ``moved`` less ``by_force`` @ (C, Ċ, C̈) is the `Motion` of y − u, ``p`` that at the start.
@@ -332,7 +321,7 @@ def _solved(
         own = np.eye(n)
         from_numbers = law @ np.transpose([penetration_series(0.0, unit) for unit in own.tolist()])
         from_start = law @ penetration_series(1.0, [0.0] * n)
-    condition = SCHEMES[scheme][degree]
+    condition = CONDITIONS[degree]
     numbers = from_numbers @ np.array([condition(Motion(*unit), h) for unit in np.eye(4)]).T
     derivatives = np.transpose([force.derivatives(row, h) for row in np.eye(n).tolist()])
     coefficients = np.linalg.solve(own + numbers @ by_force @ derivatives, numbers @ moved + np.outer(from_start, p))
