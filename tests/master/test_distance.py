@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from springbeam import load_scene, simulate, with_changes
+from springbeam.results.contact_times import contact_changes
 from springbeam.results.distance import HELD, apart, distance, motion
+from springbeam.results.steps import joined
 
 TIMES = np.linspace(0.0, 1.0, 11)
 
@@ -77,3 +79,30 @@ def test_a_tip_that_loads_hold_is_judged_by_the_deflection_of_its_beam():
     columns["u_tip"][-1] = -1e-13
     off = np.abs(run.u_tip - columns["u_tip"]).max()
     assert distance(run, still, 0.0).motion == pytest.approx(off / (HELD * largest))
+
+
+def test_a_top_stays_on_the_foundation_when_the_tip_leaves_it():
+    """A spring that 50 N press onto the foundation, until the end of the run, and a beam that bounces on it.
+
+    When the tip first parted, the rest on the foundation ended with it, and the last opening was lost.
+    """
+    run = simulate(
+        with_changes(
+            load_scene("soft"),
+            beam={"n_elements": 4},
+            spring={"external_force": -50.0, "damping": 20.0},
+            stop={"position": -0.002, "restitution": 0.0},
+            contact={"law": "compliance", "stiffness": 1e3, "exponent": 1.0},
+            coupling={"macro_step": 1e-3, "degree": 2},
+            time={"t_end": 0.6},
+        )
+    )
+    seated = run.time[run.phase == "seated"]
+    assert (run.phase[-1], joined(run.steps[-1:])[0]) == ("seated", False)
+    changes = contact_changes(run, 1e-3)
+    without_steps = replace(run, steps=None)  # as of a reference
+    assert contact_changes(without_steps, 1e-3) == changes
+    on_foundation = [change for change in changes if change.kind in ("strikes", "leaves")]
+    assert [(change.kind, change.time) for change in on_foundation[-1:]] == [("strikes", seated[0])]
+    opened = [event.time for event in run.events if event.kind in ("separation", "release")]
+    assert [change.time for change in changes if change.kind == "opens"][-1] == opened[-1]

@@ -93,7 +93,7 @@ def test_the_shortest_contact_that_ended_by_the_last_row_counts_if_it_passes_on_
     events = [Event(time, EventKind(kinds[k % 2])) for k, time in enumerate(times)]
 
     def shortest(below, least, of=steps):
-        return shortest_contact(of, events, below, least)
+        return shortest_contact(SCENE, of, events, below, least)
 
     assert shortest(1.0, 0.19) == pytest.approx(0.2, rel=1e-14)
     assert shortest(0.15, 0.19) == shortest(1.0, 0.21) == shortest(1.0, 0.1, steps[:0]) == np.inf
@@ -104,8 +104,8 @@ def test_a_touch_after_a_release_is_a_contact_of_its_own():
     steps = steps_with(lambda t: (1.0, 0.0, 0.0), np.linspace(0.0, 0.8, 9))
     kinds = {0.0: "impact", 0.4: "release", 0.5: "separation"}
     events = [Event(time, EventKind(kind)) for time, kind in kinds.items()]
-    assert shortest_contact(steps, events, 1.0, 0.05) == pytest.approx(0.1, rel=1e-14)
-    assert shortest_contact(steps, events, 1.0, 0.15) == pytest.approx(0.5, rel=1e-14)
+    assert shortest_contact(SCENE, steps, events, 1.0, 0.05) == pytest.approx(0.1, rel=1e-14)
+    assert shortest_contact(SCENE, steps, events, 1.0, 0.15) == pytest.approx(0.5, rel=1e-14)
 
 
 def test_a_tip_that_strikes_the_stop_itself():

@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .steps import impulse
+from ..scene import Scene
+from .steps import impulse, joined
 from .trajectory import Event, EventKind, Trajectory
 
 #: Share of the impulse of a run below which a contact or a stroke is none to speak of.
@@ -24,7 +25,6 @@ _ON_FOUNDATION = {
     EventKind.STOP_IMPACT: (True, False),
     EventKind.SEATED: (True,),
     EventKind.UNSEATED: (False,),
-    EventKind.SEPARATION: (False,),
 }
 
 #: From when to when something is touched [s]; an impact that lets go at once has no length.
@@ -48,7 +48,7 @@ def contact_changes(run: Trajectory, window: float) -> list[ContactChange]:
     for since, until in _merged(_contacts(run, inf), window):
         if until - since >= window:
             changes += [ContactChange("closes", since), ContactChange("opens", until)]
-    for since, until in _merged(foundation_contacts(run.events, inf), window):
+    for since, until in _merged(foundation_contacts(run.scene, run.events, inf), window):
         changes += [ContactChange("strikes", since)]
         if until > since:
             changes += [ContactChange("leaves", until)]
@@ -85,7 +85,15 @@ def impulse_difference(run: Trajectory, reference: Trajectory) -> float:
 
 
 def _contacts(run: Trajectory, end: float) -> list[Interval]:
-    return tip_contacts(run.events, end, free_at_end=run.phase[-1] == "free")
+    """Return the contacts of tip and spring; one that goes on ends at ``end`` [s].
+
+    In a run without steps, ends between which no force acts are apart, also above a lower end that rests.
+    """
+    if run.steps is not None and len(run.steps):
+        free_at_end = not joined(run.steps[-1])
+    else:
+        free_at_end = run.phase[-1] == "free" or (run.phase[-1] == "seated" and run.contact_force[-1] == 0.0)
+    return tip_contacts(run.events, end, free_at_end=bool(free_at_end))
 
 
 def tip_contacts(events: Iterable[Event], end: float, *, free_at_end: bool) -> list[Interval]:
@@ -112,9 +120,15 @@ def touches(events: Iterable[Event]) -> list[Interval]:
     ]
 
 
-def foundation_contacts(events: Iterable[Event], end: float) -> list[Interval]:
-    """Return the impacts on the foundation, and the rests on it; a rest that goes on ends at ``end`` [s]."""
-    return _intervals(((event.time, held) for event in events for held in _ON_FOUNDATION.get(event.kind, ())), end)
+def foundation_contacts(scene: Scene, events: Iterable[Event], end: float) -> list[Interval]:
+    """Return the impacts on the foundation, and the rests on it; a rest that goes on ends at ``end`` [s].
+
+    Ends that part leave the lower one on the foundation; a tip alone leaves the foundation itself.
+    """
+    on_foundation = dict(_ON_FOUNDATION)
+    if scene.lower is None:
+        on_foundation[EventKind.SEPARATION] = (False,)
+    return _intervals(((event.time, held) for event in events for held in on_foundation.get(event.kind, ())), end)
 
 
 def _intervals(changes: Iterable[tuple[float, bool]], end: float) -> list[Interval]:
@@ -146,7 +160,11 @@ def _contacts_and_strokes(run: Trajectory, end: float) -> Iterator[tuple[list[In
         passed = np.abs(impulse(run.steps)) + np.abs(kicks(times, run.events))
     yield _contacts(run, end), times, passed
     times = np.array([event.time for event in run.events])
-    yield foundation_contacts(run.events, end), times, np.array([abs(e.impulse_foundation) for e in run.events])
+    yield (
+        foundation_contacts(run.scene, run.events, end),
+        times,
+        np.array([abs(e.impulse_foundation) for e in run.events]),
+    )
 
 
 def _felt(intervals: list[Interval], times: np.ndarray, passed: np.ndarray, window: float) -> list[Interval]:

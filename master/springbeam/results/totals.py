@@ -106,7 +106,7 @@ def totals(scene: Scene, steps: np.ndarray, events: Iterable[Event], window: flo
     }
 
 
-def shortest_contact(steps: np.ndarray, events: Iterable[Event], below: float, least: float) -> float:
+def shortest_contact(scene: Scene, steps: np.ndarray, events: Iterable[Event], below: float, least: float) -> float:
     """Return how long the shortest contact, touch above Ψ or rest on the foundation lasts [s]; ∞ if not ``below`` [s].
 
     Those are left out whose force passes on no more than ``least`` [N·s], and those that have not ended by the last
@@ -116,7 +116,7 @@ def shortest_contact(steps: np.ndarray, events: Iterable[Event], below: float, l
     if len(steps) == 0:
         return inf
     held = [*tip_contacts(events, inf, free_at_end=_apart(steps[-1])), *touches(events)]
-    for intervals, force in ((held, "contact_force"), (foundation_contacts(events, inf), "foundation_force")):
+    for intervals, force in ((held, "contact_force"), (foundation_contacts(scene, events, inf), "foundation_force")):
         passed = np.cumsum(impulse(steps, force))
         for since, until in intervals:
             if 0.0 < until - since < min(below, found) and until <= time[-1]:
@@ -145,7 +145,7 @@ def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float
     end = float(steps["time"][-1])
     free_at_end = _apart(steps[-1])
     of_tip = tip_contacts(events, end, free_at_end=free_at_end)
-    intervals = of_tip if scene.coupled else foundation_contacts(events, end)
+    intervals = of_tip if scene.coupled else foundation_contacts(scene, events, end)
     lengths = [until - since for since, until in intervals]
     found |= {"contact_duration": max(lengths, default=0.0), "contact_duration_total": sum(lengths)}
     found["number_of_contacts"] = len(intervals)

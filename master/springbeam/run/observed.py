@@ -48,7 +48,7 @@ def why_not_resolved(
 ) -> str | None:
     """Return in words why a run in steps of H [s] whose ends are ``misplaced`` is not resolved; ``None`` if it is."""
     least = SHORT_IMPULSE * least_momentum(scene, pair, steps)
-    lasted = shortest_contact(steps, events, SHORT * H, least)
+    lasted = shortest_contact(scene, steps, events, SHORT * H, least)
     sizes = steps["size"][steps["size"] > 0.0]
     late = float(np.sqrt(np.mean(sizes**3) / np.mean(sizes))) if scene.coupling.adaptive and len(sizes) else None
     return not_resolved(
