@@ -98,7 +98,7 @@ def test_a_picture_that_cannot_be_written_ends_with_3_and_loses_nothing(here, mo
 
 
 def test_report_fits_80_columns_with_whole_numbers_and_warnings_as_they_are(here, monkeypatch):
-    """It says how many events are not shown; what rounding leaves of a zero is 0."""
+    """Strikes in succession are one line with their sums; what rounding leaves of a zero is 0."""
 
     def many(scene, recorder, progress=None):
         strike = Event(123.456789, "stop_impact", -1.2345e-5, -1.234e-5, 0.1, 0.1, -1.234e-7, 1e-9, 1e-9)
@@ -114,7 +114,7 @@ def test_report_fits_80_columns_with_whole_numbers_and_warnings_as_they_are(here
     assert max(map(len, lines)) <= 80
     assert lines[3].split() == ["release", "0.20000000", "0", "0.25"]
     assert " ".join(lines[4].split()) == "stop_impact 123.45678900 -1.234e-05 -1.234e-05 -1.23e-07 1e-09 1e-09"
-    assert "⋮ 30 more" in " ".join(shown.split())
+    assert " ".join(lines[5].split()) == "39 more, to 162.45678900 -4.81e-06 3.9e-08 3.9e-08"  # sums of the others
     assert "events    40 stop_impact, 1 release, 1 impact" in shown
     assert "warning   [beam] is [bold]coarse[/bold]" in shown
 

@@ -21,7 +21,7 @@ from ..results.directory import RunDirectory
 from ..results.files import load_events, load_summary, load_trajectory
 from ..results.recording import FileRecorder
 from ..results.totals import in_words
-from ..results.trajectory import Event, Trajectory, rounded
+from ..results.trajectory import Event, Trajectory, cascades, rounded
 from ..run.outcome import Progress
 from ..scene import Scene, load_scene
 from ..scene.suspicions import implausible
@@ -43,8 +43,8 @@ from .common import (
 #: Most rows that --output-interval may ask for.
 _MOST_ROWS = 10_000_000
 _REFRESH_SECONDS = 0.1
-#: More are in events.csv.
-_FIRST_EVENTS = 12
+#: Events and cascades that the table shows; more are in events.csv.
+_FIRST_LINES = 24
 
 
 def run(
@@ -191,7 +191,7 @@ def _in_words(scene: Scene, summary: Mapping[str, Any], events: list[Event]) -> 
     """Yield what a run has come to: its events, totals, residuals and warnings."""
     yield Text(scene.title or "(untitled scene)", style="bold")
     if events:
-        yield _event_table(events[:_FIRST_EVENTS], len(events) - _FIRST_EVENTS, scene)
+        yield _event_table(events, scene)
         kinds = Counter(event.kind for event in events)
         yield f"events    {', '.join(f'{number} {kind}' for kind, number in kinds.most_common())}"
         yield "          (on the tip, of the stop: impulses, upward; lost: energy that the event takes)"
@@ -224,21 +224,28 @@ def picked_in_words(accuracy: Mapping[str, Any]) -> str:
     return f"{accuracy['asked']:g} asked: {found['scheme']} {found['degree']}, H = {found['macro_step']:.3g} s"
 
 
-def _event_table(events: list[Event], more: int, scene: Scene) -> Table:
+def _event_table(events: list[Event], scene: Scene) -> Table:
+    """Return the events as a table; of a cascade the first one, and the sums over the others."""
     position, speed = ("u_tip", "v_tip") if scene.lower is None else ("y", "z")
     columns = (
         *("event", "time\n[s]:.8f", f"{position}\n[m]:", f"{speed}\n[m/s]:"),
         *("on the\ntip [N·s]:.3g", "of the\nstop [N·s]:.3g", "lost\n[J]:.3g"),
     )
     scales = {name: max(abs(getattr(event, name) or 0.0) for event in events) for name in (position, speed)}
-    rows = [
-        (
-            event.kind,
-            event.time,
-            *("" if getattr(event, name) is None else rounded(getattr(event, name), scales[name]) for name in scales),
-            *(x or None for x in (event.impulse_contact, event.impulse_foundation, event.energy_loss)),
-        )
-        for event in events
-    ]
-    unseen: list[tuple[Any, ...]] = [("⋮", f"{more} more", *[None] * 5)] * (more > 0)
-    return table(columns, rows + unseen)
+    rows: list[tuple[Any, ...]] = []
+    folded = list(cascades(events))
+    for first, *others in folded[:_FIRST_LINES]:
+        places = (getattr(first, name) for name in scales)
+        moves = ("" if x is None else rounded(x, scale) for x, scale in zip(places, scales.values(), strict=True))
+        rows.append((first.kind, first.time, *moves, *_sums([first])))
+        if others:
+            rows.append((f"  {len(others)} more, to", others[-1].time, None, None, *_sums(others)))
+    if more := sum(map(len, folded[_FIRST_LINES:])):
+        rows.append(("⋮", f"{more} more", *[None] * 5))
+    return table(columns, rows)
+
+
+def _sums(events: list[Event]) -> tuple[float | None, ...]:
+    """Return impulses on the tip and of the stop [N·s], and the energy lost [J], of all ``events``; ``None`` for 0."""
+    names = ("impulse_contact", "impulse_foundation", "energy_loss")
+    return tuple(sum(getattr(event, name) for event in events) or None for name in names)

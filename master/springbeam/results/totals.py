@@ -38,7 +38,7 @@ TOTALS = {
     "number_of_contacts": Quantity("contacts", ""),
     "bounce_time": Quantity("from the first contact until nothing opens again", "s"),
     "last_impact_time": Quantity("last impact", "s"),
-    "rebound_velocity": Quantity("velocity of the tip when it last leaves", "m/s"),
+    "rebound_velocity": Quantity("upward velocity of the tip when it last leaves", "m/s"),
     "deepest_tip": Quantity("lowest place of the tip", "m"),
     "deepest_tip_time": Quantity("when the tip is lowest", "s"),
     "stop_strokes": Quantity("strokes on the foundation", ""),

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from html import escape
 from importlib import import_module
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -114,6 +116,15 @@ class Event:
 
 
 EVENT_COLUMNS = tuple(Event.__dataclass_fields__)
+#: So many events of a kind in succession are a cascade.
+_CASCADE = 4
+
+
+def cascades(events: Iterable[Event]) -> Iterator[list[Event]]:
+    """Yield the events in their order: those of a cascade together, each other one alone."""
+    for _, some in groupby(events, key=lambda event: event.kind):
+        same = list(some)
+        yield from [same] if len(same) >= _CASCADE else ([event] for event in same)
 
 
 def columns_of(scene: Scene) -> dict[str, str]:

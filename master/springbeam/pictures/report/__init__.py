@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ import numpy as np
 import tomli_w
 
 from ...results.totals import in_words
-from ...results.trajectory import Event, Trajectory, rounded
+from ...results.trajectory import Trajectory, cascades, rounded
 from ...scene import Scene
 from ...scene.partners import kind_of
 from ...scene.statics import bending_stiffness, shear_stiffness
@@ -47,8 +46,6 @@ _NUMBERS = {
     "wall_time": ("wall time", "{:.3g} s"),
     "max_energy_residual": ("largest energy residual, relative", "{:.2g}"),
 }
-#: So many events of a kind in succession are a cascade.
-_CASCADE = 4
 
 
 def page(trajectory: Trajectory) -> str:
@@ -83,7 +80,7 @@ def page(trajectory: Trajectory) -> str:
         numbers=list(_numbers(trajectory)),
         described=list(described(scene)),
         results=list(in_words(trajectory.summary)),
-        events=list(_folded(events)),
+        events=list(cascades(events)),
         event_values=values,
         event_scales={name: max((abs(getattr(e, name) or 0.0) for e in events), default=0.0) for name in values},
         rounded=rounded,
@@ -112,13 +109,6 @@ def _warnings(trajectory: Trajectory) -> list[str]:
         found.append(f"The run was {status}{when}: {summary.get('cause', 'cause unknown')}")
     found += [str(warning) for warning in summary.get("warnings", ())]
     return found
-
-
-def _folded(events: list[Event]) -> Iterator[list[Event]]:
-    """Return the events as the lines of the table: cascades of a kind together and all others alone."""
-    for _, some in groupby(events, key=lambda event: event.kind):
-        same = list(some)
-        yield from [same] if len(same) >= _CASCADE else ([event] for event in same)
 
 
 def _glossary(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
