@@ -114,7 +114,7 @@ def test_report_fits_80_columns_with_whole_numbers_and_warnings_as_they_are(here
     assert max(map(len, lines)) <= 80
     assert lines[3].split() == ["release", "0.20000000", "0", "0.25"]
     assert " ".join(lines[4].split()) == "stop_impact 123.45678900 -1.234e-05 -1.234e-05 -1.23e-07 1e-09 1e-09"
-    assert " ".join(lines[5].split()) == "39 more, to 162.45678900 -4.81e-06 3.9e-08 3.9e-08"  # sums of the others
+    assert " ".join(lines[5].split()) == "+39, until 162.45678900 -4.81e-06 3.9e-08 3.9e-08"  # sums of the others
     assert "events    40 stop_impact, 1 release, 1 impact" in shown
     assert "warning   [beam] is [bold]coarse[/bold]" in shown
 

@@ -239,7 +239,7 @@ def _event_table(events: list[Event], scene: Scene) -> Table:
         moves = ("" if x is None else rounded(x, scale) for x, scale in zip(places, scales.values(), strict=True))
         rows.append((first.kind, first.time, *moves, *_sums([first])))
         if others:
-            rows.append((f"  {len(others)} more, to", others[-1].time, None, None, *_sums(others)))
+            rows.append((f"+{len(others)}, until", others[-1].time, None, None, *_sums(others)))
     if more := sum(map(len, folded[_FIRST_LINES:])):
         rows.append(("⋮", f"{more} more", *[None] * 5))
     return table(columns, rows)
