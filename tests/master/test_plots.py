@@ -105,6 +105,18 @@ def written(figure):
     return [text for text in found if text.get_text()]
 
 
+def assert_nothing_collides(figure):
+    """Nothing written is cut off, or lies on anything else that is, or on axes."""
+    figure.canvas.draw()
+    frames = [ax.get_window_extent() for ax in figure.axes]
+    boxes = {text: text.get_window_extent() for text in written(figure)}
+    for text, box in boxes.items():
+        assert 0.0 <= box.x0 < box.x1 <= figure.bbox.width, text
+        assert 0.0 <= box.y0 < box.y1 <= figure.bbox.height, text
+        others = [*frames, *(other for other in boxes.values() if other is not box)]
+        assert not any(box.overlaps(other) for other in others), text
+
+
 LONG = "A dropped package with a long name, which is wrapped where the picture ends, and goes on for more than a line"
 
 
@@ -117,14 +129,12 @@ def test_nothing_written_over_time_is_cut_off_or_lies_on_anything_else(picture, 
     run.summary |= {"resolved": False, "contact_force_max": 9.98, "contact_force_window": 3.28e-4}
     run.summary |= {"contact_force_max_time": 0.3}
     figure = figure_of(run, picture)
-    figure.canvas.draw()
-    frames = [ax.get_window_extent() for ax in figure.axes]
-    boxes = {text: text.get_window_extent() for text in written(figure)}
-    for text, box in boxes.items():
-        assert 0.0 <= box.x0 < box.x1 <= figure.bbox.width, text
-        assert 0.0 <= box.y0 < box.y1 <= figure.bbox.height, text
-        others = [*frames, *(other for other in boxes.values() if other is not box)]
-        assert not any(box.overlaps(other) for other in others), text
+    assert_nothing_collides(figure)
+
+
+def test_runs_with_long_names_are_compared_with_keys_that_fit_beside_their_panels():
+    names = [f"results/bumper-of-rubber-with-a-beam-{k}" for k in range(4)]
+    assert_nothing_collides(timeline.draw_compared({name: a_trajectory(events=EVERY_EVENT) for name in names}))
 
 
 def test_the_overview_is_one_page_of_positions_velocities_forces_and_energy():

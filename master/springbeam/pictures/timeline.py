@@ -54,8 +54,8 @@ _KEY_COLUMNS = 4
 #: Of a figure, and of what surrounds its panels [inch]: labels to the left, keys to the right; between two panels; the
 #: labels of the time axis; a row of a title or of the key; a row of marks of events; free room.
 _WIDTH, _LEFT, _RIGHT, _GAP, _AXIS, _LINE, _MARK_ROW, _ROOM = 8.2, 0.75, 1.85, 0.12, 0.45, 0.19, 0.11, 0.12
-#: Most characters in a line of a key beside a panel.
-_KEY_WIDTH = 24
+#: Most characters in a line of a key beside a panel, and the height of a line [inch].
+_KEY_WIDTH, _KEY_LINE = 24, 0.16
 
 
 def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Figure:
@@ -83,14 +83,15 @@ def _painted(panels: Sequence[Panel], clock: Unit, above: float, below: float) -
     There is room [inch] ``above`` and ``below`` them. Every place is known before anything is drawn: a layout that
     looks for room draws all texts several times.
     """
-    height = above + sum(panel.height + _GAP for panel in panels) + _AXIS + below
+    heights = [max(panel.height, _KEY_LINE * sum(len(key.splitlines()) for key in _keys(panel))) for panel in panels]
+    height = above + sum(heights) + _GAP * len(panels) + _AXIS + below
     figure = Figure(figsize=(_WIDTH, height))
     FigureCanvasAgg(figure)
     axes = list[Axes]()
     top, across = height - above, _WIDTH - _LEFT - _RIGHT
-    for panel in panels:
-        top -= panel.height
-        place = (_LEFT / _WIDTH, top / height, across / _WIDTH, panel.height / height)
+    for panel, own in zip(panels, heights, strict=True):
+        top -= own
+        place = (_LEFT / _WIDTH, top / height, across / _WIDTH, own / height)
         axes.append(figure.add_axes(place, sharex=axes[0] if axes else None))
         paint(axes[-1], panel, clock)
         axes[-1].yaxis.set_label_coords((0.15 - _LEFT) / across, 0.5)
@@ -145,21 +146,20 @@ def paint(ax: Axes, panel: Panel, clock: Unit) -> None:
     """Draw ``panel`` over time in the unit ``clock``."""
     ax.set(xlabel=f"time t [{clock.name}]", ylabel=panel.axis)
     below = np.zeros(1)
-    for curve in panel.curves:
-        time, values, (colour, words, _, marker) = (
-            clock.factor * curve.time,
-            panel.unit.factor * curve.values,
-            curve.look,
-        )
+    for curve, key in zip(panel.curves, _keys(panel), strict=True):
+        time = clock.factor * curve.time
+        values = panel.unit.factor * curve.values
+        colour = curve.look.colour
+        marker = curve.look.marker
         if curve.stacked:
-            ax.fill_between(time, below, below + values, color=colour, label=words, linewidth=0.0)
+            ax.fill_between(time, below, below + values, color=colour, label=key, linewidth=0.0)
             below = below + values
         elif marker is not None:
             ax.vlines(time, 0.0 if panel.logarithmic is None else panel.logarithmic[0], values, color=colour, lw=1.0)
             face = "none" if marker.sign == "○" else colour
-            ax.plot(time, values, marker.matplotlib, color=colour, label=words, ms=marker.size, mfc=face)
+            ax.plot(time, values, marker.matplotlib, color=colour, label=key, ms=marker.size, mfc=face)
         else:
-            ax.plot(time, values, label=words, **line_style(curve.look))
+            ax.plot(time, values, label=key, **line_style(curve.look))
     if panel.logarithmic is not None:
         ax.set(yscale="log", ylim=panel.logarithmic)
         ax.yaxis.set_major_locator(LogLocator(numticks=6))
@@ -169,16 +169,19 @@ def paint(ax: Axes, panel: Panel, clock: Unit) -> None:
     elif ax.get_ylim()[0] < 0.0 < ax.get_ylim()[1]:
         ax.axhline(0.0, color=GREY, lw=0.5, zorder=1)
     # The key stands beside the panel.
-    handles, labels = ax.get_legend_handles_labels()
     ax.legend(
-        handles,
-        [textwrap.fill(label, _KEY_WIDTH) for label in labels],
         loc="upper left",
         bbox_to_anchor=(1.005, 1.0),
         frameon=False,
         borderaxespad=0.0,
         handlelength=1.6,
+        labelspacing=0.3,
     )
+
+
+def _keys(panel: Panel) -> list[str]:
+    """Return the words of each curve, in lines that fit beside the panel."""
+    return [textwrap.fill(curve.look.words.replace(", L", ",\u00a0L"), _KEY_WIDTH) for curve in panel.curves]
 
 
 def line_style(look: Look) -> dict[str, Any]:
