@@ -58,7 +58,7 @@ def value_text(v: Variable, value: str) -> str:
 def role(v: Variable) -> dict[str, str]:
     """Return what a variable is for: description, causality, variability, initial."""
     parameter = v["causality"] == "parameter"
-    discrete = v["consumed"] or v["type"] != "Real"
+    discrete = v["consumed"] or v["discrete"] or v["type"] != "Real"
     attributes = {"description": v["description"], "causality": v["causality"]}
     attributes["variability"] = "fixed" if parameter else "discrete" if discrete else "continuous"
     if v["causality"] != "input":
@@ -143,7 +143,8 @@ class Description:
         if self.version == 2:
             ET.SubElement(ET.SubElement(types, "SimpleType", named), kind, limits)
         else:
-            ET.SubElement(types, f"{TYPES3[kind]}Type", named | limits)
+            # Without the description, which FMPy 0.3.20 and older cannot read there.
+            ET.SubElement(types, f"{TYPES3[kind]}Type", {"name": named["name"]} | limits)
 
     def _variables2(self) -> None:
         listed = ET.SubElement(self.root, "ModelVariables")

@@ -1,7 +1,7 @@
 // LDLᵀ of a symmetric positive definite band matrix.
 #pragma once
 
-#include <Eigen/Core>
+#include "eigen.hpp"
 
 namespace beam {
 

@@ -31,10 +31,10 @@ constexpr double largest_phase = 1e12;
 
 /// @throws std::invalid_argument for the first parameter that is not allowed beside the others
 void validate(const Parameters& p) {
-  if (p.n_elements > max_elements / p.element_degree) {
+  const int most_elements = 2 * max_elements / (p.element_degree * (p.element_degree + 1));
+  if (p.n_elements > most_elements) {
     reject("n_elements", p.n_elements,
-           "between 1 and " + std::to_string(max_elements / p.element_degree) + " (" + std::to_string(max_elements) +
-               " over element_degree)");
+           "between 1 and " + std::to_string(most_elements) + " with element_degree = " + std::to_string(p.element_degree));
   }
   if (p.integrator != Integrator::modal) return;
   const int unknowns = 2 * p.n_elements * p.element_degree;

@@ -3,12 +3,12 @@
 // u(L), F what the loads below give. Ahn & Tate, eqs. (1)–(5), (59).  Up is positive; C > 0 lifts the tip.
 #pragma once
 
-#include <Eigen/Core>
-
 #include <array>
 #include <cstddef>
 #include <initializer_list>
 #include <memory>
+
+#include "eigen.hpp"
 
 namespace beam {
 
@@ -23,7 +23,8 @@ enum class MassMatrix { consistent = 1, averaged = 2 };
 
 /// Highest polynomial degree of an element.
 inline constexpr int max_element_degree = 12;
-/// Most elements times their degree that a beam may have; bounds memory, not the mathematics.
+/// Most elements that a beam may have, of degree 1; of degree p fewer by p(p + 1)/2, as a band of its matrices has
+/// 4n p(p + 1) values: 64 MB, and an integrator keeps five. Bounds memory, not the mathematics.
 inline constexpr int max_elements = 1000000;
 /// Most unknowns of a dense eigenproblem: of the mesh (two per element and degree) where all modes are wanted, of the
 /// reduced basis where some are.

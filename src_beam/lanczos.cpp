@@ -1,4 +1,6 @@
 // Apart from modes.cpp, as either takes the compiler long.
+#include "eigen.hpp"
+
 #include <Spectra/SymGEigsShiftSolver.h>
 
 #include <algorithm>

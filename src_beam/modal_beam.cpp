@@ -1,7 +1,5 @@
 #include "modal_beam.hpp"
 
-#include <Eigen/Core>
-
 #include <utility>
 
 #include "modal_oscillator.hpp"

@@ -1,10 +1,9 @@
 #include "modal_oscillator.hpp"
 
-#include <Eigen/Core>
-
 #include <algorithm>
 #include <cmath>
 
+#include "eigen.hpp"
 #include "gauss.hpp"
 
 namespace beam {

@@ -35,8 +35,6 @@
 // factorising K would lose cond(K) ~ KAG/EI·n⁴.
 #pragma once
 
-#include <Eigen/Core>
-
 #include "band.hpp"
 #include "beam.hpp"
 

@@ -151,9 +151,9 @@ void Component::directional_derivative(const unsigned unknowns[], std::size_t n_
   }
 }
 
-Component* instantiate(const char* function, const Log& log, bool log_events, bool co_simulation, const char* name,
-                       const char* identity) {
-  auto made = std::make_unique<Component>(log, log_events);
+Component* instantiate(const char* function, const Log& log, bool log_events, const TypeNames& type_names,
+                       bool co_simulation, const char* name, const char* identity) {
+  auto made = std::make_unique<Component>(log, log_events, type_names);
   const Status status = guard(made.get(), function, instantiated, [&](Component& k) {
     if (!co_simulation) throw std::invalid_argument("only co-simulation is provided");
     if (!name || !*name) throw std::invalid_argument("instanceName is empty");

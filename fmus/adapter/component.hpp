@@ -43,7 +43,8 @@ using Log = std::function<void(Status, const char*, const std::string&)>;
 /// Arguments that are missing or wrong throw std::invalid_argument.
 class Component {
  public:
-  Component(Log log, bool log_events) : log_(std::move(log)), log_events_(log_events) {}
+  Component(Log log, bool log_events, const TypeNames& names)
+      : instance(names), log_(std::move(log)), log_events_(log_events) {}
 
   Instance instance;
   bool event_mode_used = false, early_return_allowed = false;  ///< what the importer can do (FMI 3.0)
@@ -115,7 +116,7 @@ Status guard(void* c, const char* function, unsigned legal, const Body& body) no
 
 /// A new instance; NULL, with a message, if it is not for co-simulation, has no name, or `identity` is not the
 /// description's. @throws std::bad_alloc
-Component* instantiate(const char* function, const Log& log, bool log_events, bool co_simulation, const char* name,
-                       const char* identity);
+Component* instantiate(const char* function, const Log& log, bool log_events, const TypeNames& type_names,
+                       bool co_simulation, const char* name, const char* identity);
 
 }  // namespace fmi

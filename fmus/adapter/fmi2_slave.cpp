@@ -76,7 +76,8 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
               Status status, const char* category, const std::string& message) {
       callbacks.logger(callbacks.componentEnvironment, name.c_str(), to2(status), category, as_format(message).c_str());
     };
-  return fmi::instantiate(__func__, log, loggingOn != fmi2False, fmuType == fmi2CoSimulation, instanceName, fmuGUID);
+  return fmi::instantiate(__func__, log, loggingOn != fmi2False, type_names, fmuType == fmi2CoSimulation, instanceName,
+                          fmuGUID);
 } catch (const std::bad_alloc&) {
   return nullptr;
 }

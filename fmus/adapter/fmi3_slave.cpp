@@ -31,7 +31,8 @@ fmi3Instance instantiate(const char* function, bool co_simulation, fmi3String na
     log = [=](Status status, const char* category, const std::string& message) {
       send(environment, to3(status), category, message.c_str());
     };
-  return fmi::instantiate(function, log, log_events, co_simulation, name, token);
+  return fmi::instantiate(function, log, log_events, TypeNames{"Float64", "Int32", "Boolean"}, co_simulation, name,
+                          token);
 } catch (const std::bad_alloc&) {
   return nullptr;
 }

@@ -13,8 +13,6 @@ namespace fmi {
 
 namespace {
 
-const char* name(Type type) { return type_names[static_cast<int>(type)]; }
-
 [[noreturn]] void refuse(const Variable& v, double value, const std::string& why) {
   throw std::invalid_argument("'" + v.name + "' = " + number(value) + why);
 }
@@ -36,7 +34,7 @@ bool is_setting(const Variable& v) { return v.causality == Causality::parameter 
 
 }  // namespace
 
-Instance::Instance() : table_(table()), place_(table_.variables.size()) {
+Instance::Instance(const TypeNames& names) : type_names_(names), table_(table()), place_(table_.variables.size()) {
   for (const bool settings : {true, false}) {
     for (std::size_t i = 0; i < place_.size(); ++i) {
       const Variable& v = table_.variables[i];
@@ -113,6 +111,7 @@ const Variable& Instance::variable(unsigned reference, Type type, const char* wh
   }
   const Variable& v = table_.variables[reference];
   if (type != v.type) {
+    const auto name = [this](Type t) { return type_names_.at(static_cast<std::size_t>(t)); };
     throw std::invalid_argument(std::string("cannot ") + what + " '" + v.name + "' (value reference " +
                                 std::to_string(reference) + ") as " + name(type) + ": it is " + name(v.type));
   }

@@ -15,7 +15,7 @@ namespace fmi {
 
 class Instance {
  public:
-  Instance();
+  explicit Instance(const TypeNames& names);  ///< as messages call types
 
   Progress progress;
 
@@ -61,6 +61,7 @@ class Instance {
   double difference(const Variable& of, unsigned known);  ///< the derivative by differences
   void changed(std::size_t place);                        ///< by the importer
 
+  const TypeNames type_names_;
   const Table& table_;
   std::unique_ptr<Model> model_;
   bool built_ = false;                     ///< it is, with the present settings

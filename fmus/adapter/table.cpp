@@ -40,7 +40,7 @@ std::string variable(const Variable& v) {
   };
   return object({{"name", quoted(v.name)},
                  {"causality", quoted(causalities[static_cast<int>(v.causality)])},
-                 {"type", quoted(type_names[static_cast<int>(v.type)])},
+                 {"type", quoted(type_names.at(static_cast<std::size_t>(v.type)))},
                  {"unit", quoted(v.unit)},
                  {"description", quoted(v.description)},
                  {"choice", quoted(v.choice)},
@@ -50,6 +50,7 @@ std::string variable(const Variable& v) {
                  {"nominal", quoted(v.nominal)},
                  {"exact", yes(v.exact)},
                  {"consumed", yes(v.consumed)},
+                 {"discrete", yes(v.discrete)},
                  {"elements", std::to_string(v.elements)},
                  {"dependencies", array(v.dependencies, dependency)},
                  {"initial_dependencies", names(v.initial_dependencies)}});

@@ -2,6 +2,7 @@
 // gets or sets a value go by it. A value reference is the variable's position in the table.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <functional>
@@ -17,7 +18,8 @@
 namespace fmi {
 
 enum class Type { real, integer, boolean };
-inline constexpr const char* type_names[] = {"Real", "Integer", "Boolean"};
+using TypeNames = std::array<const char*, 3>;
+inline constexpr TypeNames type_names{"Real", "Integer", "Boolean"};
 enum class Causality { parameter, input, output, local };
 
 /// An input that an output follows without a step.
@@ -40,6 +42,7 @@ struct Variable {
   double max = std::numeric_limits<double>::infinity();
   double nominal = 1.0;
   bool exact = false;        ///< an output whose start is the initial state (initial="exact")
+  bool discrete = false;     ///< an output that changes at steps only. It is a Real: some tools read all outputs so
   bool consumed = false;     ///< an input that acts once: read back as 0 after the step that used it
   std::size_t elements = 1;  ///< of the array that begins here, where variables can be arrays; 0: within one
 
@@ -56,7 +59,7 @@ struct Variable {
   Variable& range(double low, double high) { return min = low, max = high, *this; }
   Variable& at_least(double low) { return min = low, *this; }
   Variable& positive() { return min = std::numeric_limits<double>::min(), *this; }
-  Variable& whole() { return type = Type::integer, *this; }
+  Variable& steps_only() { return discrete = true, *this; }
   Variable& typical(double value) { return nominal = value, *this; }
   Variable& from(std::vector<std::string> names) { return initial_dependencies = std::move(names), *this; }
 };

@@ -330,7 +330,7 @@ fmi::Table fmi::make_table() {
       of(&Beam::load_work), of(&Beam::load_power));
   add.output("warnings", "", "steps so far that were discarded; restored states do not take it back",
              [](const BeamModel& m) { return m.refused; })
-      .whole();
+      .steps_only();
   add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam", of(&Beam::tip_mass))
       .from(basis);
   add.output(

@@ -419,9 +419,10 @@ fmi::Table fmi::make_table() {
     add.depends(name, [by = partial](M m) { return -m.mobility() * by(m); }, order);
   for (const auto& [name, partial, order] : loads)
     add.depends(name, [=, by = partial](M m) { return m.mobility() * by(m) * (1.0 - by_held(m)); });
-  add.output("seated", "", "whether the top rests on the foundation inside", of(&Spring::seated)).type =
-      fmi::Type::boolean;
-  add.output("number_of_impacts", "", "impacts on the foundation inside since the start", of(&Spring::impacts)).whole();
+  add.output("seated", "", "1 while the top rests on the foundation inside, otherwise 0", of(&Spring::seated))
+      .steps_only();
+  add.output("number_of_impacts", "", "impacts on the foundation inside since the start", of(&Spring::impacts))
+      .steps_only();
   add.output("last_impact_time", "s", "time of the last of them; -1 if there was none", of(&Spring::last_impact));
   add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
   add.output("stop_impulse", "N.s", "sum of the foundation's impulses over the last step", of(&Spring::stop_impulse));
@@ -450,7 +451,7 @@ fmi::Table fmi::make_table() {
          "steps so far in which something was missed or refused: the wiring is wrong, or a step was discarded. Many "
          "tools hide the messages that say what; restored states do not take it back",
          [](M m) { return m.warnings(); })
-      .whole();
+      .steps_only();
   add.local("internal_steps", "", "steps that IDA took since the start", of(&Spring::ida_steps));
   return t;
 }

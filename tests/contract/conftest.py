@@ -44,7 +44,8 @@ class Fmu:
         given = {"guid": self.description.guid, "modelIdentifier": self.name, "unzipDirectory": str(folder)}
         self.slave = {"2.0": fmi2.FMU2Slave, "3.0": fmi3.FMU3Slave}[self.version](**given)
         self.variables = {v.name: v for v in self.description.modelVariables}
-        self.outputs = [name for name in self.named("output") if self.variables[name].type in ("Real", "Float64")]
+        #: But for `warnings`, which counts what was refused and is no part of the state.
+        self.outputs = [name for name in self.named("output") if name != "warnings"]
         self.instances = []
         self.parameters = MOVING[self.name]
         self.force, self.impulse, self.displacement, self.velocity = ENDS[self.name]
@@ -168,9 +169,6 @@ class Instance:
         """Real values: one, or a list."""
         found = self.values(names)
         return found[names[0]] if len(names) == 1 else [found[name] for name in names]
-
-    def integer(self, name):
-        return getattr(self.slave, f"get{self.fmu.variables[name].type}")(self.fmu.numbers(name))[0]
 
     def outputs(self):
         """The Real ones."""

@@ -215,7 +215,7 @@ def linux_host(tmp_path_factory):
     if compiler is None:
         pytest.skip("no C compiler: the FMUs are not tried in a C host")
     host = tmp_path_factory.mktemp("host") / "host"
-    ran(compiler, "-O1", "-isystem", HEADERS, HERE / "host.c", "-o", host, "-ldl")
+    ran(compiler, "-O1", "-isystem", HEADERS, HERE / "host.c", "-o", host, "-ldl", "-lm", "-pthread")
     return host
 
 

@@ -282,7 +282,8 @@ class Instance {
 std::vector<Reference> outputs_of_type(fmi::Type type) {
   std::vector<Reference> found;
   for (std::size_t i = 0; i < variables().size(); ++i)
-    if (variables()[i].get && variables()[i].type == type) found.push_back(static_cast<Reference>(i));
+    if (variables()[i].get && variables()[i].type == type && variables()[i].name != "warnings")  // no part of the state
+      found.push_back(static_cast<Reference>(i));
   return found;
 }
 const std::vector<Reference>& outputs() {

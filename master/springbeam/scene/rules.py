@@ -138,6 +138,11 @@ def _tolerance(scene: Scene) -> Mapping[str, str]:
     return {"tolerance": at(scene, f"coupling.{next(given)}")}
 
 
+def _most_elements(beam: Beam) -> int:
+    """Return how many elements of its degree a beam may have."""
+    return 2 * MOST_ELEMENTS // (beam.element_degree * (beam.element_degree + 1))
+
+
 def _mesh(scene: Scene) -> Mapping[str, Any]:
     """Return what the mesh of our beam has and allows, for the texts of rules."""
     beam = scene.beam
@@ -150,6 +155,7 @@ def _mesh(scene: Scene) -> Mapping[str, Any]:
         "most": most,
         "fewer": min(64, most),
         "degree": beam.element_degree,
+        "most_elements": _most_elements(beam),
     }
 
 
@@ -265,8 +271,8 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     # The mesh
     Rule(
-        lambda s: s.beam and s.beam.n_elements * s.beam.element_degree > MOST_ELEMENTS,
-        f"{{beam.n_elements}}: times element_degree = {{degree}} it must be at most {MOST_ELEMENTS}",
+        lambda s: s.beam and s.beam.n_elements > _most_elements(s.beam),
+        "{beam.n_elements}: with element_degree = {degree} it must be at most {most_elements}",
         _mesh,
     ),
     Rule(

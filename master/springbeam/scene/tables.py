@@ -36,7 +36,7 @@ ALL_MODES_UP_TO = 1000
 MOST_MODES = 1000
 #: Most modes times unknowns: 40 bytes each while the modes are found, so 1 GB.
 MOST_MODE_VALUES = 25_000_000
-#: Most elements times their degree.
+#: Most elements of degree 1; of degree p fewer by p(p + 1)/2, as a band of their matrices grows so.
 MOST_ELEMENTS = 1_000_000
 
 
