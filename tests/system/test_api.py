@@ -235,7 +235,7 @@ def test_numbers_of_numpy_are_numbers():
     assert type(changed.beam.n_elements) is int
     shaped = {"on": "beam", "shape": np.array([1.0, -0.5])}
     assert with_changes(load_scene("soft"), loads=[shaped]).loads[0].shape == (1.0, -0.5)
-    with pytest.raises(SceneError, match=r"n_elements = 7\.5: must be an integer"):
+    with pytest.raises(SceneError, match=r"n_elements = 7\.5: must be a whole number"):
         with_changes(load_scene("soft"), beam={"n_elements": np.float64(7.5)})
 
 
