@@ -194,7 +194,7 @@ def _in_words(scene: Scene, summary: Mapping[str, Any], events: list[Event]) -> 
         yield _event_table(events, scene)
         kinds = Counter(event.kind for event in events)
         yield f"events    {', '.join(f'{number} {kind}' for kind, number in kinds.most_common())}"
-        yield "          (on the tip, of the stop: impulses, upward; lost: energy that the event takes)"
+        yield "          (on tip, of stop: impulses, upward; lost: energy that events take)"
     results = Table.grid(padding=(0, 2))
     for words, value in in_words(summary):
         results.add_row(Text(words), Text(value))
@@ -229,7 +229,7 @@ def _event_table(events: list[Event], scene: Scene) -> Table:
     position, speed = ("u_tip", "v_tip") if scene.lower is None else ("y", "z")
     columns = (
         *("event", "time\n[s]:.8f", f"{position}\n[m]:", f"{speed}\n[m/s]:"),
-        *("on the\ntip [N·s]:.3g", "of the\nstop [N·s]:.3g", "lost\n[J]:.3g"),
+        *("on tip\n[N·s]:.3g", "of stop\n[N·s]:.3g", "lost\n[J]:.3g"),
     )
     scales = {name: max(abs(getattr(event, name) or 0.0) for event in events) for name in (position, speed)}
     rows: list[tuple[Any, ...]] = []
