@@ -19,7 +19,7 @@ from springbeam.run import runner
 from springbeam.scene import Scene
 from springbeam.scene.resolution import choice
 from springbeam.studies import tradeoff
-from springbeam.studies.study import record_all, troubles
+from springbeam.studies.study import troubles
 from springbeam.studies.tables import Row, in_words
 from springbeam.studies.tradeoff import TARGETS, Tradeoff, cheapest
 
@@ -87,7 +87,7 @@ def main(names: list[str]) -> None:
         window = WINDOWS[name]
         scene = with_changes(load_scene(window.scene), **window.changes)
         study = Tradeoff.of(scene, window.until)
-        records = record_all(study)
+        records = study.computed()
         rows, remarks = study.rows(records), troubles(records)
         study.findings(records).pictures["tradeoff"]().savefig(IMAGES / f"tradeoff-{name}.png", dpi=110)
         shrink(IMAGES / f"tradeoff-{name}.png")

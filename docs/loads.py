@@ -13,7 +13,6 @@ from pages import IMAGES, shrink  # beside this script
 from springbeam import load_scene, simulate
 from springbeam.pictures.drawing import BLACK, BLUE, VERMILLION
 from springbeam.studies import sweep
-from springbeam.studies.study import record_all
 
 
 def bifurcation() -> None:
@@ -24,7 +23,7 @@ def bifurcation() -> None:
         metric=("stroboscopic", "settled_u_tip"),
     )
     with tempfile.TemporaryDirectory() as folder:
-        found = todo.findings(record_all(todo, workers=os.cpu_count() or 1))
+        found = todo.findings(todo.computed(workers=os.cpu_count() or 1))
         found.written(Path(folder), pictures=True)
         shutil.copy(Path(folder) / "sweep.png", IMAGES / "vibro-impact.png")
 

@@ -12,7 +12,7 @@ from time import perf_counter
 from measure import compare, ratio_row, shown, timed
 
 from springbeam import load_scene, with_changes
-from springbeam.studies.study import Records, record_all
+from springbeam.studies.study import Records
 from springbeam.studies.sweep import Sweep
 
 #: End of the runs [s] and how many.
@@ -26,7 +26,7 @@ def plan(t_end, runs):
 
 def recorded(todo, pool):
     with tempfile.TemporaryDirectory() as folder, Records(todo, Path(folder)) as records:
-        return timed(lambda: record_all(todo, records, cluster=pool), perf_counter)
+        return timed(lambda: todo.computed(records, cluster=pool), perf_counter)
 
 
 def in_a_pool(todo, pool):

@@ -17,7 +17,7 @@ from springbeam.run import accuracy as search
 from springbeam.run.accuracy import simulate
 from springbeam.run.runner import run
 from springbeam.scene.reading import tomllib
-from springbeam.studies.crosscheck import Orders
+from springbeam.studies.crosscheck import orders
 
 sys.path.append(str(Path(__file__).parents[1] / "campaign"))
 import judge
@@ -224,8 +224,8 @@ def test_what_runs_a_scene_as_it_is_wants_the_accuracy_picked():
     scene = scene_from_dict(ASKING)
     with pytest.raises(SceneError, match=r"accuracy = 0\.0001"):
         run(scene, MemoryRecorder(scene))
-    refused = Orders(scene=scene).record({"coupling.macro_step": 1e-3})
-    assert (refused["status"], "accuracy = 0.0001 picks" in refused["error"]) == ("refused", True)
+    with pytest.raises(SceneError, match=r"accuracy = 0\.0001 picks"):
+        orders(scene)
 
 
 def test_command(tmp_path):

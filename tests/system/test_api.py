@@ -257,10 +257,10 @@ def test_a_script_that_asks_for_processes_outside_of_its_guard_is_refused(tmp_pa
     """Each process runs the script again up to there."""
     lines = [
         "from springbeam import load_scene",
-        "from springbeam.studies.study import record_all",
+        "from springbeam.studies import study",
         "from springbeam.studies.sweep import Sweep",
         "sweep = Sweep(scene=load_scene('duffing', ['time.t_end=0.01']), vary=('spring.mass=1:2:2',))",
-        "{}print(len(record_all(sweep, workers=2)))",
+        "{}print(len(sweep.computed(workers=2)))",
     ]
     script = tmp_path / "script.py"
     script.write_text("\n".join(lines).format(""))

@@ -40,7 +40,7 @@ TABLES = {
     "animate": "done --seconds 0.2 --fps 10 --out moving.gif",
     "export": "done",
     "predict": "soft --set beam.n_elements=10",
-    "converge": "soft --levels 3 --set beam.n_elements=4 --set time.t_end=0.05 --out meshes",
+    "converge": "soft --levels 3 --set beam.n_elements=4 --set time.t_end=0.05",
     "tradeoff": "duffing --until 0.5 --quick --out traded",
     "crosscheck": "soft --set time.t_end=0.1 --set beam.n_elements=6",
     "stability": "--samples 2 --resolution 0 --workers 1 --out grid",

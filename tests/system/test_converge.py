@@ -7,7 +7,7 @@ from commands import printed
 from rich.console import Console
 
 from springbeam.scene import load_scene, with_changes
-from springbeam.studies.converge import Converge, settled
+from springbeam.studies.converge import judged, meshes, settled
 
 
 @pytest.mark.parametrize("sizes", [(1, 2, 4, 8), (1, 2, 5, 10), (3, 4, 7, 30)])
@@ -26,11 +26,12 @@ def test_what_hardly_converges_has_no_limit():
 
 def test_errors_are_from_the_limit_and_as_given_is_the_mesh_of_the_scene():
     """1 m + (20/n)² m by 20, 40 and 80 elements; all numbers of modes leave 7 m."""
-    study = Converge(scene=with_changes(load_scene("soft"), beam={"n_elements": 20}), metric=("u_tip_end",), levels=3)
+    scene = with_changes(load_scene("soft"), beam={"n_elements": 20})
     ends = {"elements": lambda row: 1.0 + (20.0 / row["beam.n_elements"]) ** 2, "modes": lambda row: 7.0}
-    cases = study.cases().items()
-    records = {name: {"u_tip_end": ends[case["refined"]](case), "cost_wall_time": 1.0} for name, case in cases}
-    found = study.findings(records)
+    rows = [
+        {**mesh, "u_tip_end": ends[mesh["refined"]](mesh), "cost_wall_time": 1.0} for mesh in meshes(scene, 3).values()
+    ]
+    found = judged(scene, rows, ("u_tip_end",))
     errors = [row["error_u_tip_end"] for row in found.tables["converge"]]
     assert errors[:3] == pytest.approx([1.0, 0.25, 0.0625], rel=1e-9)
     with (console := Console(width=80)).capture() as shown:
@@ -46,10 +47,11 @@ def test_beyond_all_modes_there_is_nothing():
     assert settled(values, sizes, complete=True) == (0.25, None, 1.75, 0.0)
     for elements, error in ((12, 0.0), (24, 0.25)):  # of 24 modes, of 48
         scene = with_changes(load_scene("soft"), beam={"n_elements": elements, "n_modes": 24})
-        study = Converge(scene=scene, metric=("u_tip_end",), levels=3)
-        rows = [{"u_tip_end": value, "cost_wall_time": 1.0} for value in 2 * values]
-        records = dict(zip(study.cases(), rows, strict=True))
-        found = study.findings(records).document["modes"]["settled"]["u_tip_end"]
+        rows = [
+            {**mesh, "u_tip_end": value, "cost_wall_time": 1.0}
+            for mesh, value in zip(meshes(scene, 3).values(), 2 * values, strict=True)
+        ]
+        found = judged(scene, rows, ("u_tip_end",)).document["modes"]["settled"]["u_tip_end"]
         assert found["error"] == pytest.approx(error)
 
 
@@ -62,4 +64,4 @@ def test_linear_elements_converge_by_order_two(tmp_path):
     assert [level["unknowns"] for level in found["modes"]["levels"]] == [1, 3, 6, 12]
     assert found["elements"]["settled"]["first_separation"]["limit"] is None  # there is none
     written = {file.name for file in (tmp_path / "found").iterdir()}
-    assert written == {"study.jsonl", "converge.csv", "converge.parquet", "converge.png"}
+    assert written == {"converge.csv", "converge.parquet", "converge.png"}

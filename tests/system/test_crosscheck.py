@@ -11,8 +11,7 @@ from commands import command, printed
 from springbeam import load_scene, with_changes
 from springbeam.monolithic import event_driven
 from springbeam.studies.comparison import _judged, compare
-from springbeam.studies.crosscheck import Crosscheck, Orders
-from springbeam.studies.study import record_all
+from springbeam.studies.crosscheck import crosscheck, orders
 
 SOFT = load_scene("soft")
 
@@ -77,11 +76,10 @@ def test_what_cannot_be_compared_has_not_agreed(tmp_path):
     """Tip and top touch at one velocity: the least change of it decides whether they are joined at once."""
     beam, spring = {"n_elements": 3, "fidelity": "quasi_static"}, {"initial_velocity": -1.0}
     grazing = with_changes(SOFT, beam=beam, spring=spring, time={"t_end": 0.05}, coupling={"macro_step": 1e-3})
-    found = Crosscheck(scene=grazing)
-    report = found.record({})
-    assert (report["verdict"], report["quantities"]) == ("not comparable", [])
-    assert "Nothing could be compared" in report["notes"][-1]
-    assert found.findings({"comparison": report}).code == 4
+    found = crosscheck(grazing)
+    assert (found.document["verdict"], found.document["quantities"]) == ("not comparable", [])
+    assert "Nothing could be compared" in found.document["notes"][-1]
+    assert found.code == 4
 
 
 def test_a_run_that_is_not_resolved_cannot_agree(tmp_path):
@@ -130,16 +128,16 @@ def test_quick_compares_the_first_quarter_and_leaves_the_last_halving_out(here, 
     rows = list(csv.DictReader((here / found["files"][0]).open()))
     assert [float(row["order_H"]) for row in rows] == [row["order_H"] for row in found["orders"]]
     late = with_changes(SOFT, beam={"initial_deflection_slope": 0.1})  # the tip arrives at 0.1 s
-    (case,) = Crosscheck(scene=late, quick=True).cases().values()
-    assert case["time.t_end"] == pytest.approx(0.1 + 0.25 * (SOFT.time.t_end - 0.1), rel=1e-14)
+    compared = crosscheck(with_changes(late, beam={"n_elements": 3}), quick=True).document["t_end"]
+    assert compared == pytest.approx(0.1 + 0.25 * (SOFT.time.t_end - 0.1), rel=1e-14)
 
 
 def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
-    """It shows again what it has found, until it is to begin anew."""
+    """Results stay as they are until they are to be replaced."""
     out = tmp_path / "both"
     arguments = ["crosscheck", "duffing", "--set", "time.t_end=1", "--out", out]
     right = event_driven.simulate
-    for options, mass, code in (([], 1.0, 0), ([], 1.01, 0), (["--force"], 1.01, 1)):
+    for options, mass, code in (([], 1.0, 0), ([], 1.01, 2), (["--force"], 1.01, 1)):
         wrong = {"spring": {"mass": mass}}
         monkeypatch.setattr(event_driven, "simulate", lambda scene, **more: right(with_changes(scene, **wrong), **more))  # noqa: B023
         assert command(*arguments, *options).exit_code == code
@@ -149,8 +147,18 @@ def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
 def test_orders_are_those_of_the_scheme():
     """Degree 0: displacement, velocity and force of order 4."""
     coupling = {"macro_step": 1e-3, "degree": 0}
-    study = Orders(scene=with_changes(SOFT, time={"t_end": 0.07}, coupling=coupling), quick=True)
-    orders = {row["quantity"]: row["order_H/2"] for row in study.findings(record_all(study)).tables["orders"]}
-    assert orders["y"] == pytest.approx(4.0, abs=0.5)
-    assert orders["z"] == pytest.approx(4.0, abs=0.5)
-    assert orders["contact_force"] == pytest.approx(4.0, abs=0.5)
+    scene = with_changes(SOFT, time={"t_end": 0.07}, coupling=coupling)
+    found = {row["quantity"]: row["order_H/2"] for row in orders(scene, quick=True).tables["orders"]}
+    assert found["y"] == pytest.approx(4.0, abs=0.5)
+    assert found["z"] == pytest.approx(4.0, abs=0.5)
+    assert found["contact_force"] == pytest.approx(4.0, abs=0.5)
+
+
+def test_orders_of_runs_that_all_stop_are_no_success():
+    """Jacobi on a contact that is far too stiff for it: there was an empty table, and exit code 0."""
+    contact = {"law": "compliance", "stiffness": 1e9, "exponent": 1.0}
+    coupling = {"scheme": "jacobi", "macro_step": 1e-2}
+    wild = with_changes(SOFT, contact=contact, coupling=coupling, time={"t_end": 0.1}, beam={"n_elements": 3})
+    found = orders(wild, quick=True)
+    assert (found.code, found.tables["orders"], list(found.document["stopped"])) == (3, [], ["H", "H/2", "H/4"])
+    assert "fewer than two of the runs came to their end" in found.error

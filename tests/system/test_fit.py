@@ -5,15 +5,13 @@ from itertools import count
 
 import numpy as np
 import pytest
-from commands import command, printed, refused
+from commands import Interrupt, command, printed, refused
 from scenes import scene_from_dict
 from scipy.stats import t as student
 
 from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
 from springbeam.signals.measured import read_measured, residuals
 from springbeam.studies import fit
-from springbeam.studies.fit import Fit
-from springbeam.studies.study import record_all
 
 TRUE = {"spring.linear_stiffness": 800.0, "spring.damping": 1.2}
 OSCILLATOR = scene_from_dict(
@@ -41,8 +39,8 @@ def written(path, header, *columns):
 
 
 def fitted(path, vary=GUESSES, scene=OSCILLATOR, **options):
-    study = Fit.of(scene, path, vary, **options)
-    return record_all(study)["fit"]
+    found = fit.fit(scene, path, vary, **options)
+    return {**found.document, "runs": found.tables["fit"]}
 
 
 # -- beside a run -------------------------------------------------------------------------------------------------
@@ -267,12 +265,23 @@ def test_the_command_ends_with_1_where_the_data_does_not_tell(here):
     assert "fewer of its points lie in the run than are needed to find spring.mass; make" in away.stderr
 
 
-def test_a_fit_that_is_done_is_shown_at_once(here):
+def test_an_interrupted_fit_keeps_its_runs(here, monkeypatch):
+    """A search of minutes had left nothing."""
+    written(here / "m.csv", "time,y", TIMES, simulate(load_scene("duffing")).at(TIMES)["y"])
+    interrupt, right = Interrupt(6), fit.simulate
+    monkeypatch.setattr(fit, "simulate", lambda scene: interrupt() or right(scene))
+    line = ["fit", "duffing", "m.csv", "--vary", "spring.linear_stiffness=3.2", "--set", "time.t_end=0.6"]
+    cut = command(*line, "--shift", "0", "--out", "f")
+    assert cut.exit_code == 3
+    assert "error: interrupted after 4 runs" in cut.stderr  # of five calls the first is the run with the guesses
+    assert (here / "f" / "fit.csv").read_text().count("\n") == 5
+
+
+def test_results_of_a_fit_are_not_overwritten_unasked(here):
     written(here / "m.csv", "time,y", TIMES, simulate(load_scene("duffing")).at(TIMES)["y"])
     line = ["fit", "duffing", "m.csv", "--vary", "spring.linear_stiffness=3.2", "--set", "time.t_end=0.6"]
     first = json.loads(printed(*line, "--out", "f", "--json"))
     assert first["keys"][0]["value"] == pytest.approx(3.0, rel=1e-6)
-    assert json.loads(printed(*line, "--out", "f", "--json")) == first
+    assert "f: is not empty" in refused(*line, "--out", "f")
+    assert json.loads(printed(*line, "--out", "f", "--force", "--json"))["keys"] == first["keys"]
     assert (here / "f" / "fit.csv").read_text().count("\n") > 5
-    written(here / "m.csv", "time,y", TIMES, exact())
-    assert "holds another study" in refused(*line, "--out", "f")

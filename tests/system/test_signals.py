@@ -14,7 +14,7 @@ from springbeam import SceneError, load_scene, simulate, with_changes
 from springbeam.signals.driven import poincare, responses, settled
 from springbeam.signals.spectra import power_spectrum, sampled, shock_of_run, shock_spectrum, spectra
 from springbeam.studies.metrics import METRICS
-from springbeam.studies.study import record_all, troubles
+from springbeam.studies.study import troubles
 from springbeam.studies.sweep import Sweep
 
 MASS, STIFFNESS, DAMPING, FORCE, DRIVE, START = 0.2, 800.0, 1.2, 3.0, 7.0, 0.05
@@ -118,7 +118,7 @@ def importable(monkeypatch):
 def test_a_metric_of_ones_own_is_a_column_of_a_sweep(importable):
     metrics = ("y_max", "y_min", "spread=test_signals:spread")
     study = Sweep(scene=oscillator(t_end=0.5), vary=("spring.mass=0.1,0.2",), metric=metrics)
-    for row in record_all(study).values():
+    for row in study.computed().values():
         assert row["status"] == "done"
         assert row["spread"] == pytest.approx(row["y_max"] - row["y_min"], rel=1e-3)
 
@@ -126,7 +126,7 @@ def test_a_metric_of_ones_own_is_a_column_of_a_sweep(importable):
 def test_a_rigid_impact_leaves_no_peak_of_an_acceleration():
     metrics = ("max_a_tip", "max_a_y", "max_v_tip")
     study = Sweep(scene=load_scene("soft", ["time.t_end=0.05"]), vary=("spring.mass=1,2",), metric=metrics)
-    records = record_all(study)
+    records = study.computed()
     for row in records.values():
         assert (row["max_a_tip"], row["max_a_y"]) == (None, None)
         assert row["max_v_tip"] > 0.0
@@ -137,12 +137,12 @@ def test_a_rigid_impact_leaves_no_peak_of_an_acceleration():
     soft = Sweep(
         scene=load_scene("vibro-impact", ["time.t_end=0.1"]), vary=("beam.n_elements=30,40",), metric=("max_a_tip",)
     )
-    assert all(row["max_a_tip"] > 0.0 and row["warnings"] == "" for row in record_all(soft).values())
+    assert all(row["max_a_tip"] > 0.0 and row["warnings"] == "" for row in soft.computed().values())
 
 
 def test_a_function_that_gives_no_number_spoils_its_row_only(importable):
     study = Sweep(scene=oscillator(t_end=0.1), vary=("spring.mass=0.1,0.2",), metric=("a=test_signals:twice",))
-    for row in record_all(study).values():
+    for row in study.computed().values():
         assert row["status"] == "refused"
         assert "--metric a=test_signals:twice: gives 5" in row["error"]
 
@@ -166,7 +166,7 @@ def test_the_damage_boundary_of_an_oscillator_is_that_of_its_shock_spectrum(
         metric=("a=test_signals:highest_in_space",),
         boundary=f"a={limit}",
     )
-    records = record_all(study)
+    records = study.computed()
     findings = study.findings(records).written(tmp_path, pictures=True)
     found = findings.document["boundary"]
     rate = sqrt(STIFFNESS / MASS)

@@ -39,7 +39,6 @@ from springbeam.studies.stability.cells import (
 )
 from springbeam.studies.stability.grid import CLASSES, Grid, ended, judged, run_cell
 from springbeam.studies.stability.predict import THRESHOLD, critical_step, linear_pair
-from springbeam.studies.study import record_all
 
 SMALL = {"time": {"t_end": 0.05}, "beam": {"n_elements": 5}, "coupling": {"macro_step": 2e-3}}
 
@@ -251,7 +250,7 @@ def test_the_grid_covers_the_ranges():
 def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else():
     """One process and two compute the same records; of errors near rounding the digits differ, and a busy machine may
     give a reference up."""
-    records, again = record_all(Part()), record_all(Few(), workers=2)
+    records, again = Part().computed(), Few().computed(workers=2)
     for name, record in again.items():
         errors = [found[name].pop("error_motion", None) for found in (dict(records), again)]
         if None not in errors:

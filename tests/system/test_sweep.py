@@ -16,11 +16,10 @@ from springbeam.results.trajectory import Event, EventKind
 from springbeam.run.runner import simulate
 from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
 from springbeam.studies import picture, study, sweep
-from springbeam.studies.converge import Converge
-from springbeam.studies.design import design, parse_axis
+from springbeam.studies.converge import converge
+from springbeam.studies.design import design, parse_axis, with_keys
 from springbeam.studies.metrics import METRICS as METRICS_THERE_ARE
 from springbeam.studies.picture import Scale
-from springbeam.studies.study import record_all
 
 METRICS = ("y_min", "first_stop_impact", "energy_residual")
 
@@ -91,7 +90,7 @@ def test_a_sweep_whose_every_run_is_refused_is_bad_input(masses, code, tmp_path,
 @pytest.mark.filterwarnings("error:The input coordinates to pcolormesh")  # of values that do not ascend
 def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
     plan = planned("spring.mass=0.5,1,-1", "spring.linear_stiffness=1:100:3:log")
-    records = record_all(plan)
+    records = plan.computed()
     assert plan.findings(records).document["runs"] == {"done": 6, "stopped": 0, "refused": 3, "lost": 0}
     plan.findings(records).written(tmp_path, pictures=True)
     assert (tmp_path / "sweep.png").stat().st_size > 10_000
@@ -104,7 +103,7 @@ def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
             assert "[spring] mass = -1" in rows["error"][k]
             assert rows["y_min"][k] is None
             continue
-        run = simulate(plan.at(values))
+        run = simulate(with_keys(plan.scene, values))
         assert rows["y_min"][k] == run.y.min()
         assert rows["energy_residual"][k] == run.summary["max_energy_residual"]
         assert rows["first_stop_impact"][k] == next(e.time for e in run.events if e.kind == "stop_impact")
@@ -159,7 +158,7 @@ def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_dou
     todo = sweep.Sweep(
         scene=load_scene("vibro-impact"), vary=("loads.0.frequency=35,45",), metric=("stroboscopic", "u_tip_max")
     )
-    records = record_all(todo)
+    records = todo.computed()
     found = todo.findings(records).written(tmp_path, pictures=False)
     columns = swept(tmp_path)
     once, doubled = (np.unique(np.round(np.array(points), 5)) for points in columns["stroboscopic"])
@@ -171,7 +170,7 @@ def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_dou
 
 def test_several_numbers_of_a_run_are_for_sweeps_and_none_of_a_run_without_a_drive():
     with pytest.raises(SceneError, match="stroboscopic: is several numbers"):
-        Converge(scene=load_scene("vibro-impact"), metric=("stroboscopic",)).cases()
+        converge(load_scene("vibro-impact"), metric=("stroboscopic",))
     assert METRICS_THERE_ARE["stroboscopic"](simulate(small())) is None
 
 
@@ -223,5 +222,6 @@ def test_a_worker_of_a_cluster_that_is_killed_costs_no_row(tmp_path):
             process.kill()
     assert done < 40
     assert process.returncode == 0, errors
-    alone = record_all(sweep.Sweep(scene=load_scene("duffing", ["time.t_end=0.1"]), vary=(vary,), metric=(metric,)))
+    study = sweep.Sweep(scene=load_scene("duffing", ["time.t_end=0.1"]), vary=(vary,), metric=(metric,))
+    alone = study.computed()
     assert swept(out)[metric] == [row[metric] for row in alone.values()]

@@ -12,8 +12,9 @@ from springbeam.monolithic import event_driven
 from springbeam.results.distance import motion
 from springbeam.scene import load_scene, with_changes
 from springbeam.studies import tradeoff
+from springbeam.studies.design import with_keys
 from springbeam.studies.metrics import costs
-from springbeam.studies.study import record_all, troubles
+from springbeam.studies.study import troubles
 from springbeam.studies.tradeoff import Tradeoff, cheapest, pareto
 
 
@@ -22,7 +23,7 @@ def test_a_curve_between_few_points_is_judged_too(monkeypatch):
     monkeypatch.setattr(tradeoff, "_LIMIT", HANGS)  # on a busy machine, too, nothing is given up
     study = Tradeoff.of(soft(), until=0.06, repeats=1)
     coarse = next(case for case in study.cases().values() if case["family"] == "energy 2")
-    scene = study.at(coarse)
+    scene = with_keys(study.scene, coarse)
     run = tradeoff.simulate(scene)
     exact = event_driven.simulate(scene, sample_times=run.time)
     rows = np.searchsorted(exact.time, run.time)
@@ -123,11 +124,11 @@ def test_what_takes_too_long_is_given_up_and_named(monkeypatch):
     """With no time at all every run is given up: one of each family is begun, and none is judged."""
     monkeypatch.setattr(tradeoff, "_LIMIT", 0.0)
     study = Tradeoff.of(with_changes(load_scene("soft"), beam={"n_elements": 4}), until=0.02, repeats=2)
-    rows = study.rows(record_all(study))
+    rows = study.rows(study.computed())
     begun = [row for row in rows if row["status"] == "stopped"]
     assert len(begun) == len({row["family"] for row in rows}) < len(rows)
     assert all("takes more than 0 s" in row["error"] or "diverges" in row["error"] for row in begun)
-    assert troubles(record_all(study)) == [
+    assert troubles(study.computed()) == [
         f"error     in {len(rows)} cases, first in energy 0, H = 0.004: stopped at t = 0.0005 s: takes more than 0 s"
     ]
     assert {row["status"] for row in rows} == {"stopped", "skipped"}

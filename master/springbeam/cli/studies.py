@@ -11,14 +11,15 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from ..results.directory import ResultsExist
+from ..results.directory import ResultsExist, RunDirectory
 from ..scene import load_scene
 from ..studies.tables import Findings
 from .common import (
@@ -70,19 +71,31 @@ class Frame:
     ] = None
 
 
-def study_command(*of_workers: str) -> Callable[[Callable[..., Study]], Callable[..., Findings]]:
+@dataclass(frozen=True)
+class Once:
+    """What is found at once, with no cases to keep and to go on from."""
+
+    kind: str  #: names the directory of the results
+    announced: str  #: what there is to compute
+    find: Callable[[], Findings]
+
+
+def study_command(*of_workers: str) -> Callable[[Callable[..., Study | Once]], Callable[..., Findings]]:
     """Return what makes a command of a function that returns a study: with its options, then those of `Frame`.
 
     ``of_workers`` names the options of workers that the command offers.
     """
 
-    def decorate(make: Callable[..., Study]) -> Callable[..., Findings]:
+    def decorate(make: Callable[..., Study | Once]) -> Callable[..., Findings]:
         own, frame = (inspect.signature(what, eval_str=True).parameters for what in (make, Frame))
         shared = {name: p for name, p in frame.items() if name in of_workers or name not in ("workers", "scheduler")}
 
         def command(**given: Any) -> Findings:
             frame = Frame(**{name: given.pop(name) for name in shared})
-            return carry_out(make(**given), given.get("scene"), frame)
+            made = make(**given)
+            if isinstance(made, Once):
+                return find(made, given["scene"], frame)
+            return carry_out(made, given.get("scene"), frame)
 
         command.__name__, command.__doc__ = make.__name__, make.__doc__
         parameters = [p.replace(kind=p.KEYWORD_ONLY) for p in (own | shared).values()]
@@ -90,6 +103,43 @@ def study_command(*of_workers: str) -> Callable[[Callable[..., Study]], Callable
         return command
 
     return decorate
+
+
+def find(once: Once, scene: str, frame: Frame) -> Findings:
+    """Find it, write the files into a directory of their own, and return what was found.
+
+    The directory is ``out``, else ``results/SCENE-KIND``, or with -2, -3, … behind it where there are results.
+    """
+    from ..monolithic.hybrid_system import ReferenceFailure
+    from ..run.outcome import RunStopped
+
+    with _new_directory(Path("results") / f"{Path(scene).stem}-{once.kind}", frame) as directory:
+        bar = progress_bar(TextColumn("{task.description}"), TimeElapsedColumn(), quiet=frame.quiet or frame.as_json)
+        try:
+            with bar:
+                bar.add_task(once.announced, total=None)
+                found = once.find()
+            if frame.force:
+                for stale in directory.glob(f"{once.kind}.*"):
+                    stale.unlink()
+            return found.written(directory, pictures=not frame.no_plots)
+        except (RunStopped, ReferenceFailure) as error:
+            fail(STOPPED, cause_of(error, directory))
+
+
+@contextmanager
+def _new_directory(default: Path, frame: Frame) -> Iterator[Path]:
+    """Make and claim the directory of the results; it goes again where nothing is written there."""
+    if frame.out is None and not frame.force:
+        directory = RunDirectory.create_numbered(default)
+    else:
+        directory = RunDirectory.create(frame.out or default, replace=True)
+    try:
+        if not frame.force and any(directory.path.iterdir()):
+            raise ResultsExist(f"{directory.path}: is not empty")
+        yield directory.path
+    finally:
+        directory.discard()
 
 
 def carry_out(study: Study, scene: str | None, frame: Frame) -> Findings:
@@ -137,11 +187,11 @@ def _going_on(records: Records, total: int) -> Iterator[None]:
 
 def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
     """Return all records, and show meanwhile how far it is."""
-    from ..studies.study import dask_cluster, record_all
+    from ..studies.engine import dask_cluster
 
     total, there = len(study.cases()), len(records.by_name)
     if there == total:
-        return record_all(study, records)
+        return study.computed(records)
     silent = frame.quiet or frame.as_json
     known = f"\n{there} of {total} records are there" * bool(there)
     console_for(silent=silent).print(f"{study.announced.format(total)}{known}")
@@ -149,7 +199,7 @@ def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
     task = bar.add_task("", total=total, completed=there)
     processes = (frame.workers or os.cpu_count() or 1) if study.parallel else 0
     with records, dask_cluster(frame.scheduler) if frame.scheduler else nullcontext() as cluster, bar:
-        return record_all(study, records, processes, cluster, lambda record: bar.advance(task))
+        return study.computed(records, processes, cluster, lambda record: bar.advance(task))
 
 
 # -- the commands ---------------------------------------------------------------------------------------------------
@@ -235,22 +285,20 @@ def fit(
         typer.Option("--shift", metavar="SECONDS", help="Move the clock of the measurement by this. Default: found."),
     ] = None,
     settings: SettingsOption = None,
-) -> Study:
+) -> Once:
     """Find keys of a scene by measured curves, with confidence intervals. Exit code 1 if the data does not
     determine them.
 
     Example: springbeam fit soft measured.csv --vary spring.linear_stiffness=3 --vary spring.damping=0.1
     """
-    from ..studies.fit import Fit
+    from ..studies.fit import asked
+    from ..studies.fit import fit as find_keys
 
-    return Fit.of(
-        load_scene(scene, settings or ()),
-        measured,
-        vary or (),
-        names=tuple(names or ()),
-        shift=shift,
-        read=tuple(read or ()),
-    )
+    what = load_scene(scene, settings or ())
+    announced = "some 25 runs for each key, five times as many where the clock is to be found"
+    asked(what, measured, vary or (), names or (), read or ())
+    find = partial(find_keys, what, measured, vary or (), names=names or (), read=read or (), shift=shift)
+    return Once("fit", announced, find)
 
 
 @study_command()
@@ -289,14 +337,19 @@ def converge(
         int, typer.Option("--levels", metavar="N", min=3, max=8, help="Meshes, each with twice the elements.")
     ] = 4,
     metric: MetricOption = None,
-) -> Study:
+) -> Once:
     """Show how the results settle with finer meshes and more modes: observed orders, extrapolated values, cost.
 
     Example: springbeam converge steel-bumper --metric contact_force_max
     """
-    from ..studies.converge import Converge
+    from ..studies.converge import QUANTITIES, meshes
+    from ..studies.converge import converge as settle
+    from ..studies.metrics import metrics_of
 
-    return Converge(scene=load_scene(scene, settings or ()), levels=levels, metric=tuple(metric or ()))
+    what = load_scene(scene, settings or ())
+    metrics_of(metric or QUANTITIES)
+    announced = f"{len(meshes(what, levels))} runs"
+    return Once("converge", announced, partial(settle, what, levels=levels, metric=metric or ()))
 
 
 @study_command()
@@ -309,20 +362,30 @@ def crosscheck(
     quick: Annotated[
         bool, typer.Option("--quick", help="Compare only the first quarter of the time; with --orders, not H/8.")
     ] = False,
-) -> Study:
+) -> Once:
     """Compare the co-simulation with the monolithic reference of its law.
 
     Exit code 1 if they differ, 4 if they cannot be compared over the run that was asked for.
 
     Example: springbeam crosscheck soft --set coupling.degree=2 --orders
     """
-    from ..studies.crosscheck import Crosscheck, Orders
+    from ..monolithic import event_driven
+    from ..studies import crosscheck as study
 
     what = load_scene(scene, settings or ())
+    event_driven.refuse(what)
     made = picked(what)
-    remarks = () if made is None else (f"accuracy {picked_in_words(made.summary['accuracy'])}",)
-    kind = Orders if with_orders else Crosscheck
-    return kind(scene=what if made is None else made.scene, quick=quick, remarks=remarks)
+    compared = what if made is None else made.scene
+    look = study.orders if with_orders else study.crosscheck
+
+    def compare() -> Findings:
+        found = look(compared, quick=quick)
+        if made is None:
+            return found
+        return replace(found, shown=[f"accuracy {picked_in_words(made.summary['accuracy'])}", *found.shown])
+
+    announced = "a reference and up to 4 runs" if with_orders else "2 runs and 2 references"
+    return Once("orders" if with_orders else "crosscheck", announced, compare)
 
 
 @study_command("workers")

@@ -60,7 +60,7 @@ def compare(scene: Scene) -> Row:
         perturbation of the reference up to the horizon; ``quantities``: a row each, with the largest error (where a
         bound is broken the furthest out of it), when it occurred, its root mean square, the bound then, and whether it
         has passed; ``events``: a row per change of contact, whose ``time`` is ``None`` where the run lacks it;
-        ``notes``; ``scene``; and ``runs``, columns and events of both where they were compared.
+        ``notes``; ``scene``; and ``runs``, what is drawn of both where they were compared.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def compare(scene: Scene) -> Row:
     found |= {"quantities": [], "events": [], "notes": [], "scene": scene.model_dump(exclude_none=True)}
     runs = _beside_event_driven(scene, found)
     found["runs"] = {
-        name: {"columns": {column: run[column] for column in present(run, _DRAWN)}, "events": run.events}
+        name: Trajectory(scene, {column: run[column] for column in present(run, _DRAWN)}, run.events)
         for name, run in zip(("co-simulation", "reference"), runs, strict=False)
     }
     if all(row["passed"] for row in (*found["quantities"], *found["events"])):

@@ -7,18 +7,21 @@ shows how fast each quantity settles (Richardson 1911, Roache 1994).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import groupby
-from typing import Any, ClassVar, NamedTuple
+from time import perf_counter
+from typing import Any, NamedTuple
 
 from rich.text import Text
 from scipy.optimize import brentq
 
 from ..pictures.diagrams import Diagram, draw_diagrams
 from ..scene import Scene, SceneError
-from .metrics import Metric, heading, metrics_of
-from .study import Study
+from .design import with_keys
+from .metrics import heading, metrics_of
+from .study import measured, troubles
 from .tables import Findings, Row, difference, table
 
 #: Quantities that are compared unless others are asked for, those that a scene has.
@@ -68,85 +71,91 @@ def settled(values: Sequence[float | None], sizes: Sequence[int], *, complete: b
     return Settled(change, order, last + rest, abs(rest))
 
 
-class Converge(Study):
-    """A scene on finer and finer meshes, and with more and more modes of its own mesh."""
+def converge(scene: Scene, *, levels: int = 4, metric: Sequence[str] = ()) -> Findings:
+    """Run ``scene`` on finer and finer meshes, and with more and more modes of its own mesh, and judge what settles.
 
-    kind: ClassVar[str] = "converge"
+    Parameters
+    ----------
+    scene
+        What is run.
+    levels
+        Meshes of each sequence, as of `meshes`.
+    metric
+        The quantities; those of `QUANTITIES` that the scene has if there are none.
 
-    scene: Scene
-    levels: int = 4  #: of each sequence: n, 2n, 4n, … elements; modes by halves down from those that the scene keeps
-    metric: tuple[str, ...] = ()  #: those of `QUANTITIES` that the scene has if there are none
+    Raises
+    ------
+    SceneError
+        If the scene has no beam with a mesh, or a quantity is unknown.
+    """
+    metrics, rows = metrics_of(metric or QUANTITIES), dict[str, Row]()
+    for name, mesh in meshes(scene, levels).items():
+        began = perf_counter()
+        record = measured(partial(with_keys, scene, mesh), metrics)
+        rows[name] = {**mesh, **record, "cost_wall_time": perf_counter() - began}
+    found = judged(scene, list(rows.values()), metric)
+    return replace(found, shown=[*found.shown, *troubles(rows)])
 
-    @property
-    def metrics(self) -> dict[str, Metric]:
-        """Those asked for."""
-        return metrics_of(self.metric or QUANTITIES)
 
-    def cases(self) -> dict[str, Row]:
-        """Return the meshes by what is refined, coarse to fine; ``unknowns`` are the modes that take part.
+def meshes(scene: Scene, levels: int) -> dict[str, Row]:
+    """Return the meshes by what is refined, coarse to fine; ``unknowns`` are the modes that take part.
 
-        Raises
-        ------
-        SceneError
-            If the scene has no beam with a mesh, or a quantity is unknown.
-        """
-        beam = self.scene.beam
-        if beam is None or self.scene.massless:
-            raise SceneError("[beam]: the scene has no mesh to refine")
-        _ = self.metrics
-        more = [_RATIO**k for k in range(self.levels)]
-        found = [("elements", beam.n_elements * k, beam.n_modes) for k in more]
-        if beam.integrator == "modal" and beam.modes_kept >= more[-1]:
-            fewer = [beam.modes_kept // k for k in more[:0:-1]]
-            found += [("modes", beam.n_elements, n_modes) for n_modes in (*fewer, beam.n_modes)]
-        cases = {}
-        for refined, elements, modes in found:
-            keys = {"beam.n_elements": elements, "beam.n_modes": modes}
-            mesh = self.at(keys).beam
-            assert mesh is not None
-            label = f"{refined}: {', '.join(f'{key} = {value}' for key, value in keys.items())}"
-            cases[label] = {"refined": refined, "unknowns": mesh.modes_kept, **keys}
-        return cases
+    Elements are n, 2n, 4n, …; modes go down by halves from those that the scene keeps. Raises SceneError if there is no
+    mesh.
+    """
+    beam = scene.beam
+    if beam is None or scene.massless:
+        raise SceneError("[beam]: the scene has no mesh to refine")
+    more = [_RATIO**k for k in range(levels)]
+    found = [("elements", beam.n_elements * k, beam.n_modes) for k in more]
+    if beam.integrator == "modal" and beam.modes_kept >= more[-1]:
+        fewer = [beam.modes_kept // k for k in more[:0:-1]]
+        found += [("modes", beam.n_elements, n_modes) for n_modes in (*fewer, beam.n_modes)]
+    cases = {}
+    for refined, elements, modes in found:
+        keys = {"beam.n_elements": elements, "beam.n_modes": modes}
+        mesh = with_keys(scene, keys).beam
+        assert mesh is not None
+        label = f"{refined}: {', '.join(f'{key} = {value}' for key, value in keys.items())}"
+        cases[label] = {"refined": refined, "unknowns": mesh.modes_kept, **keys}
+    return cases
 
-    def findings(self, records: Mapping[str, Row]) -> Findings:
-        """Judge how the quantities settle: those asked for, or those that the scene has.
 
-        In the table errors are from the limits of a sequence. All modes of a mesh are its solution: no mode lies beyond
-        the last.
-        """
-        rows, beam, document = self.rows(records), self.scene.beam, dict[str, Any]()
-        made, diagrams = list[Row](), list[Diagram]()
-        shown: list[Any] = [Text(self.scene.title or "(untitled scene)", style="bold")]
-        given = rows[0]
-        names = [name for name in self.metrics if self.metric or given[name] is not None]
-        for refined, several in groupby(rows, lambda row: row["refined"]):
-            mine = list(several)
-            sizes = [row["beam.n_elements" if refined == "elements" else "unknowns"] for row in mine]
-            complete = refined == "modes" and beam is not None and beam.modes_kept == beam.unknowns
-            found = {name: settled([row[name] for row in mine], sizes, complete=complete) for name in names}
-            document[refined] = {"levels": mine, "settled": {name: s._asdict() for name, s in found.items()}}
-            columns = ("", "as given:.6g", "extrapolated:.6g", "error:.1e", "order:.1f")
-            cells = [
-                (heading(name), given[name], s.limit, _error(given[name], s), s.order) for name, s in found.items()
-            ]
-            shown.append(table(columns, cells, f"more {refined}"))
-            meshes = (
-                f"{row['beam.n_elements']} el. {row['unknowns']} modes {row['cost_wall_time']:.2g} s" for row in mine
-            )
-            shown.append(f"runs      {', '.join(meshes)}")
-            curves = {heading(name): list[tuple[float, float]]() for name in names}
-            labels = "unknowns of the beam", "distance from the limit, relative"
-            diagrams.append(Diagram(*labels, curves, f"more {refined}"))
-            for row in mine:
-                errors = {name: difference(row[name], s.limit) for name, s in found.items()}
-                made.append(row | {f"error_{name}": error for name, error in errors.items()})
-                for name, error in errors.items():
-                    share = abs((error or 0.0) / (found[name].limit or 1.0))
-                    if share > _ROUNDING:
-                        curves[heading(name)].append((row["unknowns"], share))
-        shown.append("error: of the run as given; in brackets the last change, where the values show no limit")
-        draw = partial(draw_diagrams, diagrams, f"{self.scene.title}: convergence with the mesh")
-        return Findings(document, shown, tables={self.kind: made}, pictures={self.kind: draw})
+def judged(scene: Scene, rows: Sequence[Row], metric: Sequence[str] = ()) -> Findings:
+    """Judge by a row per mesh how the quantities settle: those asked for, or those that the scene has.
+
+    In the table errors are from the limits of a sequence. All modes of a mesh are its solution: no mode lies beyond
+    the last.
+    """
+    beam, document = scene.beam, dict[str, Any]()
+    made, diagrams = list[Row](), list[Diagram]()
+    shown: list[Any] = [Text(scene.title or "(untitled scene)", style="bold")]
+    given = rows[0]
+    names = [name for name in metrics_of(metric or QUANTITIES) if metric or given[name] is not None]
+    for refined, several in groupby(rows, lambda row: row["refined"]):
+        mine = list(several)
+        sizes = [row["beam.n_elements" if refined == "elements" else "unknowns"] for row in mine]
+        complete = refined == "modes" and beam is not None and beam.modes_kept == beam.unknowns
+        found = {name: settled([row[name] for row in mine], sizes, complete=complete) for name in names}
+        document[refined] = {"levels": mine, "settled": {name: s._asdict() for name, s in found.items()}}
+        columns = ("", "as given:.6g", "extrapolated:.6g", "error:.1e", "order:.1f")
+        cells = [(heading(name), given[name], s.limit, _error(given[name], s), s.order) for name, s in found.items()]
+        shown.append(table(columns, cells, f"more {refined}"))
+        meshes = (f"{row['beam.n_elements']} el. {row['unknowns']} modes {row['cost_wall_time']:.2g} s" for row in mine)
+        shown.append(f"runs      {', '.join(meshes)}")
+        curves = {heading(name): list[tuple[float, float]]() for name in names}
+        labels = "unknowns of the beam", "distance from the limit, relative"
+        diagrams.append(Diagram(*labels, curves, f"more {refined}"))
+        for row in mine:
+            errors = {name: difference(row[name], s.limit) for name, s in found.items()}
+            made.append(row | {f"error_{name}": error for name, error in errors.items()})
+            for name, error in errors.items():
+                share = abs((error or 0.0) / (found[name].limit or 1.0))
+                if share > _ROUNDING:
+                    curves[heading(name)].append((row["unknowns"], share))
+    shown.append("error: of the run as given; in brackets the last change, where the values show no limit")
+    draw = partial(draw_diagrams, diagrams, f"{scene.title}: convergence with the mesh")
+    return Findings(document, shown, tables={"converge": made}, pictures={"converge": draw})
 
 
 def _error(given: float | None, found: Settled) -> float | str | None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from ..scene import ArgumentError, SceneError, key_kind, parse_value
+from ..scene import ArgumentError, Scene, SceneError, key_kind, parse_value, with_changes
 from ..scene.scene import split_key
 
 #: The couplings that studies run: scheme and degree, of rigid and of soft laws.
@@ -52,6 +52,18 @@ class Axis:
         """Return ``count`` values from end to end of the range; one that may be 0 begins there."""
         inside = [self.at(self.zero + (1.0 - self.zero) * k / (count - 1)) for k in range(count)]
         return (0.0, *inside[1:]) if self.zero else tuple(inside)
+
+
+def with_keys(scene: Scene, case: Mapping[str, Any]) -> Scene:
+    """Return ``scene`` with the values of a case, by ``accuracy`` and ``table.key``; other names are labels.
+
+    Raises SceneError if it cannot be run.
+    """
+    tables: dict[str, Any] = {"accuracy": case["accuracy"]} if "accuracy" in case else {}
+    for name, value in case.items():
+        if (key := split_key(name)) is not None:
+            tables.setdefault(key[0], {})[key[1]] = value
+    return with_changes(scene, **tables)
 
 
 def parse_axis(text: str) -> Axis:

@@ -9,9 +9,8 @@ unknown more unless it is given.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from hashlib import sha256
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from rich.text import Text
@@ -24,11 +23,10 @@ from ..scene import ArgumentError, Scene, SceneError, key_kind
 from ..scene.scene import split_key
 from ..signals.curves import signal
 from ..signals.measured import Measured, read_measured, reading_of, time_shifts
-from .design import design, parse_axis
-from .study import Study
+from .design import design, parse_axis, with_keys
 from .tables import Findings, Row, table
 
-_CASE = "fit"
+_STOPPED = 3
 #: The unknown that moves the clock of the measurement [s], beside keys.
 SHIFT = "shift"
 #: Share of the run by which the clock may move from where a search begins before points leave the run.
@@ -44,91 +42,111 @@ _UNDETERMINED = 1e-5
 _CONFIDENCE = 0.95
 
 
-class Fit(Study):
-    """Keys that make runs of a scene agree with a measurement."""
+def fit(
+    scene: Scene,
+    file: Path,
+    vary: Sequence[str],
+    *,
+    names: Sequence[str] = (),
+    read: Sequence[str] = (),
+    shift: float | None = None,
+) -> Findings:
+    """Find the keys that make runs of ``scene`` agree with a measurement, with their intervals.
 
-    kind: ClassVar[str] = "fit"
-    announced: ClassVar[str] = "some 25 runs for each key, five times as many where the clock is to be found"
+    The table has a row per run: the keys, and the root mean square of what is left of each curve. The exit code is 1 if
+    the data does not determine the keys. A search that is interrupted has the rows so far, and exit code 3.
 
-    scene: Scene
-    file: str  #: path of the measurement
-    digest: str  #: of its content
-    vary: tuple[str, ...]  #: KEY=GUESS
-    names: tuple[str, ...] = ()  #: NAME=COLUMN
-    read: tuple[str, ...] = ()  #: KEY=VALUE of how the file is read
-    shift: float | None = None  #: by which the clock of the measurement is moved [s]; found if it is left out
+    Parameters
+    ----------
+    scene
+        What is run.
+    file
+        The measured columns, time first.
+    vary
+        ``KEY=GUESS`` each.
+    names
+        ``NAME=COLUMN`` each: which column of a run a measured one is.
+    read
+        ``KEY=VALUE`` each: how the file is read.
+    shift
+        By which the clock of the measurement is moved [s]; found if it is left out.
 
-    @classmethod
-    def of(cls, scene: Scene, path: Path, vary: Sequence[str], **settings: Any) -> Fit:
-        """Return the study of a file. Raises OSError if it cannot be read."""
-        digest = sha256(path.read_bytes()).hexdigest()
-        return cls(scene=scene, file=str(path), digest=digest, vary=tuple(vary), **settings)
+    Raises
+    ------
+    SceneError
+        For keys, guesses or columns that are not there, and for too few points.
+    RunStopped
+        If the run with the guesses stops early.
+    OSError
+        If the file cannot be read.
+    """
+    guesses, data = asked(scene, file, vary, names, read)
+    runs = list[Row]()
+    try:
+        record = _found(scene, data, guesses, shift, runs, str(file))
+    except KeyboardInterrupt:
+        return Findings({}, code=_STOPPED, error=f"interrupted after {len(runs)} runs", tables={"fit": runs})
+    keys = [(row["key"], row["value"], row["low"], row["high"]) for row in record["keys"]]
+    left = [(name, rms, share) for name, (rms, share) in record["left"].items()]
+    shown: list[Any] = [
+        table(("key", "value:.8g", "95 % from:.6g", "to:.6g"), keys),
+        table(("curve", "left, rms:.4g", "of its spread:.2%"), left),
+        f"{len(runs)} runs; {record['message']}",
+    ]
+    shown += [Text(f"not determined: {why}", style="bold red") for why in record["undetermined"]]
+    told = {name: record[name] for name in ("keys", "left", "undetermined")}
+    return Findings(told, shown, code=1 if record["undetermined"] else 0, tables={"fit": runs})
 
-    def cases(self) -> dict[str, Row]:
-        """Return the one search. Raises SceneError for keys, guesses or columns that are not there."""
-        self.at(self.guesses())
-        self.data()
-        return {_CASE: {}}
 
-    def guesses(self) -> dict[str, float]:
-        """Return the keys and where the search begins."""
-        axes = [parse_axis(text) for text in self.vary]
-        (values, *more), names = design(axes, 0, 0, "random"), [axis.name for axis in axes]
-        for name, guess in zip(names, values, strict=True):
-            key = split_key(name)
-            if key is None or key_kind(*key) is not float:
-                raise ArgumentError(f"--vary {name}: takes no real numbers, and cannot be fitted")
-            if more or guess == 0.0:
-                raise ArgumentError(
-                    f"--vary {name}: a guess is one value that has the sign and roughly the size of what is sought, as "
-                    "in spring.linear_stiffness=800; 0 has none"
-                )
-        return dict(zip(names, map(float, values), strict=True))
+def asked(
+    scene: Scene, file: Path, vary: Sequence[str], names: Sequence[str], read: Sequence[str]
+) -> tuple[dict[str, float], Measured]:
+    """Return where a search begins and what is measured, both checked; parameters and errors as of `fit`."""
+    guesses = _guesses(vary)
+    with_keys(scene, guesses)
+    return guesses, read_measured(str(file), scene, mapping(names), reading_of(read))
 
-    def data(self) -> Measured:
-        """Return the measured curves."""
-        return read_measured(self.file, self.scene, mapping(self.names), reading_of(self.read))
 
-    def record(self, case: Row) -> Row:
-        """Return the values found, their intervals, and every run on the way. Raises SceneError for too few points."""
-        data, guesses, free = self.data(), self.guesses(), self.shift is None
-        run = simulate(self.at(guesses))
-        # While keys are wrong the curves may fit best a period too late: a few places are tried.
-        starts = [self.shift] if self.shift is not None else time_shifts(run, data)[0][:_TRIED]
-        starts += [0.0] * int(free and data.covered(run).mean() > 0.5)
-        parts = {shift: data.covered(run, shift, _MARGIN * free) for shift in starts}
-        parts = {shift: part for shift, part in parts.items() if part.sum() > len(guesses) + free}
-        if not parts:
+def _guesses(vary: Sequence[str]) -> dict[str, float]:
+    """Return the keys and where the search begins."""
+    axes = [parse_axis(text) for text in vary]
+    (values, *more), names = design(axes, 0, 0, "random"), [axis.name for axis in axes]
+    for name, guess in zip(names, values, strict=True):
+        key = split_key(name)
+        if key is None or key_kind(*key) is not float:
+            raise ArgumentError(f"--vary {name}: takes no real numbers, and cannot be fitted")
+        if more or guess == 0.0:
             raise ArgumentError(
-                f"{self.file}: fewer of its points lie in the run than are needed to find {', '.join(guesses)}"
-                f"{' and the shift of its clock' * free}; make time.t_end longer, give more points, or another --shift"
+                f"--vary {name}: a guess is one value that has the sign and roughly the size of what is sought, as in "
+                "spring.linear_stiffness=800; 0 has none"
             )
-        searches = [
-            _Search(self, data, part, guesses | {SHIFT: shift} if free else guesses, shift)
-            for shift, part in parts.items()
-        ]
-        record = min(searches, key=lambda search: search.least(most=_FIRST_LOOK).cost).found()
-        if record["undetermined"] and 0.0 in parts:  # the keys alone may be
-            searches.append(_Search(self, data, parts[0.0], guesses, 0.0))
-            record = searches[-1].found()
-        return {**record, "runs": [run for search in searches for run in search.runs]}
+    return dict(zip(names, map(float, values), strict=True))
 
-    def findings(self, records: Mapping[str, Row]) -> Findings:
-        """Show the values with their intervals, or which of them the data does not determine.
 
-        The table has a row per run: the keys, and the root mean square of what is left of each curve.
-        """
-        record = records[_CASE]
-        keys = [(row["key"], row["value"], row["low"], row["high"]) for row in record["keys"]]
-        left = [(name, rms, share) for name, (rms, share) in record["left"].items()]
-        shown: list[Any] = [
-            table(("key", "value:.8g", "95 % from:.6g", "to:.6g"), keys),
-            table(("curve", "left, rms:.4g", "of its spread:.2%"), left),
-            f"{len(record['runs'])} runs; {record['message']}",
-        ]
-        shown += [Text(f"not determined: {why}", style="bold red") for why in record["undetermined"]]
-        told = {name: record[name] for name in ("keys", "left", "undetermined")}
-        return Findings(told, shown, code=1 if record["undetermined"] else 0, tables={self.kind: record["runs"]})
+def _found(
+    scene: Scene, data: Measured, guesses: Mapping[str, float], shift: float | None, runs: list[Row], file: str
+) -> Row:
+    """Return the values found and their intervals; each run on the way is added to ``runs``."""
+    free = shift is None
+    run = simulate(with_keys(scene, guesses))
+    # While keys are wrong the curves may fit best a period too late: a few places are tried.
+    starts = time_shifts(run, data)[0][:_TRIED] if shift is None else [shift]
+    starts += [0.0] * int(free and data.covered(run).mean() > 0.5)
+    parts = {start: data.covered(run, start, _MARGIN * free) for start in starts}
+    parts = {start: part for start, part in parts.items() if part.sum() > len(guesses) + free}
+    if not parts:
+        raise ArgumentError(
+            f"{file}: fewer of its points lie in the run than are needed to find {', '.join(guesses)}"
+            f"{' and the shift of its clock' * free}; make time.t_end longer, give more points, or another --shift"
+        )
+    searches = [
+        _Search(scene, data, part, {**guesses, SHIFT: start} if free else guesses, start, runs)
+        for start, part in parts.items()
+    ]
+    record = min(searches, key=lambda search: search.least(most=_FIRST_LOOK).cost).found()
+    if record["undetermined"] and 0.0 in parts:  # the keys alone may be
+        record = _Search(scene, data, parts[0.0], guesses, 0.0, runs).found()
+    return record
 
 
 def mapping(names: Sequence[str]) -> dict[str, str]:
@@ -143,16 +161,28 @@ def mapping(names: Sequence[str]) -> dict[str, str]:
 
 
 class _Search:
-    """One search from guesses of keys, and of `SHIFT` if the clock moves; ``runs`` are the rows of its runs.
+    """One search from guesses of keys, and of `SHIFT` if the clock moves; a row of each of its runs goes to ``runs``.
 
     The points that take part are ``part`` of the data, wherever the clock moves.
     """
 
-    def __init__(self, fit: Fit, data: Measured, part: np.ndarray, guesses: Mapping[str, float], shift: float) -> None:
-        self._fit, self._data, self._part, self._guesses, self._shift = fit, data, part, guesses, shift
+    def __init__(
+        self,
+        scene: Scene,
+        data: Measured,
+        part: np.ndarray,
+        guesses: Mapping[str, float],
+        shift: float,
+        runs: list[Row],
+    ) -> None:
+        self._scene = scene
+        self._data = data
+        self._part = part
+        self._guesses = guesses
+        self._shift = shift
+        self.runs = runs
         self._spread = {name: float(np.std(values)) or 1.0 for name, values in data.values.items()}
         self._weights = {name: 1.0 / spread for name, spread in self._spread.items()}
-        self.runs: list[Row] = []
 
     def values(self, unknowns: np.ndarray) -> dict[str, float]:
         """Return the keys at ``unknowns``."""
@@ -167,7 +197,7 @@ class _Search:
         values = self.values(unknowns)
         shift = values.get(SHIFT, self._shift)
         try:
-            run = simulate(self._fit.at(values))
+            run = simulate(with_keys(self._scene, values))
         except (RunStopped, SceneError) as refused:
             self.runs.append({**values, "error": str(refused)})
             return np.full(len(self._data.values) * int(self._part.sum()), _REFUSED)
@@ -199,7 +229,6 @@ class _Search:
             "undetermined": undetermined,
             "left": {name: (rms, rms / self._spread[name]) for name, rms in left.items()},
             "message": str(result.message).rstrip("."),
-            "runs": self.runs,
         }
 
     def _judged(self, result: Any) -> tuple[list[Row], list[str]]:

@@ -20,10 +20,10 @@ import numpy as np
 from ..pictures.diagrams import Diagram, draw_diagrams
 from ..scene import ArgumentError, Load, Scene
 from ..scene.messages import unit_of
-from .design import Axis, Sampling, design, parse_axis
+from .design import Axis, Sampling, design, parse_axis, with_keys
 from .metrics import PRINCIPAL, USUAL, Metric, heading, metrics_of
 from .picture import Scale, column, multiples, singly
-from .study import Study
+from .study import Study, measured
 from .tables import Findings, Row, table
 
 STATUSES = ("done", "stopped", "refused", "lost")
@@ -71,6 +71,10 @@ class Sweep(Study):
         names = [axis.name for axis in self.axes]
         values = design(self.axes, self.samples, self.seed, self.sampling)
         return {str(index): dict(zip(names, several, strict=True)) for index, several in enumerate(values)}
+
+    def record(self, case: Row) -> Row:
+        """Run one case and return its metrics, as `measured` does."""
+        return measured(lambda: with_keys(self.scene, case), self.metrics)
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Count the rows by status; show the first values of metrics that were asked for, and the damage boundary."""

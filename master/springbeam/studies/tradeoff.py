@@ -25,7 +25,8 @@ from ..run.runner import simulate
 from ..scene import Scene, SceneError, with_changes
 from ..scene.resolution import slowest_frequency
 from .comparison import SHORT_SHARE, comparable_until
-from .design import RIGID, SOFT
+from .design import RIGID, SOFT, with_keys
+from .engine import Measure
 from .metrics import costs
 from .study import Study
 from .tables import Findings, Row, table
@@ -83,9 +84,18 @@ class Tradeoff(Study):
         families: dict[str, list[Row]] = {}
         for case in _configurations(self.scene):
             with suppress(SceneError):  # what the scene cannot have
-                self.at(case)
+                with_keys(self.scene, case)
                 families.setdefault(case["family"], []).append(case)
         return {_label(case): case for cases in families.values() for case in cases[:: 3 if self.quick else 1]}
+
+    def measure(self, known: Mapping[str, Row]) -> Measure:
+        """Return what measures a case, unless those before it make that needless."""
+
+        def measure(case: Row) -> Row:
+            skipped = self.skipped(case, known)
+            return self.record(case) if skipped is None else skipped
+
+        return measure
 
     def skipped(self, case: Row, records: Mapping[str, Row]) -> Row | None:
         """Leave out what a coarser one of the family was too slow for."""
@@ -113,7 +123,7 @@ class Tradeoff(Study):
             if perf_counter() - began > limit:
                 raise RunStopped(f"takes more than {limit:g} s", time)
 
-        run = simulate(self.at(case), limited)
+        run = simulate(with_keys(self.scene, case), limited)
         done = perf_counter()
         run.at(self.times)
         return {
