@@ -46,7 +46,7 @@ STYLE: dict[Any, Any] = {
     "agg.path.chunksize": 10000,
 }
 REMARK: dict[str, Any] = {"fontsize": 7.0, "style": "italic", "color": GREY}
-DPI = 160
+DPI = 120
 #: Of the PNGs: four times as fast as by default, and a few percent larger.
 COMPRESSION = {"compress_level": 2}
 _TITLE_WIDTH, _BESIDE_MARK = 105, 60  # characters
