@@ -65,7 +65,7 @@ double Compliance::elastic_coefficient(Along& along, std::size_t n, const Series
 }
 
 void Compliance::extend(Along& along, std::size_t n, const Series& depth, double size) const {
-  auto& [elastic, damping, dissipation, power] = along;
+  auto& [elastic, damping, power] = along;
   elastic[n] = elastic_coefficient(along, n, depth);
   if (!damped()) return;
   const auto rate = [&](std::size_t k) { return static_cast<double>(k + 1) * depth[k + 1] / size; };
@@ -75,8 +75,6 @@ void Compliance::extend(Along& along, std::size_t n, const Series& depth, double
   } else {
     damping[n] = -elastic[n];
   }
-  dissipation[n] = 0.0;
-  for (std::size_t k = 0; k <= n; ++k) dissipation[n] += damping[k] * rate(n - k);
 }
 
 bool Compliance::analytic() const { return p_ == std::floor(p_); }

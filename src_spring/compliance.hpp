@@ -11,9 +11,9 @@
 namespace spring {
 
 class Compliance {
-  static constexpr int highest_power = 4;
-
  public:
+  static constexpr std::size_t highest_power = 4;  ///< p up to which extend() multiplies powers
+
   /// λ [N/m^p], p, χ [s/m]
   Compliance(double stiffness, double exponent, double damping = 0.0)
       : lambda_(stiffness), p_(exponent), chi_(damping) {}
@@ -38,10 +38,9 @@ class Compliance {
   };
   Slopes slopes(double depth, double rate) const;
 
-  /// Along a depth δ(s), s = τ/H: Taylor coefficients of λ δ^p, of what damping adds to it, and of the dissipated
-  /// power.
+  /// Along a depth δ(s), s = τ/H: Taylor coefficients of λ δ^p, and of what damping adds to it.
   struct Along {
-    Series elastic{}, damping{}, dissipation{};     ///< [N], [N], [W]
+    Series elastic{}, damping{};                    ///< [N]
     std::array<Series, highest_power - 1> power{};  ///< δ², δ³, …
   };
   /// Sets coefficient `n` of each from δ's up to n + 1 and from the lower ones; `size` H [s].
@@ -50,7 +49,7 @@ class Compliance {
   /// p is an integer: the force is analytic in δ ≥ 0, also at δ = 0.
   bool analytic() const;
   /// So small a one that extend() multiplies powers instead of dividing by δ.
-  bool polynomial() const { return analytic() && p_ <= highest_power; }
+  bool polynomial() const { return analytic() && p_ <= static_cast<double>(highest_power); }
 
  private:
   bool even() const;  ///< p is an even number

@@ -8,241 +8,167 @@ namespace spring {
 namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
+constexpr const char* out_of_range = "values leave the range of floating-point numbers";
 
-// The tolerances hold for a step, IDA's are per internal step: what is asked of IDA is a tenth, and less where the
-// step spans more of the spring's motion and so more internal steps.
-constexpr double safety = 0.01, safety_per_rate = 10.0;
-// IDA's local error must stay this much above rounding in the contact force, or its error estimate is noise.
-constexpr double noise_margin = 20.0;
-// An oscillation is flown through in parts, H × (rate of the spring) long at most: there R, of max_order at most, is
-// exact to a small part of the tolerance, and IDA confirms that in a step or two.
-double part_length(const Parameters& parameters) {
-  const double tolerance = std::max(parameters.relative_tolerance, 1e-15);
-  return 0.25 * std::pow(tolerance / 1e-12, 1.0 / (max_order + 1));
-}
-// Where damping rules, IDA's own steps outgrow such parts. Taylor terms are then used while H × rate is below this;
-// beyond, they would only cancel.
-constexpr double resolved_limit = 3.0;
-// No tolerance is finer than this: relative to y and z (a fraction of their rounding), and absolute.
-constexpr double finest = 0.01 * epsilon, smallest = 1e-150;
-// H / first step = 2ᵏ, so that it does not vary with the forces but in rare jumps. IDA doubles step and order until
-// order 5; k = 3 brings it to order 3 at least, and to five instants at least at which events are looked for. Where
-// none can be and R is exact to a small part of the tolerance, one step does.
-constexpr int least_halvings = 3, most_halvings = 48;
-// How far below the tolerance the first step's deviation from R stays: backward Euler overrates it by R's order.
-constexpr double first_step_margin = 1000.0;
-constexpr std::size_t least_order = 4;  ///< of R, where the motion is resolved and smooth
-
-enum Unknown { q, p, A, B, e, unknowns };
+// What a series leaves out, of the tolerance: below rounding at the default one, so that y(t+H) is smooth in the
+// forces; and never less than what rounding leaves of it anyway.
+constexpr double share = 1e-5, least_share = 0.01 * epsilon;
+// Forces of second order in time, which act on the fourth power, are in every series.
+constexpr std::size_t least_order = 4;
+// A power law δ^p of other p than 1, 2, 3, 4 has a series as far as δ does not change by more than this part of it;
+// where that is for parts below this fraction of the time in which the motion changes, IDA needs fewer steps.
+constexpr double part_of_depth = 0.5, least_part = 0.1;
+// A series serves for about 1/rate; over a longer span, where the motion dies out, IDA needs some hundred steps, each
+// as long as a series takes.
+constexpr double most_decay = 100.0;
 
 }  // namespace
 
 Flight::Flight(const Motion& motion, const Parameters& parameters)
-    : motion_(motion),
-      parameters_(parameters),
-      distances_{parameters.stop_enabled, parameters.compliant()},
-      part_(part_length(parameters)),
-      solver_(unknowns) {}
+    : motion_(motion), parameters_(parameters), integrated_(motion, parameters) {}
 
-Flight::Reached Flight::run(const Start& start) {
+const FlightEnd& Flight::run(const Start& start) {
   start_ = start;
-  begin(start.size);
-  Expansion motion = expand();
-  Pace pace = this->pace(motion);
-  while (size_ * pace.rate > part_ && 2.0 * pace.oscillation > pace.rate) {
-    begin(std::clamp(part_ / pace.rate, size_ / 16, size_ / 2));
-    motion = expand();
-    pace = this->pace(motion);
+  reached_ = {Event::none, 0.0, false, start.y, start.z, 0.0, 0.0, 0.0, 0};
+  Expansion motion = expand(start.size);
+  Motion::Rates rates = this->rates(motion);
+  while (size_ * rates.sum() > 1.0) {
+    motion = expand(std::clamp(1.0 / rates.sum(), size_ / 16, size_ / 2));
+    rates = this->rates(motion);
   }
-  const Tolerances tolerances = this->tolerances(pace);
-  const Opening opening = open(motion, pace, tolerances);
-  launch(motion, pace, tolerances, opening);
-
-  const auto event = static_cast<Event>(solver_.advance());
-  const double H = size_, s = solver_.s(), y = displacement();
-  if (event == Event::none && parameters_.stop_enabled && start.gap + (y - start.y) < -tolerances.y)
-    throw IdaError("the top passed the stop unnoticed");
-  const double* Y = solver_.value();
-  double dissipated = Y[e];
-  if (motion_.damping() > 0.0) dissipated += motion_.damping() / H * R_.squared_rate_integral(s);
-  for (int k = 0; k <= contact_order_; ++k)
-    dissipated += H * dissipation_taylor_[static_cast<std::size_t>(k)] * std::pow(s, k + 1) / (k + 1);
-  const double z = (R_.order() > 0 ? start_.z : 0.0) + (R_.rate_rise(s) + Y[p]) / H;
-  return {event, y, z, H * (R_.integral(s) + Y[A]), H * H * (R_.integral_2(s) + Y[B]), dissipated};
+  bool in_parts = rates.decay <= rates.oscillation || start.size * rates.decay <= most_decay;
+  for (; in_parts && !analytic(motion); in_parts = size_ * rates.sum() > least_part) {
+    motion = expand(size_ / 2);
+    rates = this->rates(motion);
+  }
+  if (in_parts)
+    follow(motion, rates.oscillation);
+  else
+    integrate();
+  return reached_;
 }
 
-void Flight::begin(double size) {
-  size_ = size;
-  loads_ = start_.loads.scaled(size);
+void Flight::integrate() {
+  try {
+    reached_ = integrated_.run(start_, touching_);
+  } catch (const SolverError&) {
+    reached_ = integrated_.reached();
+    throw;
+  }
 }
 
 /// Finds out, too, whether the top touches the tip.
-Expansion Flight::expand() {
+Expansion Flight::expand(double size) {
+  size_ = size;
+  loads_ = start_.loads.scaled(size);
   for (touching_ = false;; touching_ = true) {
-    Expansion motion(start_.y, start_.z, start_.depth, loads_, size_);
-    while (motion.highest <= least_order) motion_.extend(motion, touching_, loads_, size_);
+    Expansion motion(start_.y, start_.z, start_.depth, loads_, size);
+    while (motion.highest <= least_order) motion_.extend(motion, touching_, loads_, size);
     if (start_.released) motion.y[2] = 0.0;
     if (touching_ || !parameters_.compliant() || direction(motion.depth) <= 0.0) return motion;
   }
 }
 
-Flight::Pace Flight::pace(const Expansion& motion) const {
-  const double H = size_;
-  const Compliance& contact = motion_.compliance();
+Motion::Rates Flight::rates(const Expansion& motion) const {
   const Series &y = motion.y, &depth = motion.depth;
-  const double travel = std::abs(y[1]) + std::abs(y[2]), depth_travel = std::abs(depth[1]) + std::abs(depth[2]);
-  Pace pace{};
-  pace.depth_rate = depth[1] / H;
   Compliance::Slopes slopes{};
   if (touching_) {
-    pace.force = contact.force(start_.depth, pace.depth_rate);
-    pace.lost = contact.continued(start_.depth, pace.depth_rate).dissipation;
-    slopes = contact.slopes(start_.depth + depth_travel, pace.depth_rate);
+    const double deepest = start_.depth + std::abs(depth[1]) + std::abs(depth[2]);
+    slopes = motion_.compliance().slopes(deepest, depth[1] / size_);
   }
-  const auto rates = motion_.rates(std::abs(start_.y) + travel, slopes);
-  pace.oscillation = rates.oscillation;
-  pace.rate = rates.oscillation + rates.decay;
-  pace.smooth = !touching_ || contact.polynomial() || start_.depth > 2.0 * depth_travel;
-  pace.span = std::min(H, 1.0 / std::max(pace.rate, std::numeric_limits<double>::min()));
-  pace.velocity = std::abs(start_.z) + std::abs(2.0 * y[2] / H / H) * pace.span;
-  pace.displacement = std::abs(start_.y) + pace.velocity * pace.span;
-  return pace;
+  const auto rates = motion_.rates(std::abs(start_.y) + std::abs(y[1]) + std::abs(y[2]), slopes);
+  if (!std::isfinite(rates.sum())) throw SolverError(out_of_range);
+  return rates;
 }
 
-/// Of y and z by what they and their change over the segment (or over 1/rate) are.
-Flight::Tolerances Flight::tolerances(const Pace& pace) const {
-  const double noise = noise_margin * epsilon * pace.force / motion_.mass() * pace.span;
-  const double share = safety / (1.0 + safety_per_rate * std::min(size_ * pace.rate, resolved_limit));
-  const auto tolerance = [&](double size, double least) {
-    return std::max({share * (parameters_.relative_tolerance * size + parameters_.absolute_tolerance), finest * size,
-                     least, smallest});
+/// Whether the contact force is, as far as the part goes.
+bool Flight::analytic(const Expansion& motion) const {
+  if (!touching_) return true;
+  const Compliance& law = motion_.compliance();
+  const Series& depth = motion.depth;
+  double way = 0.0, change = 0.0;  // of the depth and of its rate
+  for (std::size_t k = 1; k <= least_order; ++k) {
+    way += std::abs(depth[k]);
+    if (k > 1) change += static_cast<double>(k) * std::abs(depth[k]) / size_;
+  }
+  const bool smooth_power = law.polynomial() || way <= part_of_depth * start_.depth;
+  return smooth_power && (!law.damped() || 2.0 * change < std::abs(law.release_speed() + depth[1] / size_));
+}
+
+/// An upper estimate of the terms that are left out. A power law carries each coefficient on over as many orders as its
+/// exponent says, those between may be 0.
+double Flight::neglected(const Expansion& motion, double oscillation) const {
+  const std::size_t k = motion.highest;
+  const Series& c = touching_ ? motion.depth : motion.y;
+  double before = 0.0;
+  for (std::size_t j = k - Compliance::highest_power; j < k; ++j) before = std::max(before, std::abs(c[j]));
+  return static_cast<double>(k) * std::abs(c[k]) + size_ * oscillation * (size_ * oscillation) * before;
+}
+
+void Flight::follow(Expansion& motion, double oscillation) {
+  auto& y = motion.y;
+  const double part = std::max(share * parameters_.relative_tolerance, least_share);
+  const Series& c = touching_ ? motion.depth : y;
+  const auto allowed = [&] {
+    return part * std::max({std::abs(c[1]), std::abs(c[2]), std::abs(c[3]), std::abs(c[4])});
   };
-  const double z = tolerance(pace.velocity, noise), y = tolerance(pace.displacement, noise * pace.span);
-  const double e = motion_.mass() * (pace.velocity + z) * z + noise_margin * epsilon * pace.span * std::abs(pace.lost);
-  return {share, y, z, e};
-}
+  const auto excess = [&] { return neglected(motion, oscillation) > allowed(); };
+  while (motion.highest <= max_order && excess()) motion_.extend(motion, touching_, loads_, size_);
+  while (excess()) {
+    const double shorter = std::pow(allowed() / neglected(motion, oscillation), 1.0 / max_order);
+    if (!(shorter > 0.0)) throw SolverError(out_of_range);
+    motion.shorten(std::min(shorter, 0.9));
+    size_ *= std::min(shorter, 0.9);
+  }
+  const int order = static_cast<int>(motion.highest) - 1;
 
-/// R ends where the first term that it leaves out is small. The first step is as long as that keeps the error of the
-/// low orders that IDA begins with.
-Flight::Opening Flight::open(Expansion& motion, const Pace& pace, const Tolerances& tolerances) const {
+  Series to_stop = y, to_tip = motion.depth;
+  to_stop[0] = start_.gap;
+  if (!touching_)
+    for (double& c : to_tip) c = -c;
+  const auto [event, s] =
+      first_event(parameters_.stop_enabled ? &to_stop : nullptr, parameters_.compliant() ? &to_tip : nullptr, order);
+
   const double H = size_;
-  const Compliance& contact = motion_.compliance();
-  const Series &y = motion.y, &depth = motion.depth;
-  const bool resolved = H * pace.rate <= resolved_limit;
-  const std::size_t most = pace.smooth ? max_order : contact.analytic() ? least_order : 2;
-  const auto neglected = [&] {
-    const auto k = static_cast<double>(motion.highest);
-    return k * std::abs(y[motion.highest]) + H * pace.rate * (H * pace.rate) * std::abs(y[motion.highest - 1]);
+  double rise = 0.0, faster = 0.0, integral = 0.0, integral_2 = 0.0;
+  for (int k = order; k > 0; --k) {
+    const double c = y[static_cast<std::size_t>(k)];
+    rise = (rise + c) * s;
+    integral = (integral + c / (k + 1)) * s;
+    integral_2 = (integral_2 + c / ((k + 1) * (k + 2))) * s;
+    if (k > 1) faster = (faster + k * c) * s;
+  }
+  const double at_start = start_.y;
+  reached_ = {event,
+              s * H,
+              s == 1.0 && H == start_.size,
+              at_start + rise,
+              start_.z + faster / H,
+              s * H * (at_start + integral),
+              s * s * H * H * (at_start / 2 + integral_2),
+              dissipated(motion, order, s),
+              1};
+}
+
+/// By α_s, and by the contact: what the contact force does along the depth, less what the law stores.
+double Flight::dissipated(const Expansion& motion, int order, double s) const {
+  const Compliance& law = motion_.compliance();
+  const auto work = [&](const auto& force, const Series& along, int highest) {
+    std::array<double, std::size_t{2} * max_order> done{};
+    for (std::size_t i = 0; i <= static_cast<std::size_t>(highest); ++i)
+      for (std::size_t j = 1; j <= static_cast<std::size_t>(order); ++j)
+        done[i + j] += force(i) * static_cast<double>(j) * along[j] / static_cast<double>(i + j);
+    return sum_of_powers(done, s, 1, highest + order);
   };
-  Opening opening{resolved ? 2 : 0, 0};
-  double h = 1.0;
-  const auto limit = [&h](double bound, double exponent) {
-    if (bound < std::numeric_limits<double>::max()) h = std::min(h, std::pow(bound, exponent));
-  };
-  if (resolved && most > 2) {
-    const double small = H * tolerances.share * parameters_.relative_tolerance * pace.velocity / first_step_margin;
-    while (motion.highest <= most && neglected() > small) motion_.extend(motion, touching_, loads_, H);
-    opening.order = static_cast<int>(motion.highest) - 1;
-    limit(H * tolerances.z / (first_step_margin * neglected()), 1.0 / opening.order);
-  } else {
-    limit(H * tolerances.z / std::abs(6.0 * y[3]), 0.5);
-    if (opening.order == 0) limit(tolerances.y / std::abs(2.0 * y[2]), 0.5);
-  }
-  const double levels = std::ceil(-std::log2(h));
-  if (std::isnan(levels)) throw IdaError("values leave the range of floating-point numbers");
-  const double least = opening.order > 2 && !within_reach(motion) ? 0.0 : least_halvings;
-  opening.halvings = static_cast<int>(std::clamp(levels, least, double{most_halvings}));
-  if (touching_ && opening.order <= 2) {
-    // The power law has no second derivative or outgrows its rates at the start: the velocity from its growth instead.
-    const auto growth = [&](double s) {
-      const double deeper = start_.depth + s * (std::abs(depth[1]) + s * std::abs(depth[2]));
-      return s * H * (contact.force(deeper, pace.depth_rate) - pace.force) / motion_.mass();
-    };
-    while (opening.halvings < most_halvings && growth(std::ldexp(1.0, -opening.halvings)) > tolerances.z)
-      ++opening.halvings;
-  }
-  return opening;
-}
-
-/// Whether the stop or the tip may be met, were the motion its Taylor polynomial.
-bool Flight::within_reach(const Expansion& motion) const {
-  const auto travels = [&](const Series& c, double distance) {
-    double way = 0.0;
-    for (std::size_t k = 1; k <= motion.highest; ++k) way += std::abs(c[k]);
-    return 1.01 * way >= std::abs(distance);
-  };
-  return (parameters_.stop_enabled && travels(motion.y, start_.gap)) ||
-         (parameters_.compliant() && travels(motion.depth, start_.depth));
-}
-
-void Flight::launch(const Expansion& motion, const Pace& pace, const Tolerances& tolerances, const Opening& opening) {
-  const double H = size_, z = start_.z;
-  const Series& y = motion.y;
-  R_ = Taylor(y, opening.order);
-  remainder_ = motion_.remainder(R_, loads_, H);
-  contact_order_ = touching_ ? opening.order - 2 : -1;
-  for (std::size_t k = 0; static_cast<int>(k) <= contact_order_; ++k) {
-    contact_taylor_[k] = motion.contact.elastic[k] + motion.contact.damping[k];
-    dissipation_taylor_[k] = motion.contact.dissipation[k];
-  }
-  double* tolerance = solver_.absolute_tolerance();
-  tolerance[q] = tolerance[A] = tolerance[B] = tolerances.y;
-  tolerance[p] = H * tolerances.z;
-  tolerance[e] = tolerances.e;
-  double* Y = solver_.initial_value();
-  double* Yp = solver_.initial_derivative();
-  std::fill(Y, Y + unknowns, 0.0);
-  std::fill(Yp, Yp + unknowns, 0.0);
-  Y[p] = Yp[q] = y[1] - R_.rate(0.0);
-  Yp[p] = opening.order == 0 ? 2.0 * y[2] : 0.0;
-  if (opening.order == 0) Yp[e] = H * (motion_.damping() * z * z + pace.lost);
-  const double relative = std::max(tolerances.share * parameters_.relative_tolerance, 50.0 * epsilon);
-  solver_.start(*this, relative, std::ldexp(1.0, -opening.halvings), start_.most_steps);
-}
-
-double Flight::contact_depth(double rise, double s) const {
-  const auto& u = loads_.tip;
-  return start_.depth + rise - s * (u[1] + s * u[2] / 2);
-}
-
-bool Flight::residual(double s, const double* Y, const double* Yp, double* F) const noexcept {
-  const double H = size_, slope = R_.rate(s), w = Y[p] / H;
-  Compliance::Effect contact{};  // in excess of the Taylor terms
-  if (touching_) {
-    const double depth_rate = contact_rate(slope + Y[p], s) / H;
-    contact = motion_.compliance().continued(contact_depth(R_.rise(s) + Y[q], s), depth_rate);
-    contact.force -= sum_of_powers(contact_taylor_, s, 0, contact_order_);
-    contact.dissipation -= sum_of_powers(dissipation_taylor_, s, 0, contact_order_);
-  }
-  F[q] = Yp[q] - Y[p];
-  F[p] = Yp[p] - H * H * motion_.excess_acceleration(R_(s), Y[q], w, remainder_(s), contact.force);
-  F[A] = Yp[A] - Y[q];
-  F[B] = Yp[B] - Y[A];
-  F[e] = Yp[e] - (motion_.damping() * w * (2.0 * slope + Y[p]) + H * contact.dissipation);
-  return std::isfinite(F[p]) && std::isfinite(F[e]);
-}
-
-void Flight::jacobian(double s, double c, const double* Y, const double*, double* J) const noexcept {
-  const double H = size_, rise = R_.rise(s) + Y[q], slope = R_.rate(s) + Y[p];
-  Compliance::Slopes contact{};
-  if (touching_) contact = motion_.compliance().slopes(contact_depth(rise, s), contact_rate(slope, s) / H);
-  const auto at = [J](int row, int column) -> double& { return J[column * unknowns + row]; };
-  for (int i = 0; i < unknowns; ++i) at(i, i) = c;
-  at(q, p) = -1.0;
-  at(p, q) = -H * H * motion_.acceleration_by_displacement(start_.y + rise, contact.force_by_depth);
-  at(p, p) = c - H * motion_.acceleration_by_velocity(contact.force_by_rate);
-  at(A, q) = -1.0;
-  at(B, A) = -1.0;
-  at(e, q) = -H * contact.dissipation_by_depth;
-  at(e, p) = -2.0 * motion_.damping() * slope / H - contact.dissipation_by_rate;
-}
-
-Distance Flight::distance(int which, double s, const double* Y) const noexcept {
-  const double rise = R_.rise(s) + Y[q], slope = R_.rate(s) + Y[p];
-  if (!distances_[which]) return {1.0, 1.0};
-  if (static_cast<Event>(which) == Event::stop) return {start_.gap + rise, slope};
-  const double sign = touching_ ? 1.0 : -1.0;
-  return {sign * contact_depth(rise, s), sign * contact_rate(slope, s)};
+  double lost = 0.0;
+  if (motion_.damping() > 0.0)
+    lost += motion_.damping() / size_ *
+            work([&](std::size_t i) { return static_cast<double>(i + 1) * motion.y[i + 1]; }, motion.y, order - 1);
+  if (touching_ && law.damped())
+    lost += work([&](std::size_t i) { return motion.contact.elastic[i] + motion.contact.damping[i]; }, motion.depth,
+                 order - 2) -
+            (law.energy(sum_of_powers(motion.depth, s, 0, order)) - law.energy(start_.depth));
+  return lost;
 }
 
 }  // namespace spring

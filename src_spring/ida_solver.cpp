@@ -4,12 +4,10 @@
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
-#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <string>
-#include <utility>
 
 #ifndef SUN_COMM_NULL  // before SUNDIALS 7
 #define SUN_COMM_NULL nullptr
@@ -21,7 +19,7 @@ namespace {
 static_assert(sizeof(sunrealtype) == sizeof(double), "SUNDIALS must be built in double precision");
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr int max_order = 5;
+constexpr int highest_order = 5;  ///< of its BDF
 // Newton's remainder, relative to the tolerance: small, or it is noise in the error estimate (IDA's default, 0.33,
 // costs more steps than it saves iterations).
 constexpr double newton_share = 0.01;
@@ -29,7 +27,7 @@ constexpr int max_error_failures = 40;  ///< in one internal step: a first step 
 
 [[noreturn]] void fail(const char* what, int code) {
   std::unique_ptr<char, decltype(&std::free)> name(IDAGetReturnFlagName(code), &std::free);
-  throw IdaError(std::string(what) + ": " + (name ? name.get() : "unknown flag"));
+  throw SolverError(std::string(what) + ": " + (name ? name.get() : "unknown flag"));
 }
 
 void check(int code, const char* what) {
@@ -37,13 +35,19 @@ void check(int code, const char* what) {
 }
 
 /// @throws std::bad_alloc
-template <class Handle, class Destroy>
-std::shared_ptr<std::remove_pointer_t<Handle>> own(Handle made, const Destroy& destroy) {
-  if (made == nullptr) throw std::bad_alloc();
-  return {made, destroy};
+template <class Handle>
+Handle made(Handle handle) {
+  if (handle == nullptr) throw std::bad_alloc();
+  return handle;
 }
 
 }  // namespace
+
+void IdaSolver::Destroy::operator()(N_Vector made) const { N_VDestroy(made); }
+void IdaSolver::Destroy::operator()(SUNMatrix made) const { SUNMatDestroy(made); }
+void IdaSolver::Destroy::operator()(SUNLinearSolver made) const { SUNLinSolFree(made); }
+void IdaSolver::Destroy::operator()(SUNContext made) const { SUNContext_Free(&made); }
+void IdaSolver::Destroy::operator()(void* ida) const { IDAFree(&ida); }
 
 int IdaSolver::residual(double s, N_Vector Y, N_Vector Yp, N_Vector F, void* solver) {
   const ImplicitSystem& system = *static_cast<const IdaSolver*>(solver)->system_;
@@ -59,7 +63,7 @@ int IdaSolver::jacobian(double s, double c, N_Vector Y, N_Vector Yp, N_Vector, S
 }
 
 IdaSolver::Vector IdaSolver::new_vector() const {
-  Vector vector = own(N_VNew_Serial(n_, context_.get()), N_VDestroy);
+  Vector vector(made(N_VNew_Serial(n_, context_.get())));
   N_VEnableFusedOps_Serial(vector.get(), SUNTRUE);
   return vector;
 }
@@ -67,15 +71,15 @@ IdaSolver::Vector IdaSolver::new_vector() const {
 IdaSolver::IdaSolver(int unknowns) : n_(unknowns) {
   SUNContext context = nullptr;
   if (SUNContext_Create(SUN_COMM_NULL, &context) != 0) throw std::bad_alloc();
-  context_ = own(context, [](SUNContext made) { SUNContext_Free(&made); });
-  for (Vector* vector : {&Y0_, &Yp0_, &tolerance_, &Y_, &Yp_}) *vector = new_vector();
+  context_.reset(context);
+  for (Vector* vector : {&Y0_, &Yp0_, &tolerance_, &Y_, &Yp_, &between_}) *vector = new_vector();
   for (const Vector* vector : {&Y0_, &Yp0_}) N_VConst(0.0, vector->get());
   N_VConst(1.0, tolerance_.get());
-  J_ = own(SUNDenseMatrix(unknowns, unknowns, context), SUNMatDestroy);
-  linear_solver_ = own(SUNLinSol_Dense(Y0_.get(), J_.get(), context), SUNLinSolFree);
-  ida_ = own(IDACreate(context), [](void* made) { IDAFree(&made); });
+  J_.reset(made(SUNDenseMatrix(unknowns, unknowns, context)));
+  linear_solver_.reset(made(SUNLinSol_Dense(Y0_.get(), J_.get(), context)));
+  ida_.reset(made(IDACreate(context)));
   void* const ida = ida_.get();
-  // What IDA would print is said by whoever catches IdaError.
+  // What IDA would print is said by whoever catches SolverError.
 #if SUNDIALS_VERSION_MAJOR >= 7
   SUNContext_ClearErrHandlers(context);
 #else
@@ -86,7 +90,7 @@ IdaSolver::IdaSolver(int unknowns) : n_(unknowns) {
   check(IDASetUserData(ida, this), "IDASetUserData");
   check(IDASetLinearSolver(ida, linear_solver_.get(), J_.get()), "IDASetLinearSolver");
   check(IDASetJacFn(ida, jacobian), "IDASetJacFn");
-  check(IDASetMaxOrd(ida, max_order), "IDASetMaxOrd");
+  check(IDASetMaxOrd(ida, highest_order), "IDASetMaxOrd");
   check(IDASetMinStep(ida, 1e-20), "IDASetMinStep");  // a motion without end would end in ever smaller steps
   check(IDASetMaxErrTestFails(ida, max_error_failures), "IDASetMaxErrTestFails");
   check(IDASetNonlinConvCoef(ida, newton_share), "IDASetNonlinConvCoef");
@@ -96,7 +100,7 @@ void IdaSolver::start(const ImplicitSystem& system, double relative_tolerance, d
   void* const ida = ida_.get();
   system_ = &system;
   most_steps_ = most_steps;
-  s_ = 0.0;
+  s_ = last_start_ = 0.0;
   N_VScale(1.0, Y0_.get(), Y_.get());
   check(IDAReInit(ida, 0.0, Y0_.get(), Yp0_.get()), "IDAReInit");
   check(IDASVtolerances(ida, relative_tolerance, tolerance_.get()), "IDASVtolerances");
@@ -104,35 +108,25 @@ void IdaSolver::start(const ImplicitSystem& system, double relative_tolerance, d
   check(IDASetStopTime(ida, 1.0), "IDASetStopTime");
 }
 
-int IdaSolver::advance() {
-  std::array<double, distances> rates;  // at the last step's start
-  for (int i = 0; i < distances; ++i) rates[i] = distance(i).rate;
-  while (s_ < 1.0) {
-    if (steps() >= most_steps_) throw IdaError("it spans too much of the motion");
-    const double start = s_;
-    const int code = IDASolve(ida_.get(), 1.0, &s_, Y_.get(), Yp_.get(), IDA_ONE_STEP);
-    if (code == IDA_REP_RES_ERR || code == IDA_FIRST_RES_FAIL)
-      fail("values leave the range of floating-point numbers", code);
-    check(code, "IDASolve");
-    const double end = s_;
-    double first = end;
-    int fallen = -1;
-    for (int i = 0; i < distances; ++i) {
-      if (s_ != end) interpolate(end);
-      const Distance now = distance(i);
-      const auto at = [&](double s) {
-        interpolate(s);
-        return distance(i);
-      };
-      const auto place = fall(start, end, std::exchange(rates[i], now.rate), now, 2.0 * epsilon, at);
-      if (!place || (fallen >= 0 && *place >= first)) continue;
-      first = *place;
-      fallen = i;
-    }
-    if (s_ != first) interpolate(first);
-    if (fallen >= 0) return fallen;
+void IdaSolver::step() {
+  if (steps() >= most_steps_) throw SolverError("it spans too much of the motion");
+  last_start_ = s_;
+  const int code = IDASolve(ida_.get(), 1.0, &s_, Y_.get(), Yp_.get(), IDA_ONE_STEP);
+  if (code == IDA_REP_RES_ERR || code == IDA_FIRST_RES_FAIL)
+    fail("values leave the range of floating-point numbers", code);
+  check(code, "IDASolve");
+}
+
+IdaSolver::Polynomial IdaSolver::over_last_step(int unknown) const {
+  Polynomial polynomial{};
+  check(IDAGetLastOrder(ida_.get(), &polynomial.degree), "IDAGetLastOrder");
+  double factor = 1.0;
+  for (int k = 0; k <= polynomial.degree; ++k) {
+    if (k > 0) factor *= last_size() / k;
+    check(IDAGetDky(ida_.get(), last_start_, k, between_.get()), "IDAGetDky");
+    polynomial.coefficients[static_cast<std::size_t>(k)] = factor * N_VGetArrayPointer(between_.get())[unknown];
   }
-  return -1;
+  return polynomial;
 }
 
 void IdaSolver::interpolate(double s) {

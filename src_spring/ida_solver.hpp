@@ -11,13 +11,11 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "fall.hpp"
+#include "taylor.hpp"
 
 namespace spring {
 
-inline constexpr int distances = 2;  ///< of a system, at most: their falls through 0 are events
-
-/// F(s, Y, Y') = 0 with its Jacobian J = ∂F/∂Y + c ∂F/∂Y' and distances.
+/// F(s, Y, Y') = 0 with its Jacobian J = ∂F/∂Y + c ∂F/∂Y'.
 class ImplicitSystem {
  public:
   virtual ~ImplicitSystem() = default;
@@ -25,12 +23,10 @@ class ImplicitSystem {
   virtual bool residual(double s, const double* Y, const double* Yp, double* F) const noexcept = 0;
   /// Column-major, n × n, zero on entry.
   virtual void jacobian(double s, double c, const double* Y, const double* Yp, double* J) const noexcept = 0;
-  /// With its rate d/ds; {1, 1} for one that is not there.
-  virtual Distance distance(int which, double s, const double* Y) const noexcept = 0;
 };
 
-/// IDA gave up; the message names the flag.
-class IdaError : public std::runtime_error {
+/// No solution was found; the message says why, or names IDA's flag.
+class SolverError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
@@ -46,20 +42,36 @@ class IdaSolver {
   double* initial_derivative() { return N_VGetArrayPointer(Yp0_.get()); }
   double* absolute_tolerance() { return N_VGetArrayPointer(tolerance_.get()); }
 
-  /// Start afresh at s = 0, for at most `most_steps` internal steps. `system` must stay alive until the last advance().
+  /// Start afresh at s = 0, for at most `most_steps` internal steps. `system` must stay alive until the last step().
   void start(const ImplicitSystem& system, double relative_tolerance, double first_step, long most_steps);
 
-  /// Go on to s = 1, or to where a distance falls through 0, whichever comes first: also where it is below 0 for a part
-  /// of an internal step only, about a minimum. Returns which; −1: none. @throws IdaError
-  int advance();
+  /// One internal step, at most to s = 1. @throws SolverError
+  void step();
+  double last_start() const { return last_start_; }      ///< where the last internal step began
+  double last_size() const { return s_ - last_start_; }  ///< before interpolate()
+  /// An unknown over the last internal step, as a power series in the part of it that is passed.
+  struct Polynomial {
+    Series coefficients;
+    int degree;
+  };
+  Polynomial over_last_step(int unknown) const;
+  /// Moves s and value() back into the last internal step.
+  void interpolate(double s);
 
   double s() const { return s_; }                                       ///< reached
   const double* value() const { return N_VGetArrayPointer(Y_.get()); }  ///< Y(s)
   long steps() const;                                                   ///< internal steps since start()
 
  private:
+  struct Destroy {
+    void operator()(N_Vector made) const;
+    void operator()(SUNMatrix made) const;
+    void operator()(SUNLinearSolver made) const;
+    void operator()(SUNContext made) const;
+    void operator()(void* ida) const;
+  };
   template <class Handle>
-  using Owned = std::shared_ptr<std::remove_pointer_t<Handle>>;
+  using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Destroy>;
   using Vector = Owned<N_Vector>;
 
   static int residual(double s, N_Vector Y, N_Vector Yp, N_Vector F, void* solver);
@@ -67,15 +79,12 @@ class IdaSolver {
                       N_Vector, N_Vector);
 
   Vector new_vector() const;
-  Distance distance(int which) const { return system_->distance(which, s_, value()); }
-  void interpolate(double s);
-
   int n_;
   const ImplicitSystem* system_ = nullptr;
-  double s_ = 0.0;
+  double s_ = 0.0, last_start_ = 0.0;
   long most_steps_ = 0;
   Owned<SUNContext> context_;  // outlives everything made in it
-  Vector Y0_, Yp0_, tolerance_, Y_, Yp_;
+  Vector Y0_, Yp0_, tolerance_, Y_, Yp_, between_;
   Owned<SUNMatrix> J_;
   Owned<SUNLinearSolver> linear_solver_;
   Owned<void*> ida_;

@@ -44,6 +44,16 @@ double Motion::acceleration_by_displacement(double y, double contact_slope) cons
 Expansion::Expansion(double y, double z, double depth, const Loads& loads, double size)
     : y{y, size * z}, depth{depth, size * z - loads.tip[1], -loads.tip[2] / 2} {}
 
+void Expansion::shorten(double factor) {
+  double power = 1.0;
+  for (std::size_t k = 0; k < y.size(); ++k, power *= factor) {
+    y[k] *= power;
+    depth[k] *= power;
+    contact.elastic[k] *= power;
+    contact.damping[k] *= power;
+  }
+}
+
 void Motion::extend(Expansion& motion, bool touching, const Loads& loads, double size) const {
   auto& [y, square, depth, contact, highest] = motion;
   const std::size_t k = highest - 1;
@@ -56,26 +66,6 @@ void Motion::extend(Expansion& motion, bool touching, const Loads& loads, double
                        contact.elastic[k] - contact.damping[k];
   y[++highest] = force / mass_ * size * size / ((n + 1.0) * (n + 2.0));
   depth[highest] += y[highest];
-}
-
-Motion::Remainder Motion::remainder(const Taylor& R, const Loads& loads, double size) const {
-  const Series& c = R.coefficients();
-  const std::size_t order = static_cast<std::size_t>(R.order()), first = std::max<std::size_t>(order, 1) - 1;
-  Remainder remainder;
-  auto& r = remainder.r_;
-  if (k2_ != 0.0) {
-    std::array<double, std::size_t{2} * max_order + 1> square{};
-    for (std::size_t i = 0; i <= order; ++i)
-      for (std::size_t j = 0; j <= order; ++j) square[i + j] += c[i] * c[j];
-    for (std::size_t i = 0; i <= order; ++i)
-      for (std::size_t j = first > i ? first - i : 0; j <= 2 * order; ++j) r[i + j] -= k2_ * c[i] * square[j];
-  }
-  for (std::size_t k = first; k <= order; ++k) r[k] -= k1_ * c[k];
-  if (order > 0) r[first] -= damping_ * static_cast<double>(order) * c[order] / size;
-  for (std::size_t k = first; k < 3; ++k) r[k] += coefficient(loads.force, k);
-  remainder.first_ = static_cast<int>(first);
-  remainder.last_ = std::max(k2_ != 0.0 ? 3 * R.order() : R.order(), 2);
-  return remainder;
 }
 
 Motion::Rates Motion::rates(double reach, const Compliance::Slopes& contact) const {

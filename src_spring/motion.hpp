@@ -31,6 +31,8 @@ struct Expansion {
 
   /// From y [m], z [m/s] and y − u_tip, under scaled loads, over a segment of size H [s].
   Expansion(double y, double z, double depth, const Loads& loads, double size);
+  /// To a segment of H × `factor`; nothing can be added then.
+  void shorten(double factor);
 };
 
 /// f_s − m a [N]
@@ -49,28 +51,10 @@ class Motion {
   /// Adds one coefficient to the motion; loads and size are those that it began with.
   void extend(Expansion& motion, bool touching, const Loads& loads, double size) const;
 
-  /// Remainder of the equation of motion along a Taylor polynomial R of the motion, without the contact force:
-  ///     r(s) = F − α_s Ṙ − k1 R − k2 R³ − m R̈ = Σ rₖ sᵏ   [N].
-  /// The terms below s^{order−1} vanish by construction (with the contact's own Taylor terms, if it touches).
-  class Remainder {
-   public:
-    double operator()(double s) const { return sum_of_powers(r_, s, first_, last_); }
-
-   private:
-    friend class Motion;
-    std::array<double, std::size_t{3} * max_order + 1> r_{};
-    int first_ = 0, last_ = 0;
-  };
-  Remainder remainder(const Taylor& R, const Loads& loads, double size) const;
-  /// ÿ − R̈ for y = R + q, ẏ = Ṙ + w, given r(s) and what the contact force has in excess of its Taylor terms:
-  /// the difference itself, free of cancellation.
-  double excess_acceleration(double R, double q, double w, double remainder, double contact) const {
-    return (remainder - damping_ * w - (k1_ + k2_ * (3.0 * R * (R + q) + q * q)) * q - contact) / mass_;
-  }
-
   /// Bounds of the rates with which the solution can change, for |y| ≤ `reach`: √(stiffness/m), damping/m [1/s].
   struct Rates {
     double oscillation, decay;
+    double sum() const { return oscillation + decay; }
   };
   Rates rates(double reach, const Compliance::Slopes& contact) const;
 

@@ -5,13 +5,30 @@
 #include <limits>
 #include <vector>
 
-#include "fall.hpp"
+#include "events.hpp"
 
 namespace spring {
 namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr int parts = 8;  ///< of a stretch in which N is smooth: instants at which it is looked at
+
+struct Distance {
+  double value, rate;
+};
+
+/// Where the distance `at(s)` falls through 0 between `low` and `high`: it is below 0 at `high`, where it is `end`, or
+/// at its minimum, if the rate turns from `rate` ≤ 0 at `low` to one above 0.
+template <class At>
+std::optional<double> fall(double low, double high, double rate, const Distance& end, double resolution, const At& at) {
+  double under = high;
+  if (!(end.value < 0.0)) {
+    if (!(rate <= 0.0 && end.rate > 0.0)) return {};
+    under = last_before(low, high, resolution, [&](double s) { return at(s).rate > 0.0; });
+    if (!(at(under).value < 0.0)) return {};
+  }
+  return last_before(low, under, resolution, [&](double s) { return at(s).value < 0.0; });
+}
 
 /// ∫ f over a … b to 1e-14, where f may behave as a power at both ends: double-exponential quadrature (Takahasi & Mori,
 /// "Double exponential formulas for numerical integration", Publ. RIMS 9, 1974, 721–741).

@@ -15,7 +15,7 @@ namespace {
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 /// In one step, counted in internal steps of IDA: some two thousand periods of the spring. A step that needs more is
 /// refused, so that no call lasts longer than a second or two. To start a segment costs as much as some steps.
-constexpr long most_work = 250'000, work_of_start = 3;
+constexpr long most_work = 250'000;
 constexpr double smallest_step = 1e-100;
 constexpr double far = 1e9;  ///< as many hilltops away, nothing brings a top back
 
@@ -45,8 +45,8 @@ class Spring::Step {
         else
           fly();
       }
-    } catch (const IdaError& error) {
-      fail(error.what(), spring_.flight_.displacement(), t_ + spring_.flight_.elapsed());
+    } catch (const SolverError& error) {
+      fail(error.what(), spring_.flight_.reached().y, t_ + spring_.flight_.reached().elapsed);
     }
     const Reached reached{remaining() > 0.0 ? t_ : size_, to_event && ends()};
     state_.stop_force = held_ / reached.size;
@@ -119,24 +119,24 @@ class Spring::Step {
 
   void fly() {
     const double gap = parameters_.stop_enabled ? state_.y - parameters_.stop_position : 1.0;
-    Flight& flight = spring_.flight_;
-    const Start start{state_.y, state_.z, now_, remaining(), gap, depth_, released_, most_work - work_};
-    const auto [event, y, z, integral, integral_2, dissipated] = flight.run(start);
-    state_.steps += static_cast<double>(flight.steps());
-    work_ += flight.steps() + work_of_start;
-    state_.integral_2 += state_.integral * flight.elapsed() + integral_2;
-    state_.integral += integral;
-    state_.dissipated += dissipated;
-    state_.y = y;
-    state_.z = z;
-    t_ = event == Flight::Event::none && flight.at_end() ? size_ : t_ + flight.elapsed();
-    if (std::abs(y) > far * parameters_.hilltop()) fail("it goes on for ever", y, t_);
+    if (work_ >= most_work) fail("it spans too much of the motion", state_.y, t_);
+    const FlightEnd came =
+        spring_.flight_.run({state_.y, state_.z, now_, remaining(), gap, depth_, released_, most_work - work_});
+    state_.steps += static_cast<double>(came.steps);
+    work_ += came.steps;
+    state_.integral_2 += state_.integral * came.elapsed + came.integral_2;
+    state_.integral += came.integral;
+    state_.dissipated += came.dissipated;
+    state_.y = came.y;
+    state_.z = came.z;
+    t_ = came.at_end ? size_ : t_ + came.elapsed;
+    if (std::abs(came.y) > far * parameters_.hilltop()) fail("it goes on for ever", came.y, t_);
     // Rounding must not put the top below the stop. Not from the gap: a distant stop would quantise y.
     if (parameters_.stop_enabled)
-      state_.y = event == Flight::Event::stop ? parameters_.stop_position : std::max(y, parameters_.stop_position);
+      state_.y = came.event == Event::stop ? parameters_.stop_position : std::max(came.y, parameters_.stop_position);
     released_ = false;
-    meeting_ = event == Flight::Event::contact;
-    happened_ = event != Flight::Event::none;
+    meeting_ = came.event == Event::contact;
+    happened_ = came.event != Event::none;
   }
 
   /// Past the hilltop, a motion that nothing brings back reaches infinity in finite time, where the solver fails.

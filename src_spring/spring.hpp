@@ -65,7 +65,7 @@ class Spring {
   double load_work() const { return state_.load_work; }             ///< of f_s and −m a since the start [J]
   double impact_loss() const { return state_.impact_loss; }         ///< in stop impacts since the start [J]
   bool seated() const { return state_.seated != 0.0; }              ///< held on the foundation by the law inside
-  double ida_steps() const { return state_.steps; }                 ///< internal IDA steps since the start
+  double internal_steps() const { return state_.steps; }            ///< of flights, since the start
   int impacts() const { return static_cast<int>(state_.impacts); }  ///< on the foundation inside, since the start
   double last_impact() const { return state_.last_impact; }         ///< when [s]; −1: there was none
   double kinetic_energy() const;                                    ///< ½ m z² [J]

@@ -163,7 +163,7 @@ struct SpringModel final : fmi::Model {
   }
 
  private:
-  static constexpr double most_trial_work = 250'000.0;  ///< of IDA's steps for one force, as for one step
+  static constexpr double most_trial_work = 250'000.0;  ///< internal steps for one force, as for one step
   static constexpr double rounding = 1e-6;              ///< of communication_step
   /// A pair that is wired wrongly gains or loses energy, or has no contact, without a sign. After `most` steps in which
   /// that shows it is sure: a sudden load makes the tip miss in 2, a harmonic one from rest in up to 8.
@@ -255,7 +255,7 @@ struct SpringModel final : fmi::Model {
       constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
       if (work > most_trial_work) return unknown;
       next.contact_force = {force, 0.0, 0.0};
-      const double before = spring->ida_steps();
+      const double before = spring->internal_steps();
       double reached = unknown;
       try {
         spring->step(held->size(), next);
@@ -263,7 +263,7 @@ struct SpringModel final : fmi::Model {
       } catch (const spring::StepFailure& e) {
         trial_failure_ = e.what();
       }
-      work += spring->ida_steps() - before;
+      work += spring->internal_steps() - before;
       spring->restore(start);
       return reached;
     };
@@ -332,10 +332,10 @@ fmi::Table fmi::make_table() {
   parameter("stop_position", "m", &Parameters::stop_position, "position phi of the foundation");
   parameter("restitution", "", &Parameters::restitution, "coefficient of restitution at the foundation").range(0, 1);
   parameter("relative_tolerance", "", &Parameters::relative_tolerance,
-            "relative tolerance of IDA; an importer's tolerance can tighten, never loosen it")
+            "relative tolerance of the motion; an importer's tolerance can tighten, never loosen it")
       .range(std::numeric_limits<double>::min(), 1e-2)
       .typical(1e-12);
-  parameter("absolute_tolerance", "", &Parameters::absolute_tolerance, "absolute tolerance of IDA")
+  parameter("absolute_tolerance", "", &Parameters::absolute_tolerance, "absolute tolerance of the motion")
       .range(std::numeric_limits<double>::min(), 1e-2)
       .typical(1e-14);
 
@@ -452,7 +452,9 @@ fmi::Table fmi::make_table() {
          "tools hide the messages that say what; restored states do not take it back",
          [](M m) { return m.warnings(); })
       .steps_only();
-  add.local("internal_steps", "", "steps that IDA took since the start", of(&Spring::ida_steps));
+  add.local("internal_steps", "",
+            "internal steps since the start: parts with a Taylor series of their own, and steps of IDA",
+            of(&Spring::internal_steps));
   return t;
 }
 

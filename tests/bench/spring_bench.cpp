@@ -145,7 +145,7 @@ void compare(const char* name, const Problem& p, double relative, const bench::O
   bare.step();
   const double y = exact(p);
   std::printf("{\"name\": \"%s counts\", \"ours\": [%ld], \"rival\": [%ld]}\n", name,
-              static_cast<long>(spring.ida_steps()), bare.steps());
+              static_cast<long>(spring.internal_steps()), bare.steps());
   std::printf("{\"name\": \"%s errors\", \"ours\": [%.3g], \"rival\": [%.3g]}\n", name,
               std::abs(spring.displacement() - y), std::abs(bare.displacement() - y));
 }

@@ -1,11 +1,13 @@
-// The layers below the spring: IDA wrapper and its events, Jacobians, Taylor polynomial.
+// The layers below the spring: IDA wrapper, Jacobians, Taylor series, falls of polynomials.
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
+#include "events.hpp"
 #include "flight.hpp"
 #include "ida_solver.hpp"
 #include "parameters.hpp"
@@ -16,10 +18,10 @@ using spring_test::epsilon;
 
 namespace {
 
-/// Y₀' = Y₁, Y₁' = −ω² Y₀: cosine; its distance to a level.
+/// Y₀' = Y₁, Y₁' = −ω² Y₀: cosine.
 class Cosine final : public ImplicitSystem {
  public:
-  Cosine(double omega, double level) : omega_(omega), level_(level) {}
+  explicit Cosine(double omega) : omega_(omega) {}
   bool residual(double, const double* Y, const double* Yp, double* F) const noexcept override {
     F[0] = Yp[0] - Y[1];
     F[1] = Yp[1] + omega_ * omega_ * Y[0];
@@ -30,12 +32,9 @@ class Cosine final : public ImplicitSystem {
     J[2] = -1.0;
     J[1] = omega_ * omega_;
   }
-  Distance distance(int which, double, const double* Y) const noexcept override {
-    return which == 0 ? Distance{Y[0] - level_, Y[1]} : Distance{1.0, 1.0};
-  }
 
  private:
-  double omega_, level_;
+  double omega_;
 };
 
 void start_cosine(IdaSolver& solver, const Cosine& system, double omega) {
@@ -88,93 +87,59 @@ Parameters nonlinear() {
 
 }  // namespace
 
-// cos ωs falls through the level at s = arccos(level)/ω. The search ends at an ulp, and then the solution's error,
-// asked to be 1e-13 per internal step, is what is left.
-TEST(IdaSolver, EventWhereADistanceFalls) {
-  const Cosine system(3.0, 0.4);
-  IdaSolver solver(2);
-  start_cosine(solver, system, 3.0);
-  ASSERT_EQ(solver.advance(), 0);
-  EXPECT_NEAR(solver.s(), std::acos(0.4) / 3.0, 1e-11);
-  EXPECT_NEAR(solver.value()[0], 0.4, 4 * epsilon);
-}
-
-// The lowest point of cos ωs is 1e-9 below the level for 1.4e-5 of s; internal steps are a hundred times longer.
-TEST(IdaSolver, DistanceThatDipsWithinOneInternalStep) {
-  const Cosine system(6.0, -1.0 + 1e-9);
+// IDA's error is asked to be 1e-13 in each of some 1000 internal steps, and over the last one it is a polynomial, of
+// both unknowns.
+TEST(IdaSolver, StepsToTheEnd) {
+  const Cosine system(6.0);
   IdaSolver solver(2);
   start_cosine(solver, system, 6.0);
-  ASSERT_EQ(solver.advance(), 0);
-  EXPECT_NEAR(solver.s(), (3.14159265358979323846 - std::sqrt(2e-9)) / 6.0, 1e-7);
-  EXPECT_LT(solver.s(), 3.14159265358979323846 / 6.0);
-}
-
-// Rising at the start: the same dip of sin ωs, where the rate of the last step's start counts, not that at s = 0.
-TEST(IdaSolver, DistanceThatRisesFirstAndDipsLater) {
-  const Cosine system(6.0, -1.0 + 1e-8);
-  IdaSolver solver(2);
-  start_cosine(solver, system, 6.0);
-  solver.initial_value()[0] = solver.initial_derivative()[1] = 0.0;
-  solver.initial_value()[1] = solver.initial_derivative()[0] = 6.0;
-  solver.start(system, 1e-13, 1e-7, 100000);
-  ASSERT_EQ(solver.advance(), 0);
-  EXPECT_NEAR(solver.s(), (1.5 * 3.14159265358979323846 - std::sqrt(2e-8)) / 6.0, 2e-7);
-}
-
-// Above the level at its lowest: no fall, on to the end.
-TEST(IdaSolver, MinimumAboveTheLevelIsNoFall) {
-  const Cosine system(6.0, -1.0 - 1e-9);
-  IdaSolver solver(2);
-  start_cosine(solver, system, 6.0);
-  ASSERT_EQ(solver.advance(), -1);
+  while (solver.s() < 1.0) solver.step();
   EXPECT_EQ(solver.s(), 1.0);
-  EXPECT_NEAR(solver.value()[0], std::cos(6.0), 2e-10);  // 1e-13 in each of some 1000 steps
-}
-
-// A distance and its rate that are 0 at the start: it falls there.
-TEST(IdaSolver, ExactZerosDoNotSwitchEventsOff) {
-  const Cosine at_start(3.0, 1.0);  // distance and rate are 0 at s = 0
-  IdaSolver solver(2);
-  start_cosine(solver, at_start, 3.0);
-  ASSERT_EQ(solver.advance(), 0);
-  EXPECT_LT(solver.s(), 1e-6);
-  const Cosine system(3.0, 0.5);
-  solver.start(system, 1e-13, 1e-7, 100000);
-  ASSERT_EQ(solver.advance(), 0);
-  EXPECT_NEAR(solver.s(), 3.14159265358979323846 / 9.0, 1e-11);
+  EXPECT_NEAR(solver.value()[0], std::cos(6.0), 2e-10);
+  const auto [cosine, degree] = solver.over_last_step(0);
+  const auto [slope, slope_degree] = solver.over_last_step(1);
+  for (const double part : {0.0, 0.3, 1.0}) {
+    const double s = solver.last_start() + part * (1.0 - solver.last_start());
+    EXPECT_NEAR(sum_of_powers(cosine, part, 0, degree), std::cos(6.0 * s), 2e-10);
+    EXPECT_NEAR(sum_of_powers(slope, part, 0, slope_degree), -6.0 * std::sin(6.0 * s), 2e-9);
+  }
+  solver.interpolate(solver.last_start());
+  EXPECT_DOUBLE_EQ(solver.value()[0], cosine[0]);
 }
 
 // The steps allowed are those since start().
 TEST(IdaSolver, StepsAreCountedFromTheStart) {
-  const Cosine system(60.0, -2.0);  // the level is never reached
+  const Cosine system(60.0);
   IdaSolver solver(2);
   start_cosine(solver, system, 60.0);
-  EXPECT_EQ(solver.advance(), -1);
+  const auto go_on = [&] {
+    while (solver.s() < 1.0) solver.step();
+  };
+  go_on();
   const long needed = solver.steps();
   solver.start(system, 1e-13, 1e-7, needed);
-  EXPECT_NO_THROW(solver.advance());
+  EXPECT_NO_THROW(go_on());
   solver.start(system, 1e-13, 1e-7, needed - 1);
-  EXPECT_THROW(solver.advance(), IdaError);
+  EXPECT_THROW(go_on(), SolverError);
 }
 
 TEST(IdaSolver, FailureCarriesIdasFlag) {
   class Nowhere final : public ImplicitSystem {
     bool residual(double, const double*, const double*, double*) const noexcept override { return false; }
     void jacobian(double, double, const double*, const double*, double*) const noexcept override {}
-    Distance distance(int, double, const double*) const noexcept override { return {1.0, 1.0}; }
   };
   const Nowhere system;
   IdaSolver solver(1);
   solver.start(system, 1e-6, 1e-3, 100000);
   try {
-    solver.advance();
+    solver.step();
     FAIL() << "no error";
-  } catch (const IdaError& error) {
+  } catch (const SolverError& error) {
     EXPECT_NE(std::string(error.what()).find("IDA_"), std::string::npos) << error.what();
   }
 }
 
-TEST(Flight, JacobianMatchesDifferences) {
+TEST(IntegratedFlight, JacobianMatchesDifferences) {
   Parameters p = nonlinear();
   Loads loads;
   loads.force = {1.0, -2.0, 3.0};
@@ -183,12 +148,11 @@ TEST(Flight, JacobianMatchesDifferences) {
   for (const auto& [damping, speed] : std::array<std::pair<double, double>, 3>{{{0.0, 0.4}, {0.8, 0.4}, {0.8, 3.0}}}) {
     p.compliance_damping = damping;
     const Motion motion(p);
-    Flight flight(motion, p);
+    IntegratedFlight flight(motion, p);
     loads.tip = {0.05, speed, -1.0};
-    // Touching, δ = 0.1; unresolved steps have another reference polynomial.
     for (const double size : {H, 40 * H}) {
       const Start start{y, z, loads, size, y + 0.2, y - 0.05, false, 100000};
-      flight.run(start);
+      flight.run(start, true);
       const double d = 1e-5;
       expect_jacobian<5>(flight, 0.3, 17.0, {0.01, 0.003, 0.1, 0.2, 0.3}, {d, d * size, d, d, d}, 1e-7);
     }
@@ -199,29 +163,6 @@ Series expanded(const Motion& motion, double y, double z, const Loads& loads, do
   Expansion e(y, z, depth, loads, H);
   while (e.highest <= max_order) motion.extend(e, touching, loads, H);
   return e.y;
-}
-
-// ÿ − R̈ without cancellation is the same as the difference of both, to the rounding of that difference.
-TEST(Motion, ExcessAccelerationIsTheDifference) {
-  const Parameters p = nonlinear();
-  const Motion motion(p);
-  constexpr double H = 0.2;
-  Loads loads;
-  loads.force = scaled({1.0, -2.0, 3.0}, H);
-  const Series y = expanded(motion, 0.15, 0.5, loads, H, false, 0.0);
-  for (const int order : {0, 2, 4, max_order}) {
-    const Taylor R(y, order);
-    const auto remainder = motion.remainder(R, loads, H);
-    for (const double s : {0.0, 0.05, 1.0}) {
-      const double q = 0.02, w = -0.3;
-      double second = 0.0;
-      for (int k = order; k >= 2; --k) second = second * s + k * (k - 1) * y[static_cast<std::size_t>(k)];
-      const double acceleration = motion.acceleration(R(s) + q, R.rate(s) / H + w, value(loads.force, s), 0.0);
-      EXPECT_NEAR(motion.excess_acceleration(R(s), q, w, remainder(s), 0.0), acceleration - second / (H * H),
-                  1000 * epsilon)
-          << order << " " << s;
-    }
-  }
 }
 
 // The coefficients that a start is expanded in, against differences of those one lower at later starts; for contact
@@ -246,10 +187,12 @@ TEST(Motion, ExpansionIsThatOfTheMotion) {
     const Series c = expanded(motion, y, z, loads, 1.0, touching, depth);
     const double force = touching ? motion.compliance().force(depth, z - speed) : 0.0;
     EXPECT_NEAR(2 * c[2], motion.acceleration(y, z, loads.force[0], force), 1e-13) << exponent;
-    const Taylor R(c, max_order);
+    Series rate{};
+    for (std::size_t k = 1; k <= max_order; ++k) rate[k - 1] = static_cast<double>(k) * c[k];
     const auto at = [&](double t) {
-      const double deep = depth + R.rise(t) - speed * t + t * t / 2;
-      return expanded(motion, R(t), R.rate(t), loads.from_time(t), 1.0, touching, deep);
+      const double rise = sum_of_powers(c, t, 1, max_order), deep = depth + rise - speed * t + t * t / 2;
+      return expanded(motion, y + rise, sum_of_powers(rate, t, 0, max_order - 1), loads.from_time(t), 1.0, touching,
+                      deep);
     };
     const std::array<Series, 4> later{at(h), at(2 * h), at(3 * h), at(4 * h)};
     for (std::size_t k = 2; k < max_order; ++k) {
@@ -260,11 +203,35 @@ TEST(Motion, ExpansionIsThatOfTheMotion) {
   }
 }
 
-TEST(Taylor, IntegralsAreExact) {
-  const Taylor R({1.0, -2.0, 3.0, 2.0, -2.0}, 4);
-  EXPECT_DOUBLE_EQ(R(0.5), 1 - 1 + 0.75 + 0.25 - 0.125);
-  EXPECT_DOUBLE_EQ(R.integral(1.0), 1 - 1 + 1 + 0.5 - 0.4);
-  EXPECT_DOUBLE_EQ(R.integral_2(1.0), 0.5 - 1.0 / 3 + 0.25 + 0.1 - 1.0 / 15);
-  // ∫ (−2 + 6s + 6s² − 8s³)²
-  EXPECT_DOUBLE_EQ(R.squared_rate_integral(1.0), 4.0 - 12 + 4 + 26 - 12 - 16 + 64.0 / 7);
+namespace {
+
+/// (s − r₁)(s − r₂)… × factor
+Series with_roots(std::initializer_list<double> roots, double factor = 1.0) {
+  Series c{factor};
+  for (const double root : roots)
+    for (std::size_t k = c.size(); k-- > 0;) c[k] = (k > 0 ? c[k - 1] : 0.0) - root * c[k];
+  return c;
+}
+
+}  // namespace
+
+// Falls of polynomials with known roots: the first from + to −, whatever turns lie before it.
+TEST(Falls, AreTheFirstChangeToNegative) {
+  const auto fall = [](std::initializer_list<double> roots, double factor) {
+    return first_fall(with_roots(roots, factor), static_cast<int>(roots.size())).value_or(-1.0);
+  };
+  EXPECT_NEAR(fall({0.3}, -1.0), 0.3, 1e-15);
+  EXPECT_EQ(fall({0.3}, 1.0), 0.0);  // below 0 at the start
+  EXPECT_EQ(fall({1.3}, -1.0), -1.0);
+  EXPECT_NEAR(fall({0.3, 0.31}, 1.0), 0.3, 1e-14);
+  Series touching = with_roots({0.2, 0.2, 0.6, 0.9});
+  touching[0] += 1e-12;  // at its least near 0.2
+  EXPECT_NEAR(first_fall(touching, 4).value_or(-1.0), 0.6, 1e-10);
+  EXPECT_NEAR(fall({0.1, 0.11, 0.5, 0.51, 0.9, 0.91}, 1.0), 0.1, 1e-14);
+  EXPECT_EQ(fall({0.0, 2.0}, -1.0), -1.0);              // starts at 0 and rises
+  EXPECT_EQ(fall({0.0, 2.0}, 1.0), 0.0);                // starts at 0 and falls
+  EXPECT_NEAR(fall({0.0, 0.4, 0.7}, 1.0), 0.4, 1e-15);  // starts at 0, rises, falls
+  EXPECT_NEAR(fall({0.0, 0.0, 0.4, 0.7}, 1.0), 0.4, 1e-15);
+  EXPECT_NEAR(fall({0.5, 0.5, 0.5}, -1.0), 0.5, 1e-5);
+  EXPECT_EQ(first_fall(Series{}, 3).value_or(-1.0), -1.0);  // rests at 0
 }

@@ -148,7 +148,7 @@ TEST(Spring, FreeMassUnderPolynomialForceIsExact) {
     EXPECT_NEAR(s.displacement_integral(), sum({0, 0.3, -0.7, f0, f1, f2}), 4 * epsilon * scale * t);
     EXPECT_NEAR(s.displacement_integral_2(), sum({0, 0, 0.3, -0.7, f0, f1, f2}), 4 * epsilon * scale * t * t);
     EXPECT_NEAR(s.acceleration(), sum({f0, f1, f2}), 4 * epsilon * (1.3 + 18 * t + 200 * t * t));
-    EXPECT_LE(s.ida_steps(), 5);  // nothing left for IDA to resolve
+    EXPECT_LE(s.internal_steps(), 5);  // nothing left for IDA to resolve
   }
 }
 
@@ -221,8 +221,8 @@ TEST(Spring, TolerancesControlCostAndError) {
     Spring s(p);
     s.step(0.2, Inputs{});  // 4 rad, several parts at any tolerance
     EXPECT_NEAR(s.displacement(), exact.displacement(0.2), 2 * tolerance);
-    EXPECT_LT(s.ida_steps(), steps_before);
-    steps_before = s.ida_steps();
+    EXPECT_LT(s.internal_steps(), steps_before);
+    steps_before = s.internal_steps();
   }
 }
 

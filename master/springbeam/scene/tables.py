@@ -286,8 +286,8 @@ class Spring(Table):
     equilibrium: float = key("m", "height Ψ at which the top starts; it rests unloaded at 0", 0.0)
     external_force: float = key("N", "constant force f_s on the top, upward", 0.0)
     initial_velocity: float = key("m/s", "velocity of the top at the start, upward", 0.0)
-    relative_tolerance: float = key("–", "relative tolerance of IDA, which integrates it", 1e-12, gt=0.0, le=1e-2)
-    absolute_tolerance: float = key("m, m/s", "absolute tolerance of IDA, of y and z", 1e-30, gt=0.0, le=1e-2)
+    relative_tolerance: float = key("–", "relative tolerance of its motion", 1e-12, gt=0.0, le=1e-2)
+    absolute_tolerance: float = key("m, m/s", "absolute tolerance of its motion, of y and z", 1e-30, gt=0.0, le=1e-2)
 
     def force(self, y: float) -> float:
         """Return k1 y + k2 y³ − f_s [N]: what holds the top at ``y`` [m], or a seated one hands to the foundation."""

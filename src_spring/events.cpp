@@ -1,0 +1,79 @@
+#include "events.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace spring {
+namespace {
+
+/// Ascending places in (0, 1].
+struct Places {
+  std::array<double, max_order + 2> at{};
+  std::size_t count = 0;
+  void add(double place) { at[count++] = place; }
+  const double* begin() const { return at.data(); }
+  const double* end() const { return at.data() + count; }
+};
+
+double value(const Series& c, int degree, double s) { return sum_of_powers(c, s, 0, degree); }
+
+/// In low … high, where the sign of a monotone stretch changes once.
+double sign_change(const Series& c, int degree, double low, double high) {
+  const bool negative = value(c, degree, low) < 0.0;
+  const auto past = [&](double s) { return (value(c, degree, s) < 0.0) != negative; };
+  return last_before(low, high, 2.0 * std::numeric_limits<double>::epsilon(), past);
+}
+
+Places sign_changes(const Series& c, int degree);
+
+/// The polynomial is monotone from 0 to the first, and from each to the next; the last is 1.
+Places ends_of_monotone_stretches(const Series& c, int degree) {
+  Series derivative{};
+  for (int k = 1; k <= degree; ++k) derivative[static_cast<std::size_t>(k - 1)] = k * c[static_cast<std::size_t>(k)];
+  Places ends = sign_changes(derivative, degree - 1);
+  ends.add(1.0);
+  return ends;
+}
+
+Places sign_changes(const Series& c, int degree) {
+  double others = 0.0;
+  for (int k = 1; k <= degree; ++k) others += std::abs(c[static_cast<std::size_t>(k)]);
+  Places changes;
+  if (degree <= 0 || std::abs(c[0]) > others) return changes;
+  double low = 0.0;
+  for (const double high : ends_of_monotone_stretches(c, degree)) {
+    if ((value(c, degree, low) < 0.0) != (value(c, degree, high) < 0.0)) changes.add(sign_change(c, degree, low, high));
+    low = high;
+  }
+  return changes;
+}
+
+}  // namespace
+
+std::optional<double> first_fall(const Series& c, int degree) {
+  double least = c[0];
+  for (int k = 1; k <= degree; ++k) least += std::min(c[static_cast<std::size_t>(k)], 0.0);
+  if (least >= 0.0) return {};
+  if (c[0] < 0.0) return 0.0;
+  double low = 0.0;
+  for (const double high : ends_of_monotone_stretches(c, degree)) {
+    if (value(c, degree, high) < 0.0) return sign_change(c, degree, low, high);
+    low = high;
+  }
+  return {};
+}
+
+Occurrence first_event(const Series* to_stop, const Series* to_tip, int degree) {
+  Occurrence first{Event::none, 1.0};
+  const auto look_at = [&](Event event, const Series* distance) {
+    const auto fall = distance ? first_fall(*distance, degree) : std::nullopt;
+    if (fall && (first.event == Event::none || *fall < first.s)) first = {event, *fall};
+  };
+  look_at(Event::stop, to_stop);
+  look_at(Event::contact, to_tip);
+  return first;
+}
+
+}  // namespace spring

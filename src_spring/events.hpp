@@ -1,0 +1,34 @@
+// Where a distance that is a polynomial of s ∈ [0, 1] first falls below 0. The places where a polynomial is 0 lie
+// between those where its derivative is, and so on up to a derivative that has none: no fall is missed, however many
+// turns there are.
+#pragma once
+
+#include <optional>
+
+#include "taylor.hpp"
+
+namespace spring {
+
+/// The last place from `low` on, to `resolution`, before past() holds, which it does at `high`.
+template <class Past>
+double last_before(double low, double high, double resolution, const Past& past) {
+  while (high - low > resolution) {
+    const double middle = low + (high - low) / 2;
+    (past(middle) ? high : low) = middle;
+  }
+  return low;
+}
+
+/// The last place, to rounding, before Σ c_k sᵏ, k ≤ degree, is below 0 for the first time; nothing if it never is.
+std::optional<double> first_fall(const Series& c, int degree);
+
+/// How a flight ends: at the stop, or where contact with the tip begins or ends.
+enum class Event { none, stop, contact };
+struct Occurrence {
+  Event event;
+  double s;  ///< 1 for none
+};
+/// The first of the falls of both distances: to the stop (NULL: there is none) and to the tip.
+Occurrence first_event(const Series* to_stop, const Series* to_tip, int degree);
+
+}  // namespace spring
