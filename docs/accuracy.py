@@ -17,7 +17,6 @@ from pages import DOCS, IMAGES, shrink, table, write_section  # beside this scri
 from springbeam import load_scene, with_changes
 from springbeam.run import runner
 from springbeam.scene import Scene
-from springbeam.scene.resolution import choice
 from springbeam.studies import tradeoff
 from springbeam.studies.study import troubles
 from springbeam.studies.tables import Row, in_words
@@ -43,7 +42,7 @@ WINDOWS = {
 }
 runner.perf_counter = tradeoff.perf_counter = rivals.perf_counter = process_time  # type: ignore[attr-defined]
 #: Schemes at the scene's own macro step and at 4 times of it.
-SCHEMES = ("energy 0", "energy 2", "hermite 2")
+SCHEMES = ("energy 0", "energy 1", "energy 2")
 
 
 def cell(row: Row | None) -> str:
@@ -65,19 +64,14 @@ def side_by_side(rows: list[Row], scene: Scene) -> list[str]:
         here = {row["family"]: row for row in rows if row.get("coupling.macro_step") == H}
         cells = [compared(here[name]) for name in SCHEMES if name in here]
         if len(cells) == len(SCHEMES):
-            lines.append([f"{H:.3g}", *cells, taken(scene, H)])
-    return table(["H [s]", *SCHEMES, "auto takes"], lines)
+            lines.append([f"{H:.3g}", *cells])
+    return table(["H [s]", *SCHEMES], lines)
 
 
 def compared(row: Row) -> str:
     if row["status"] != "done":
         return "stopped"
     return f"{row['error_motion']:.0e}, {row['error_event_time']:.0e}"
-
-
-def taken(scene: Scene, H: float) -> str:
-    auto = choice(with_changes(scene, coupling={"macro_step": H}))
-    return f"`{auto.scheme}` {auto.degree}"
 
 
 def main(names: list[str]) -> None:

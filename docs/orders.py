@@ -14,7 +14,7 @@ from pages import IMAGES, shrink, table, write_section  # beside this script
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
 
-SCHEMES = (("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2))
+SCHEMES = (("energy", 0), ("energy", 1), ("energy", 2))
 STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
 #: Ends of the phases are events; so far from them rows of all runs are of the same phase [s].
 PHASES = {

@@ -49,7 +49,6 @@ def treatments(number: int) -> tuple[Trajectory, ...]:
         "E_D lowest [J]": lambda r: energy(r).min(),
         "E_D highest [J]": lambda r: energy(r).max(),
         "|energy residual| [J]": lambda r: np.abs(r.energy_residual).max(),
-        "|v_tip - z| joined [m/s]": lambda r: np.abs(r.velocity_mismatch).max(),
         "rows": len,
         "events": lambda r: len(r.events),
         "stop impacts": lambda r: sum(event.kind == "stop_impact" for event in r.events),
