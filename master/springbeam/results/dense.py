@@ -31,7 +31,7 @@ from numpy.polynomial.polynomial import polyval
 from ..scene import Scene
 from .columns import columns
 from .paths import LAST_MOMENT, Path, derivative, sign_changes, value
-from .steps import common, joined
+from .steps import common, joined, reduced_mass
 from .trajectory import Event, Trajectory
 
 #: Fields that are linear between rows, and do not change with an event.
@@ -206,7 +206,7 @@ def forces(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
     μ g̈, whose parts up to degree 3 follow from the rates and the moments of the gap. The parts of the next two degrees
     bring both forces to what they are at the ends of the step. Between two exchanges of values they are linear.
     """
-    size, together = steps["size"], scene.contact.rigid & joined(before) & (steps["reduced_mass"] > 0.0)
+    size, together = steps["size"], joined(before) & (steps["reduced_mass"] > 0.0)
     found = {}
     for name in ("contact_force", "foundation_force"):
         c, dc, ddc = steps[name], size * steps[f"{name}_rate"], size**2 * steps[f"{name}_rate_2"]
@@ -228,8 +228,7 @@ def forces(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
 
 def _turning(before: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Return μ g̈ [N] of ends that are joined, by parts: Legendre coefficients of degrees 0 to 3, shape (4, n)."""
-    size, held, free = steps["size"], before["phase"] >= 3.0, 1.0 - steps["tip_share"]
-    mass = np.where(held & (free > 0.0), steps["reduced_mass"] / np.where(free > 0.0, free, 1.0), steps["reduced_mass"])
+    size, mass = steps["size"], reduced_mass(before)
     rate, rate_after = before["v_tip_after"] - before["z_after"], steps["v_tip"] - steps["z"]
     once, twice = (steps[f"u_tip_{name}"] - steps[f"y_{name}"] for name in ("integral", "integral_2"))
     even, odd = 0.5 * size * (rate_after - rate), 0.5 * size * (rate_after + rate)

@@ -37,7 +37,7 @@ STEP_COLUMNS = (
     # bodies tell, `BEAM_TELLS` and `SPRING_TELLS` added up, the same in all records of a run.
     *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress", "told"),
     # The same in all records: the degree of the contact force, the tip's part in the velocity that joined ends have in
-    # common, m_tip/(m_tip + m), and their reduced mass, 1/(1/m_tip + 1/m) [kg].
+    # common, m_tip/(m_tip + m), and their reduced mass, 1/(1/m_tip + 1/m) [kg], 0 if no rigid law joins them.
     *("degree", "tip_share", "reduced_mass"),
 )
 #: The contact force of a step: C and its two derivatives at the step's start.
@@ -84,9 +84,23 @@ def common(steps: np.ndarray, held: np.ndarray, of_tip: str, of_low: str) -> np.
 
 
 def impulse(steps: np.ndarray, name: str = "contact_force") -> np.ndarray:
-    """Return ∫ C dτ [N·s] over each step, or that of the force N of the foundation."""
+    """Return ∫ C dτ [N·s] over each step of a run, or that of the force N of the foundation.
+
+    What has turned a mismatch of joined ends' velocities round is no part of it.
+    """
     size, c, dc, ddc = (steps[part] for part in ("size", name, f"{name}_rate", f"{name}_rate_2"))
-    return np.asarray(size * (c + size * (dc / 2.0 + size * ddc / 6.0)))
+    before = np.roll(steps, 1)
+    turned = steps["v_tip"] - steps["z"] - before["v_tip_after"] + before["z_after"]
+    together = joined(before) & (size > 0.0) & ((name == "contact_force") | (before["phase"] >= 3.0))
+    turning = np.where(together, reduced_mass(before) * turned, 0.0)
+    return np.asarray(size * (c + size * (dc / 2.0 + size * ddc / 6.0)) - turning)
+
+
+def reduced_mass(before: np.ndarray) -> np.ndarray:
+    """Return μ [kg] of ends that a rigid law joins after the records ``before``; the tip's alone on a seat."""
+    free = 1.0 - before["tip_share"]
+    alone = before["reduced_mass"] / np.where(free > 0.0, free, 1.0)
+    return np.where((before["phase"] >= 3.0) & (free > 0.0), alone, before["reduced_mass"])
 
 
 def force(steps: np.ndarray, tau: np.ndarray, name: str = "contact_force") -> np.ndarray:

@@ -224,7 +224,7 @@ class Master:
         lost = impact.energy_loss + pair.follow_phase(phase)
         state.lost += lost
         state.enter(phase)
-        self._happened(kind, impact, lost)
+        self._happened(kind, Impact() if kind.opens else impact, lost)  # nothing strikes where ends part
 
     def _happened(self, kind: EventKind, impact: Impact, lost: float) -> None:
         tip, low = self._pair.ends_together(self.state.phase)
@@ -284,7 +284,7 @@ class Master:
                 state.energy_at_start,
             ),
             *(pair.upper.felt() if self._told & BEAM_TELLS else _NOTHING_FELT),
-            *(self._told, pair.joined.degree, pair.tip_share, pair.reduced_mass(Phase())),
+            *(self._told, pair.joined.degree, pair.tip_share, pair.turned_mass),
         )
 
     def _shape(self, beam: BeamBody, early: bool) -> None:

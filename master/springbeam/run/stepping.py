@@ -125,6 +125,8 @@ class Pair:
         self._holding = 0.0  #: what holds a seated lower end, without loads and contact [N]
         #: The soft law between the ends; a rigid one has no force of its own, and ties them while they are joined.
         self.law = law_of(scene)
+        #: μ of ends that a rigid law joins, whose mismatch of velocities a step turns round [kg]; else 0.
+        self.turned_mass = self.reduced_mass(Phase()) if self.law is None else 0.0
         #: Whether they are joined for good.
         self.lasting = scene.coupled and scene.contact.lasting
         #: Whether contact opens and closes inside steps, without an event that ends them.
