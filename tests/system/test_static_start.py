@@ -140,3 +140,33 @@ def test_a_reference_of_its_own_starts_at_the_same_rest(tables):
 def test_a_contact_that_is_closed_at_the_start_is_told():
     columns = simulate(scene(spring=SPRING, **link("compliance", exponent=1.0)))
     assert [(event.kind, event.time) for event in columns.events] == [(EventKind.IMPACT, 0.0)]
+
+
+@pytest.mark.parametrize(
+    ("force", "velocity", "events"),
+    [
+        (-5.0, 0.0, ["seated"]),
+        (5.0, 0.0, ["stop_impact"]),
+        (-5.0, 0.3, ["stop_impact"] * 10),
+        (-5.0, -0.3, ["stop_impact"] * 10),
+        (0.0, 0.0, []),
+    ],
+)
+def test_a_spring_may_start_on_its_stop(force, velocity, events):
+    """It stays there, leaves it, or rebounds at once, as in the event-driven reference."""
+    scene = scene_from_dict(
+        {
+            "time": {"t_end": 1.0},
+            "spring": {
+                "mass": 1.0, "linear_stiffness": 100.0, "external_force": force, "initial_velocity": velocity,
+            },
+            "stop": {"position": 0.0, "restitution": 0.5},
+            "coupling": {"macro_step": 0.01},
+        }
+    )  # fmt: skip
+    run, exact = simulate(scene), event_driven.simulate(scene)
+    # Bounces that die out end at another one where each counts them by rounding.
+    for found in (run, exact):
+        assert [event.kind.value for event in found.events][:10] == events
+    assert np.abs(run.at(exact.time).y - exact.y).max() < 1e-8
+    assert run.summary["max_energy_residual"] < 1e-14

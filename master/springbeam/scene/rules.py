@@ -294,8 +294,8 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     # Heights
     Rule(
-        lambda s: s.stop and (top := s.at_start("spring")) and s.stop.position >= top.value,
-        "{stop.position}: the foundation must lie below {top}",
+        lambda s: s.stop and (top := s.at_start("spring")) and s.stop.position > top.value,
+        "{stop.position}: the foundation must not lie above {top}",
         _ends,
     ),
     Rule(

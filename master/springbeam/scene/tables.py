@@ -304,7 +304,7 @@ class Stop(Table):
 
     START = "position"
 
-    position: float = key("m", "height φ, below that of the spring's top")
+    position: float = key("m", "height φ, not above that of the spring's top")
     restitution: float = key("–", "restitution e: speed after an impact over that before", 1.0, ge=0.0, le=1.0)
 
 
