@@ -110,6 +110,20 @@ class ModalBody(Double, BeamBody):
             self._dissipated += work(f) - (sum(self.energies()[:2]) - stored)
         return self.motion()
 
+    @property
+    def inertia(self):
+        return float(np.sum((self.b / self.omega**2) ** 2)) * self.stiffness(0.0) ** 2
+
+    def stiffness(self, displacement):
+        return 1.0 / float(np.sum((self.b / self.omega) ** 2))
+
+    def oscillation(self, displacement=0.0):
+        k = self.omega.argmin()
+        return float(self.omega[k]), 0.5 * float(self._damping[k] / self.omega[k])
+
+    def modes(self):
+        return self.omega**2, self._damping, self.b
+
     def acceleration(self):
         return float(self.b @ (self._acting - self._damping * self.v - self.omega**2 * self.a))
 
@@ -221,6 +235,9 @@ class DuffingBody(Double, EndLoaded):
 
     def apply_impulse(self, impulse):
         self.z += impulse / self.mass
+
+    def stiffness(self, displacement):
+        return self.k1 + 3.0 * self.k2 * displacement**2
 
     def holding_force(self, displacement, velocity):
         y = displacement

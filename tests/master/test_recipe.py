@@ -72,9 +72,11 @@ def test_the_window_of_its_peak_force_and_its_frequency_are_its_own():
     p2 = (np.sqrt(K * K + 4.0 * h * contact_energy(scene)) - K) / h  # p²
     slope = K + 3.0 * h * p2
     assert laws.stiffest(scene) == pytest.approx(slope, rel=1e-12)
-    masses = 1.0 / tip_inertia(scene.beam) + 1.0 / scene.spring.mass
+    upper = beam_body(scene.beam, 0.0)
+    assert upper.inertia == pytest.approx(tip_inertia(scene.beam), rel=1e-3)
+    masses = 1.0 / upper.inertia + 1.0 / scene.spring.mass
     window = WINDOW * 2.0 * np.pi / np.sqrt(slope * masses)
-    run = runner.simulate(scene, upper=beam_body(scene.beam, 0.0), lower=DuffingBody())
+    run = runner.simulate(scene, upper=upper, lower=DuffingBody())
     assert run.summary["contact_force_window"] == pytest.approx(window, rel=1e-12)
     # The law's peak, not a mean over a fiftieth of the beam's period.
     assert run.summary["contact_force_max"] == pytest.approx(np.max(run.contact_force), rel=0.02)

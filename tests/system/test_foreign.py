@@ -20,7 +20,7 @@ import tomli_w
 from commands import HANGS, command, printed, ran, refused
 from scenes import kinds
 
-from springbeam import RunStopped, SceneError, simulate, with_changes
+from springbeam import RunStopped, SceneError, SpringDamper, simulate, with_changes
 from springbeam.bodies import isolated
 from springbeam.bodies.foreign import ForeignBody
 from springbeam.bodies.protocol import FmuError
@@ -108,7 +108,8 @@ def test_link_and_tie_are_exact_and_keep_the_interface_energy(fmu, without):
     spring["parameters"] = {"m": M2, "k": K, "c": C, "v0": start}
     run = simulate(pair(fmu(), spring=spring, beam={"velocity": start or V}, contact=TIE))
     assert error(run, tied, *([start] if start else [])) < 1e-12
-    assert run.summary["warnings"] == []
+    (said,) = run.summary["warnings"]
+    assert said.startswith("the body in [spring] does not say its stiffness and damping")
 
 
 def test_without_integrals_the_force_has_degree_0(fmu):
@@ -507,6 +508,51 @@ NAMES = {
     "wrong way": ({"force_sign": 1}, "a positive 'F' pushes the end up; set force_sign = -1"),
     "wrong mass": ({"mass": 6.0}, "with the mass 6 kg it should"),
 }
+
+
+#: One oscillator of 2 kg and 200 N/m below, by each kind of body that says how stiff it is.
+ANSWERING = {
+    "our own": {"spring": {"mass": 2.0, "linear_stiffness": 200.0}},
+    "an element": {"spring": {"element": "spring_damper", "mass": 2.0, "stiffness": 200.0}},
+    "the caller's": {"spring": {"mass": 9.0, "linear_stiffness": 9.0}},
+}
+
+
+def struck(below, macro_step, **changes):
+    """Run 2 kg that strike what is ``below`` with 1 m/s, on a soft contact of 1e5 N/m."""
+    tables = {
+        "time": {"t_end": 1.5},
+        "beam": {"element": "point_mass", "mass": 2.0, "velocity": -1.0},
+        "contact": {"law": "compliance", "stiffness": 1e5, "exponent": 1.0},
+        "coupling": {"degree": 2, "macro_step": macro_step},
+        **changes,
+    }
+    own = {"lower": SpringDamper(2.0, 200.0)} if below == "the caller's" else {}
+    return simulate(scene_from_dict({**tables, **ANSWERING[below]}), **own)
+
+
+@pytest.mark.parametrize("below", ANSWERING)
+def test_bodies_of_every_kind_are_judged_by_what_they_say(below):
+    """The window is a fiftieth of the contact's period, whatever t_end; a period of the body is no macro step.
+
+    An element was taken for a free mass, and the window for a fiftieth of the run, 30 ms.
+    """
+    run = struck(below, 1e-3)
+    assert run.summary["contact_force_window"] == pytest.approx(0.04 * np.pi * np.sqrt(1.0 / 1e5), rel=1e-12)
+    # Half a period of the contact: 2 kg m/s over it by a sine, and a fiftieth of its period is flat to 1e-3.
+    assert run.summary["contact_force_max"] == pytest.approx(np.sqrt(1e5), rel=2e-3)
+    assert run.summary["misplaced_ends"] == pytest.approx(struck("our own", 1e-3).summary["misplaced_ends"], rel=1e-3)
+    assert run.summary["resolved"]
+    blind = struck(below, 0.2 * np.pi)
+    assert not blind.summary["resolved"]
+    assert any("turns 6.28 rad in a macro step" in warning for warning in blind.summary["warnings"])
+
+
+def test_what_a_foreign_body_does_not_say_is_not_judged(fmu):
+    run = simulate(pair(fmu()))
+    assert "misplaced_ends" not in run.summary
+    (said,) = [warning for warning in run.summary["warnings"] if "does not say its stiffness" in warning]
+    assert said.startswith("the body in [spring]")
 
 
 @pytest.mark.parametrize("what", NAMES)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -61,6 +61,7 @@ class SpringDamper(EndLoaded):
     """
 
     state: MassState
+    damping: float
 
     def __init__(
         self,
@@ -74,7 +75,7 @@ class SpringDamper(EndLoaded):
     ) -> None:
         if not (0.0 < mass < float("inf") and damping >= 0.0):
             raise ValueError(f"mass = {mass}, damping = {damping}: a mass is positive and finite, damping not negative")
-        self.mass, self._stiffness, self._damping, self._rest = mass, stiffness, damping, rest
+        self.mass, self._stiffness, self.damping, self._rest = mass, stiffness, damping, rest
         self._load, self._sign = external_force, 1.0
         self.state = MassState(Motion(displacement, velocity, 0.0, 0.0))
         self._maps = lru_cache(SIZES_REMEMBERED)(self._map)
@@ -89,7 +90,7 @@ class SpringDamper(EndLoaded):
         forces[0] += self._load + self._stiffness * self._rest
         start = np.array([*before[:2], *forces, 0.0, 0.0])
         end = Motion(*(self._maps(size) @ start).tolist())
-        if self._damping > 0.0:
+        if self.damping > 0.0:
             forces[0] -= self._stiffness * self._rest
             work = work_on((forces[0], forces[1], forces[2]), before, end, size)
             dissipated += work + sum(self._stored(before)) - sum(self._stored(end))
@@ -102,9 +103,12 @@ class SpringDamper(EndLoaded):
 
         A = np.zeros((7, 7))
         A[0, 1] = A[2, 3] = A[3, 4] = A[5, 0] = A[6, 5] = 1.0
-        A[1, :3] = -self._stiffness / self.mass, -self._damping / self.mass, 1.0 / self.mass
+        A[1, :3] = -self._stiffness / self.mass, -self.damping / self.mass, 1.0 / self.mass
         rows: np.ndarray = expm(A * size)[[0, 1, 5, 6]]
         return rows
+
+    def stiffness(self, displacement: Any) -> float:
+        return self._stiffness
 
     def motion(self) -> Motion:
         return self.state.motion
@@ -127,7 +131,7 @@ class SpringDamper(EndLoaded):
         self.state = self.state._replace(motion=motion._replace(velocity=motion.velocity + impulse / self.mass))
 
     def holding_force(self, displacement: float, velocity: float) -> float:
-        return self._stiffness * (displacement - self._rest) + self._damping * velocity - self._load
+        return self._stiffness * (displacement - self._rest) + self.damping * velocity - self._load
 
 
 class PointMass(SpringDamper):
@@ -143,6 +147,10 @@ class Prescribed(Body):
     """An end that moves as told, whatever acts on it: a driving body, seen from the driven one."""
 
     mass = float("inf")
+    damping = 0.0
+
+    def stiffness(self, displacement: Any) -> float:
+        return float("inf")
 
     def __init__(self, motion: Motion) -> None:
         self.state = motion

@@ -7,14 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from math import isfinite
+from math import isfinite, sqrt
 from struct import Struct
 from typing import Any, ClassVar, NamedTuple, NoReturn
 
 import numpy as np
 
 from ..scene import Beam, Load, Spring
-from ..scene.statics import SHAPE_POINTS
+from ..scene.modes import tip_modes
+from ..scene.statics import SHAPE_POINTS, locking, lowest_frequency, tip_compliance, tip_inertia
 from .elements import EndLoaded
 from .fmu import Fmu, Value
 from .force import combined
@@ -28,6 +29,7 @@ from .protocol import (
     Felt,
     FmuError,
     Force,
+    Modes,
     Motion,
     StepRefused,
     made_of,
@@ -346,6 +348,8 @@ class FmuBeam(OwnBody, BeamBody):
 
         ``loads`` say where point forces may act; it rests under them and a tip force ``held_by`` [N] if that is given.
         """
+        self._beam = beam
+        self.damping = beam.alpha_b / tip_compliance(beam)
         self._points = sorted({load.at for load in loads if load.at is not None})
         self._constants = {"distributed_load": beam.distributed_load}
         parameters: dict[str, Any] = {name: value for name, value in beam if name not in beam.GIVEN_ONLY}
@@ -374,6 +378,21 @@ class FmuBeam(OwnBody, BeamBody):
         shape = load.shape or [1.0]
         return [(f"distributed_load_{i}" if i else "distributed_load", s) for i, s in enumerate(shape) if s != 0.0]
 
+    @property
+    def inertia(self) -> float:
+        return tip_inertia(self._beam)
+
+    def stiffness(self, displacement: Any) -> float:
+        return 1.0 / tip_compliance(self._beam)
+
+    def oscillation(self, displacement: Any = 0.0) -> tuple[float, float]:
+        omega = lowest_frequency(self._beam) * sqrt(locking(self._beam))
+        return omega, 0.5 * self._beam.alpha_b * omega
+
+    def modes(self) -> Modes:
+        omega, tip = tip_modes(self._beam)
+        return omega**2, self._beam.alpha_b * omega**2, tip
+
     def felt(self) -> Felt:
         return made_of(Felt, self._felt())
 
@@ -397,11 +416,16 @@ class FmuSpring(OwnBody, EndLoaded):
 
     def __init__(self, spring: Spring, start_time: float, displacement: float | None = None) -> None:
         """Start at ``start_time`` [s] with y = ``displacement`` [m], which is Ψ if left out."""
-        self._spring, self._constants = spring, {"external_force": spring.external_force}
+        self._spring = spring
+        self.damping = spring.damping
+        self._constants = {"external_force": spring.external_force}
         parameters: dict[str, Any] = spring.model_dump(exclude={"initial_velocity"})
         parameters["displacement"] = spring.equilibrium if displacement is None else displacement
         parameters["velocity"] = spring.initial_velocity
         super().__init__(parameters, start_time)
+
+    def stiffness(self, displacement: Any) -> Any:
+        return self._spring.linear_stiffness + 3.0 * self._spring.cubic_stiffness * displacement**2
 
     def holding_force(self, displacement: float, velocity: float) -> float:
         return self._spring.force(displacement) + self._spring.damping * velocity

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf, sqrt
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -47,6 +48,8 @@ _T = TypeVar("_T", bound=tuple[Any, ...])
 #: ``made_of(kind, values)`` is ``kind(*values)`` of a named tuple in a third of the time.
 made_of: Callable[[type[_T], tuple[Any, ...]], _T] = tuple.__new__
 
+#: ω² [1/s²], 2 ζ ω [1/s] and the displacement of the end [1/√kg] of modes of unit mass, (n,) each.
+Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
 #: The interface ends (tip, lower end): the spring top, or without a spring the foundation.
 Ends = tuple[Motion, Motion]
 
@@ -96,6 +99,44 @@ class Body:
     mass: float
     #: Whether columns tell its acceleration and the forces inside it: of our own beam and spring.
     tells = False
+
+    #: What resists the velocity of the end [N·s/m]; ``None`` where that is not known.
+    damping: float | None = None
+
+    @property
+    def inertia(self) -> float:
+        """What a force meets that acts for long beside the waves inside the body [kg]."""
+        return self.mass
+
+    def stiffness(self, displacement: Any) -> Any:
+        """Return ∂F/∂w of the force that holds the end at ``displacement`` [N/m], also of an array of them.
+
+        ``None`` where that is not known.
+        """
+        return None
+
+    def oscillation(self, displacement: Any = 0.0) -> tuple[float, float] | None:
+        """Return the lowest frequency of the body alone [rad/s] and its damping ratio, 0 where nothing oscillates.
+
+        Of an array of displacements [m] it is where the body is stiffest; ``None`` where that is not known.
+        """
+        stiffness = self.stiffness(displacement)
+        if stiffness is None or self.damping is None:
+            return None
+        stiffest = float(np.max(stiffness))
+        if stiffest <= 0.0 or not 0.0 < self.mass < inf:
+            return 0.0, 0.0
+        omega = sqrt(stiffest / self.mass)
+        return omega, 0.5 * self.damping / (self.mass * omega)
+
+    def modes(self) -> Modes | None:
+        """Return the modes of the end, as of a linear body; ``None`` where they are not known."""
+        stiffness = self.stiffness(0.0)
+        if stiffness is None or self.damping is None:
+            return None
+        if not 0.0 < self.mass < inf:
+            return np.zeros(1), np.zeros(1), np.zeros(1)
+        return np.array([stiffness / self.mass]), np.array([self.damping / self.mass]), np.array([self.mass**-0.5])
 
     @property
     def massless(self) -> bool:

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 from operator import mul
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -122,6 +122,9 @@ class QuasiStaticBeam(BeamBody):
         C = self._stiffness * (self.state.w + self._alpha * self.state.velocity)
         moment, shear = self._load_moment + C * self._arm, self._load_shear + C
         return np.concatenate([deflection, moment, shear])
+
+    def stiffness(self, displacement: Any) -> float:
+        return self._stiffness
 
     def apply_impulse(self, impulse: float) -> None:
         raise AssertionError("a massless tip takes no impulse")

@@ -104,7 +104,7 @@ def pick(scene: Scene) -> Trajectory:
         if coarse is not None:
             before, errors = _estimated(coarse, fine, asked, before)
             # Runs that share a step, as from an event to a macro point, agree on its curve whether it is right or not.
-            errors["motion"] = max(errors["motion"], fine.summary["misplaced_ends"])
+            errors["motion"] = max(errors["motion"], fine.summary.get("misplaced_ends", 0.0))
             if _SAFETY * max(errors.values()) <= asked:
                 return _told(fine, asked, errors, pilots)
         pilots.append(fine)

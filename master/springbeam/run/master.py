@@ -16,7 +16,6 @@ import numpy as np
 
 from ..bodies.gate import admit, with_degree
 from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, Ends, StepRefused
-from ..contact.laws import stiffest
 from ..contact.phases import Impact, Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
 from ..results.columns import ledger
@@ -26,13 +25,13 @@ from ..results.steps import BEAM_TELLS, SPRING_TELLS, STEP, packed
 from ..results.totals import totals
 from ..results.trajectory import Event, EventKind
 from ..scene import SAME, Scene
-from ..scene.resolution import force_window, peak_force_doubt
+from ..scene.resolution import peak_force_doubt
 from .detection import Detector
 from .ledger import Balance
 from .log import TOGETHER, Log
 from .macro_steps import AdaptiveSteps, MacroGrid
 from .misplaced import misplaced
-from .observed import not_shown, why_not_resolved
+from .observed import force_window, not_shown, unknown, why_not_resolved
 from .outcome import RunStopped, cause_of
 from .stepping import Pair, Present, State
 
@@ -307,7 +306,8 @@ class Master:
         off = misplaced(scene, self._pair, steps, events)
         unresolved = why_not_resolved(scene, self._pair, self._steps.size, steps, events, off)
         warnings += filter(None, [unresolved or peak_force_doubt(scene), not_shown(scene, self._pair, steps)])
-        window = force_window(scene, stiffest(scene) if scene.contact.facts.opens else 0.0)
+        warnings += filter(None, [unknown(scene, self._pair)])
+        window = force_window(scene, self._pair, steps)
         amounts = totals(scene, steps, events, window) if len(steps) else {}
         ruled_out = contradictions(scene, steps, events, amounts.get("contact_duration_total", 0.0))
         warnings += [f"not resolved: {what}: an event was missed; {_SHORTER}" for what in ruled_out]
@@ -320,7 +320,7 @@ class Master:
             "iterations": self._pair.joined.state.iterations,
             **energies,
             "resolved": unresolved is None and not changed and not ruled_out,
-            "misplaced_ends": off,
+            **({} if off is None else {"misplaced_ends": off}),
             "warnings": warnings,
             **amounts,
         }

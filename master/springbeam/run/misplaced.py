@@ -9,50 +9,49 @@ mesh.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache, lru_cache, partial
+from functools import cache, partial
 from itertools import product
 from math import inf
 from typing import Any
 
 import numpy as np
 
+from ..bodies.protocol import Modes
 from ..contact.laws import SoftLaw
 from ..results.distance import HELD
 from ..results.paths import Path
 from ..results.steps import force as applied
 from ..results.steps import joined
 from ..results.trajectory import Event, EventKind
-from ..scene import Beam, Scene
-from ..scene.statics import bending_stiffness, shear_stiffness, tip_reach
+from ..scene import Scene
+from ..scene.statics import tip_reach
 from .stepping import Pair
 
 #: Places where a soft law is asked, and their shares: Gauss points.
 _POINTS, _SHARES = np.polynomial.legendre.leggauss(4)
 _INSIDE = 0.5 * (_POINTS + 1.0), 0.5 * _SHARES
-#: Elements of a mesh that has the lowest modes of any finer one.
-_ELEMENTS = 50
 #: Ways that an end is off from which on nothing more is to be learnt.
 _LOST = 1e3
 
-#: ω² [1/s²], 2 ζ ω [1/s] and the displacement of the tip [1/√kg] of modes of unit mass, (n,) each.
-Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
 
-
-def misplaced(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float:
+def misplaced(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float | None:
     """Return how far an end is from where the law of ``pair`` would have it, over its largest distance from its start.
 
     It is that of the worse end at its worst, of a tie between the rows, too; 0 where a tie holds an end that nothing
-    moves, or one without mass.
+    moves, or one without mass. ``None`` where a body does not say how it answers a force.
     """
     if not steps["size"].any() or (pair.law is None and not 0.0 < pair.upper.mass < inf):
         return 0.0
     held = 0.0 if scene.beam is None else HELD * tip_reach(scene.beam)
     moved = (float(np.abs(steps[name] - steps[name][0]).max()) for name in ("u_tip_after", "y_after"))
     ways = [way if way > held else inf for way in moved]
-    ends, stiffness = _Errors(scene, pair), np.zeros(len(steps))
-    if scene.spring is not None:
-        y = 0.5 * (steps["y"] + np.append(0.0, steps["y_after"][:-1]))
-        stiffness = ends.per_mass * (scene.spring.linear_stiffness + 3.0 * scene.spring.cubic_stiffness * y**2)
+    modes = pair.upper.modes()
+    y = 0.5 * (steps["y"] + np.append(0.0, steps["y_after"][:-1]))
+    stiff, damping = pair.lower.stiffness(y), pair.lower.damping
+    if modes is None or stiff is None or damping is None:
+        return None
+    ends = _Errors(modes, pair.lower.mass, damping)
+    stiffness = ends.per_mass * np.broadcast_to(stiff, len(steps)) if ends.per_mass > 0.0 else np.zeros(len(steps))
     follow = _along_tie if pair.law is None else partial(_along_soft_law, pair.law)
     found = 0.0
     for u, y in follow(scene.degree, ends, steps, stiffness, _after_events(scene, steps, events)):
@@ -65,12 +64,11 @@ def misplaced(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Even
 class _Errors:
     """Errors of the modes' displacements and velocities ``x``, (2, n), of the lower end's ``y`` [m] and ``z`` [m/s]."""
 
-    def __init__(self, scene: Scene, pair: Pair) -> None:
-        modes = _modes(scene, pair)
+    def __init__(self, modes: Modes, mass: float, damping: float) -> None:
         self.tip, self._moves = modes[2], cache(partial(_moves, modes))
         self.x, self.y, self.z = np.zeros((2, len(self.tip))), 0.0, 0.0
-        self.per_mass = 1.0 / pair.lower.mass if pair.lower.mass > 0.0 else 0.0
-        self._resists = self.per_mass * scene.spring.damping if scene.spring is not None else 0.0
+        self.per_mass = 1.0 / mass if mass > 0.0 else 0.0
+        self._resists = self.per_mass * damping
 
     @property
     def u(self) -> float:
@@ -222,14 +220,6 @@ def _after_events(scene: Scene, steps: np.ndarray, events: Sequence[Event]) -> n
     return np.array([shares, turns, most])
 
 
-def _modes(scene: Scene, pair: Pair) -> Modes:
-    """Return the beam's modes; a body that is not our own is a free mass."""
-    if scene.beam is None:
-        return np.zeros(1), np.zeros(1), np.full(1, pair.upper.mass**-0.5 if pair.upper.mass > 0.0 else 0.0)
-    omega, tip = tip_modes(scene.beam)
-    return omega**2, scene.beam.alpha_b * omega**2, tip
-
-
 def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
     """Return what a step of ``H`` [s] makes of displacement and velocity of each mode, (2, 2, n).
 
@@ -246,33 +236,3 @@ def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, float, np.nd
     pushed = np.array([(1.0 - kept) / stiffness * tip, sine * tip])
     moved = tip / (1.0 + H * (decay + 0.25 * H * stiffness))
     return free, pushed, float(tip @ pushed[0]), free[:, 0] * moved
-
-
-@lru_cache(maxsize=16)
-def tip_modes(beam: Beam) -> tuple[np.ndarray, np.ndarray]:
-    """Return the frequencies of the mesh [rad/s], the lowest first, and the tip's displacement in modes of unit mass
-    [1/√kg].
-
-    Elements of a higher degree and those with the averaged mass are more accurate: fine linear ones stand for them.
-    Both energies are sums of squares, so that low frequencies are not lost beside the high ones of a slender beam.
-    """
-    linear = beam.element_degree == 1 and beam.mass_matrix == "consistent"
-    n = min(beam.n_elements, _ELEMENTS) if linear else _ELEMENTS
-    h, none = beam.length / n, np.zeros((n, n))
-    rise, mean = np.eye(n) - np.eye(n, k=-1), 0.5 * (np.eye(n) + np.eye(n, k=-1))  # over an element, from the clamp on
-    bending, shear = bending_stiffness(beam) / h, shear_stiffness(beam) * h
-    if linear and not beam.reduced_integration:  # it locks
-        bending += shear * (beam.length / (beam.n_elements * h)) ** 2 / 12.0
-    strain = np.block([[none, bending**0.5 * rise], [shear**0.5 / h * rise, -(shear**0.5) * mean]])
-    speed = (beam.density * h) ** 0.5 * np.vstack([mean, rise / 12.0**0.5])
-    to_strain = np.linalg.qr(strain)[1]
-    of_strain = np.linalg.inv(to_strain)
-    speeds = np.kron(np.diag([beam.area**0.5, beam.second_moment_of_area**0.5]), speed) @ of_strain
-    if beam.n_modes and beam.integrator == "modal":
-        # The lowest, and the static shapes of a tip force, of a uniform load and of the start.
-        start = to_strain[:, :n] @ np.arange(1.0, n + 1.0)
-        shapes = np.array([of_strain[n - 1], mean.sum(axis=0) @ of_strain[:n], start])
-        space = np.linalg.qr(np.vstack([np.linalg.svd(speeds)[2][: beam.n_modes], shapes]).T)[0]
-        speeds, of_strain = speeds @ space, of_strain @ space
-    periods, modes = np.linalg.svd(speeds)[1:]
-    return 1.0 / periods, modes @ of_strain[n - 1] / periods

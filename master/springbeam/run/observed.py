@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
+from math import inf, sqrt
 
 import numpy as np
 
+from ..contact.laws import stiffest
 from ..results.columns import MOST_SHOWN, normal_compliance
 from ..results.dense import between_rows
 from ..results.totals import shortest_contact
 from ..results.trajectory import Event
 from ..scene import Load, Scene
 from ..scene.linearised import spring_frequency
-from ..scene.resolution import SHORT, SHORT_IMPULSE, not_resolved, slowest_frequency
+from ..scene.modes import tip_modes
+from ..scene.resolution import SHORT, SHORT_IMPULSE, not_resolved, oscillating, slowest_frequency, window_of
 from ..scene.statics import tip_inertia
-from .misplaced import tip_modes
 from .stepping import Pair
 
 #: Warning of a run in which a force was too large for its column.
@@ -44,7 +45,7 @@ def not_shown(scene: Scene, pair: Pair, steps: np.ndarray) -> str | None:
 
 
 def why_not_resolved(
-    scene: Scene, pair: Pair, H: float, steps: np.ndarray, events: Sequence[Event], misplaced: float
+    scene: Scene, pair: Pair, H: float, steps: np.ndarray, events: Sequence[Event], misplaced: float | None
 ) -> str | None:
     """Return in words why a run in steps of H [s] whose ends are ``misplaced`` is not resolved; ``None`` if it is."""
     least = SHORT_IMPULSE * least_momentum(scene, pair, steps)
@@ -53,12 +54,66 @@ def why_not_resolved(
     late = float(np.sqrt(np.mean(sizes**3) / np.mean(sizes))) if scene.coupling.adaptive and len(sizes) else None
     return not_resolved(
         scene,
-        misplaced,
+        misplaced or 0.0,
+        oscillations=oscillating(scene, _oscillations(pair, steps)),
         shortest_contact=lasted,
         left_out=left_out(scene, steps),
         between_rows=between_rows(scene, steps),
         H=late,
     )
+
+
+def _oscillations(pair: Pair, steps: np.ndarray) -> list[tuple[str, float, float]]:
+    """Return (table, frequency [rad/s], damping ratio) of each body that says so, where it has been stiffest."""
+    found = []
+    for table, body, column in (("beam", pair.upper, "u_tip_after"), ("spring", pair.lower, "y_after")):
+        known = body.oscillation(steps[column]) if len(steps) else None
+        if known is not None:
+            found.append((table, *known))
+    return found
+
+
+def unknown(scene: Scene, pair: Pair) -> str | None:
+    """Return a warning that names what cannot be judged, since a body does not say how stiff it is."""
+    places = {"beam": (scene.upper, pair.upper), "spring": (scene.lower, pair.lower)}
+    silent = [f"[{table}]" for table, (there, body) in places.items() if there and body.oscillation() is None]
+    if not silent:
+        return None
+    said = (
+        f"the body in {' and '.join(silent)} does not say its stiffness and damping; how far ends are misplaced, and "
+        "how far it turns in a macro step, is not known"
+    )
+    if scene.contact.force_window is None and scene.coupled:
+        said += "; contact.force_window says over which time the peak contact force is a mean"
+    return said
+
+
+def force_window(scene: Scene, pair: Pair, steps: np.ndarray) -> float:
+    """Return over which time the contact force is averaged before its peak is taken [s].
+
+    It is ``contact.force_window``, or `springbeam.scene.resolution.WINDOW` of a period: that of a contact by a soft law
+    that opens where it is deepest, whose peak is the law's; else the slowest of the upper body alone; that of both
+    together where that does not oscillate; the run where nothing does.
+    """
+    if scene.contact.force_window is not None:
+        return scene.contact.force_window
+    upper, lower = pair.upper, pair.lower
+    if pair.opens_softly and pair.law is not None:
+        deepest = float((steps["y"] - steps["u_tip"]).max(initial=0.0))
+        stiffness = max(stiffest(scene), pair.law.slope(deepest))
+        omega = sqrt(stiffness * (1.0 / upper.inertia + 1.0 / lower.inertia))
+    else:
+        omega, _ = upper.oscillation() or (0.0, 0.0)
+        omega = omega or _together(pair, steps)
+    return window_of(scene, omega)
+
+
+def _together(pair: Pair, steps: np.ndarray) -> float:
+    """Return the frequency of both ends as one [rad/s], where they have been stiffest; 0 if none is known."""
+    known = [body.stiffness(steps[name]) for body, name in ((pair.upper, "u_tip_after"), (pair.lower, "y_after"))]
+    stiffness = sum(float(np.max(k)) for k in known if k is not None) if len(steps) else 0.0
+    inertia = pair.upper.inertia + pair.lower.inertia
+    return sqrt(stiffness / inertia) if 0.0 < stiffness < inf and 0.0 < inertia < inf else 0.0
 
 
 def least_momentum(scene: Scene, pair: Pair, steps: np.ndarray) -> float:

@@ -7,13 +7,14 @@ its limits. Frequencies are those of the beam, not of its mesh, so that asking c
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from math import inf, pi, sqrt
 from typing import Any, NamedTuple
 
 from .linearised import bent_energy, spring_frequency, spring_stiffness
 from .messages import Rule, told
 from .scene import Scene
-from .statics import bending_stiffness, initial_kinetic_energy, locking, lowest_frequency, tip_compliance, tip_inertia
+from .statics import bending_stiffness, initial_kinetic_energy, locking, lowest_frequency, tip_compliance
 from .tables import ORDINARY_SCHEMES, Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
@@ -57,6 +58,7 @@ class _Seen(NamedTuple):
     left_out: float
     between_rows: float
     H: float | None
+    oscillations: Sequence[tuple[str, float, str]]
 
 
 def not_resolved(
@@ -67,6 +69,7 @@ def not_resolved(
     left_out: float = 0.0,
     between_rows: float = 0.0,
     H: float | None = None,
+    oscillations: Sequence[tuple[str, float, str]] | None = None,
 ) -> str | None:
     """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
 
@@ -85,9 +88,12 @@ def not_resolved(
         How far an end may be from its curve between the rows, over its way.
     H
         Steps of one length that make waves as late as those of the run [s]; needed if these follow from tolerances.
+    oscillations
+        As of `slow_oscillations`, which is the default.
     """
+    slow = slow_oscillations(scene) if oscillations is None else oscillations
     causes = _OF_ALL_STEPS if scene.coupling.adaptive else (*_OF_EQUAL_STEPS, *_OF_ALL_STEPS)
-    return next(told(scene, causes, _Seen(misplaced, shortest_contact, left_out, between_rows, H)), None)
+    return next(told(scene, causes, _Seen(misplaced, shortest_contact, left_out, between_rows, H, slow)), None)
 
 
 def lateness(scene: Scene, turn: float) -> float:
@@ -106,7 +112,7 @@ def _too_fast(scene: Scene, seen: _Seen) -> dict[str, Any]:
     H = scene.coupling.H
     found = (
         {"name": name, "turn": omega * H, "size": _rounded_down(TURN / omega), "otherwise": otherwise}
-        for name, omega, otherwise in slow_oscillations(scene)
+        for name, omega, otherwise in seen.oscillations
         if omega * H > TURN
     )
     return next(found, {})
@@ -170,23 +176,8 @@ def _waves_lag(scene: Scene, seen: _Seen) -> dict[str, Any]:
     return {"waves": waves, "lag": lag, "size": _rounded_down(H * sqrt(limit / lag))} if lag > limit else {}
 
 
-def force_window(scene: Scene, stiffness: float = 0.0) -> float:
-    """Return over which time the contact force is averaged before its peak is taken [s].
-
-    It is ``contact.force_window``, or `WINDOW` of a period: that of a contact by a soft law that opens, whose peak is
-    the law's; else the slowest of the beam alone; that of spring and beam together where the beam has no inertia; the
-    run where nothing oscillates. ``stiffness`` is that of such a law where it is deepest [N/m], 0 of any other.
-    """
-    beam, spring = scene.beam, scene.spring
-    if scene.contact.force_window is not None:
-        return scene.contact.force_window
-    if stiffness > 0.0 and beam is not None:
-        masses = [tip_inertia(beam), *([] if spring is None else [spring.mass])]
-        omega = sqrt(stiffness * sum(1.0 / mass for mass in masses))
-    elif beam is not None and beam.fidelity == "dynamic":
-        omega = slowest_frequency(beam)
-    else:
-        omega = joined_frequency(scene)
+def window_of(scene: Scene, omega: float) -> float:
+    """Return `WINDOW` of a period at ``omega`` [rad/s], of the run where nothing oscillates [s]."""
     return WINDOW * (2.0 * pi / omega if omega > 0.0 else scene.time.t_end)
 
 
@@ -201,26 +192,35 @@ def peak_force_doubt(scene: Scene) -> str | None:
 
 def _settling(scene: Scene) -> dict[str, float]:
     """Return the window of the peak force and a longer one in which it settles, nothing if the mesh does not count."""
-    beam, window = _struck(scene), force_window(scene)
+    beam = _struck(scene)
     if beam is None or not scene.contact.rigid:
         return {}
+    window = scene.contact.force_window or window_of(scene, slowest_frequency(beam))
     needed = SETTLED * 2.0 * pi / min(shear_frequency(beam), fastest_frequency(beam))
     return {"window": window, "longer": 1.05 * needed} if window < needed else {}
 
 
 def slow_oscillations(scene: Scene) -> list[tuple[str, float, str]]:
-    """Return (name, frequency [rad/s], what else would help) of each body and load that oscillates."""
+    """Return (name, frequency [rad/s], what else would help) of each of our bodies and of each load that oscillates."""
     found = []
     beam, spring = scene.beam, scene.spring
     if beam is not None and beam.fidelity == "dynamic":
         omega = slowest_frequency(beam)
-        if beam.alpha_b * omega < 2.0:  # else it creeps
-            static = spring is not None and scene.contact.rigid
-            found.append(("beam", omega, ', beam.fidelity = "quasi_static" leaves it out' if static else ""))
-    if spring is not None:
-        omega = spring_frequency(scene)
-        if spring.damping < 2.0 * spring.mass * omega:
-            found.append(("spring", omega, ""))
+        found.append(("beam", omega, 0.5 * beam.alpha_b * omega))
+    if spring is not None and (omega := spring_frequency(scene)) > 0.0:
+        found.append(("spring", omega, 0.5 * spring.damping / (spring.mass * omega)))
+    return oscillating(scene, found)
+
+
+def oscillating(scene: Scene, bodies: Iterable[tuple[str, float, float]]) -> list[tuple[str, float, str]]:
+    """Return as `slow_oscillations`, of ``bodies`` as (table, frequency [rad/s], damping ratio); others creep."""
+    found = []
+    for table, omega, ratio in bodies:
+        if omega > 0.0 and ratio < 1.0:
+            own = scene.beam if table == "beam" else scene.spring
+            static = own is scene.beam is not None and scene.spring is not None and scene.contact.rigid
+            name = table if own is not None else f"body in [{table}]"
+            found.append((name, omega, ', beam.fidelity = "quasi_static" leaves it out' if static else ""))
     found += [(f"load loads.{i}", load.rate, "") for i, load in enumerate(scene.loads) if load.rate > 0.0]
     return found
 
