@@ -51,7 +51,7 @@ def test_the_error_follows_the_tolerance(scheme, degree, tolerances, least, orde
     assert orders[0] < slope < orders[1]
 
 
-@pytest.mark.parametrize("degree", [0, 2])
+@pytest.mark.parametrize("degree", [1, 2])
 def test_a_tip_that_is_held_from_the_start_sets_no_length(degree):
     """Until it is let go all its motion is rounding; the beam behind it moves, and by that the steps are as long."""
     coupling = {"degree": degree, "relative_tolerance": 1e-3}
