@@ -289,3 +289,14 @@ def test_without_fmus_the_error_says_what_builds_them(desk, arguments, monkeypat
     assert len(re.findall(r"\berror:", said)) == 1
     assert fmu_directory() == desk / "empty"
     assert contents(desk).keys() == before
+
+
+@pytest.mark.parametrize("line", ["keys", "keys --json"])
+def test_an_output_that_is_closed_is_no_success(line):
+    """As of `| head`: it had ended with 1, as a check that has failed."""
+    receiver, sender = os.pipe()
+    os.close(receiver)
+    done = subprocess.run([sys.executable, "-m", "springbeam", *line.split()], stdout=sender, stderr=subprocess.PIPE)
+    os.close(sender)
+    assert done.returncode == 3
+    assert done.stderr.decode() == "error: standard output: closed before all was written\n"

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -117,10 +118,11 @@ class Command(TyperCommand):
         return parameters
 
     def invoke(self, ctx: Any) -> None:
-        with interruptible():
+        with interruptible(), closed_output_reported():
             with bad_input_reported():
                 found: Findings = super().invoke(ctx)
             say(found, quiet=ctx.params.get("quiet", False), as_json=ctx.params.get("as_json", False))
+            sys.stdout.flush()
 
 
 def _refuse_gone(words: list[str]) -> None:
@@ -131,9 +133,16 @@ def _refuse_gone(words: list[str]) -> None:
             fail(BAD_INPUT, f"{name}: gone; {GONE[name]}")
 
 
+class _Results(Console):
+    """A console that leaves an output that is closed to `closed_output_reported`."""
+
+    def on_broken_pipe(self) -> None:
+        raise BrokenPipeError
+
+
 def console_for(*, silent: bool) -> Console:
     """Return the console for results, on stdout; it is silent if only a path or JSON is to be printed."""
-    return Console(highlight=False, quiet=silent)
+    return _Results(highlight=False, quiet=silent)
 
 
 def progress_bar(*columns: ProgressColumn, quiet: bool) -> Progress:
@@ -182,6 +191,17 @@ def results_directory(path: Path) -> Path:
 
 
 @contextmanager
+def closed_output_reported() -> Iterator[None]:
+    """End the command with exit code 3 if nothing reads its standard output any more, as of ``| head``."""
+    try:
+        yield
+    except BrokenPipeError:
+        # What Python still holds of the output would fail again at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        fail(STOPPED, "standard output: closed before all was written")
+
+
+@contextmanager
 def bad_input_reported() -> Iterator[None]:
     """End the command with exit code 2 and one error if the input or a file is at fault."""
     try:
@@ -192,6 +212,8 @@ def bad_input_reported() -> Iterator[None]:
         fail(BAD_INPUT, error.typed)
     except (SceneError, FmuError, ResultsInUse, ResultsUnreadable) as error:
         fail(BAD_INPUT, str(error))
+    except BrokenPipeError:
+        raise
     except FileExistsError as error:
         fail(BAD_INPUT, f"{error.filename}: is a file; --out DIR names a directory, new or without results")
     except OSError as error:

@@ -91,6 +91,8 @@ def _contacts(run: Trajectory, end: float) -> list[Interval]:
     """
     if run.steps is not None and len(run.steps):
         free_at_end = not joined(run.steps[-1])
+    elif "contact_force" not in run.columns:  # one body alone
+        free_at_end = True
     else:
         free_at_end = run.phase[-1] == "free" or (run.phase[-1] == "seated" and run.contact_force[-1] == 0.0)
     return tip_contacts(run.events, end, free_at_end=bool(free_at_end))

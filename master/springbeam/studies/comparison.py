@@ -119,8 +119,9 @@ def _beside_event_driven(scene: Scene, found: Row) -> tuple[Trajectory, ...]:
         good = before & np.isfinite(ours) & np.isfinite(halved) & (away | (name in ("u_tip", "y")))
         if good.sum() < 2:
             continue
+        # Of the whole reference: what is away from events may be at rest to rounding.
+        scale = float(np.nanmax(np.abs(reference[name]))) or 1.0
         ours, halved, exact, other = (values[good] for values in (ours, halved, reference[name], moved[name]))
-        scale = float(np.abs(exact).max()) or 1.0
         growth = np.maximum(1.0, np.maximum.accumulate(np.abs(other - exact) / (PERTURBATION * scale)))
         found["growth"] = max(found["growth"], float(growth[-1]))
         floor = _step_error(scene) * (np.flatnonzero(good) + 1.0) + _SAFETY * _rounding(scene, name)

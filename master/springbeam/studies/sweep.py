@@ -69,8 +69,17 @@ class Sweep(Study):
         """Return the values of the axes. Raises SceneError if a key or a metric is not there."""
         _ = self.metrics, self.boundary and self._pulse  # both raise where something is not there
         names = [axis.name for axis in self.axes]
+        for name in names:
+            self._refuse_lacking(name)
         values = design(self.axes, self.samples, self.seed, self.sampling)
         return {str(index): dict(zip(names, several, strict=True)) for index, several in enumerate(values)}
+
+    def _refuse_lacking(self, name: str) -> None:
+        """Raise ArgumentError if ``name`` is a key of a load that the scene does not have."""
+        table, _, number = name.rpartition(".")[0].partition(".")
+        if table == "loads" and int(number) >= len(self.scene.loads):
+            there = ", ".join(f"loads.{k}" for k in range(len(self.scene.loads))) or "none"
+            raise ArgumentError(f"--vary {name}: the scene has no such load; there are: {there}")
 
     def record(self, case: Row) -> Row:
         """Run one case and return its metrics, as `measured` does."""
