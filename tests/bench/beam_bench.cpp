@@ -1,8 +1,6 @@
 // The beam beside what its step cannot do without: one banded solve and one banded product of the mesh's unknowns, or
 // as many 2×2 products as there are modes. beam_bench [--quick]
 #include <malloc.h>
-#include <Eigen/SparseCholesky>
-#include <Eigen/SparseCore>
 
 #include <cmath>
 #include <fstream>
@@ -12,6 +10,9 @@
 #include "../../src_beam/beam.hpp"
 #include "../../src_beam/timoshenko.hpp"
 #include "paired.hpp"
+
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
 
 namespace {
 

@@ -75,7 +75,7 @@ void compare(const char* name, const Options& o, const Ours& ours, const Rival& 
 /// An FMU without the library around it, called as an importer written in C would.
 class Fmu {
  public:
-  explicit Fmu(const std::vector<std::pair<const char*, double>>& values) {
+  explicit Fmu(const std::vector<std::pair<const char*, double>>& values) : instance_(fmi::type_names) {
     for (const auto& [name, value] : values) {
       const auto named = [&](const fmi::Variable& v) { return v.name == name; };
       const auto& variables = fmi::table().variables;
