@@ -8,26 +8,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.image import imread
 from runs import EVERY_EVENT, ODD_COLUMNS, PAIR, SCENES, a_trajectory
 
 from springbeam import Event, with_changes
-from springbeam.pictures import plots, timeline
+from springbeam.pictures import plots
 from springbeam.pictures.drawing import (
-    ENERGIES,
     EVENT_LOOKS,
     NOT_RESOLVED,
     decimated,
     phase_intervals,
     readable_unit,
-    shaded_phases,
 )
 from springbeam.pictures.frames import frames_of, sketches
-from springbeam.pictures.panels import compared, panels
+from springbeam.pictures.panels import panels
 from springbeam.pictures.plots import figure_of, plot_run
-from springbeam.pictures.report.charts import backdrop
 from springbeam.results.directory import PICTURES
 
 OVERVIEW, A, B, C, D, E, F, G = PICTURES.values()
@@ -132,58 +127,12 @@ def test_nothing_written_over_time_is_cut_off_or_lies_on_anything_else(picture, 
     assert_nothing_collides(figure)
 
 
-def test_runs_with_long_names_are_compared_with_keys_that_fit_beside_their_panels():
-    names = [f"results/bumper-of-rubber-with-a-beam-{k}" for k in range(4)]
-    assert_nothing_collides(timeline.draw_compared({name: a_trajectory(events=EVERY_EVENT) for name in names}))
-
-
 def test_the_overview_is_one_page_of_positions_velocities_forces_and_energy():
     figure = figure_of(a_trajectory(events=EVERY_EVENT), "overview")
     assert [ax.get_ylabel().split(" [")[0] for ax in figure.axes] == [
         "position", "velocity", "force", "impulse", "energy"
     ]  # fmt: skip
     assert figure.get_figheight() < 11.7  # A4
-
-
-def test_panels_are_painted_with_all_that_they_say():
-    run = a_trajectory(compliance_force=np.zeros(400))
-    (forces,) = (ax for ax in figure_of(run, "velocities_and_forces").axes if ax.get_ylabel().startswith("force"))
-    labels = {line.get_label() for line in forces.lines if line.get_label()[0] != "_"}
-    assert "contact C, as applied" in labels
-    assert "part λ(Ψ − u)₊ᵖ" not in labels
-    assert {"rest of the spring Ψ", "foundation φ"} <= set(texts(figure_of(run, "positions")))
-    energies = figure_of(run, "gap_and_energy").axes[1]
-    (total,) = [line for line in energies.lines if line.get_label()[0] != "_"]
-    areas = [area for area in energies.collections if area.get_label() in {look.words for look in ENERGIES.values()}]
-    assert (total.get_label(), total.get_linestyle(), len(areas)) == ("total", "--", 5)
-    assert areas[-1].get_paths()[0].vertices[:, 1].max() == pytest.approx(total.get_ydata().max(), rel=1e-12)
-
-
-def test_what_is_compared_is_drawn_in_the_unit_of_its_axis_and_with_what_strikes_it(monkeypatch):
-    """One run is seated, the other struck twice: it has stems, not only a force of zero."""
-    drawn = []
-    monkeypatch.setattr(Axes, "vlines", lambda ax, time, low, high, **_: drawn.append((ax.get_ylabel(), high)))
-    run, zero = a_trajectory(), np.zeros(400)
-    strokes = [Event(t, "stop_impact", 0, 0, 0, 0, 0.0, 0.6, 0.0) for t in (0.1, 0.3)]
-    struck = a_trajectory(events=strokes, foundation_force=zero)
-    figure = timeline.draw_compared({"one": run, "struck": struck})
-    units = {"u_tip": "[mm]", "v_tip": "[mm/s]", "contact_force": "[mN]"}
-    for ax, (column, unit) in zip(figure.axes, units.items(), strict=False):
-        assert ax.get_ylabel().endswith(unit)
-        assert np.abs(ax.lines[0].get_ydata()).max() == pytest.approx(1e3 * np.abs(run[column]).max(), rel=1e-12)
-        assert ax.lines[0].get_xdata()[-1] == run.time[-1]
-    assert [line.get_linestyle() for line in figure.axes[0].lines[:2]] == ["-", "--"]
-    assert [high.tolist() for _, high in drawn] == [[0.6, 0.6]]
-
-
-def test_phases_are_shaded_where_they_hold_and_a_time_axis_begins_with_the_run():
-    late = a_trajectory(time=np.linspace(0.5, 0.6, 400), phase=np.where(np.arange(400) < 100, "tied", "free"))
-    ax = figure_of(late, "positions").axes[0]
-    shaded = [shade.get_paths()[0].get_extents().intervalx.tolist() for shade in ax.collections[:2]]
-    turn, end = late.time[100], 0.6
-    assert shaded == [pytest.approx([0.5, turn]), pytest.approx([turn, end])]
-    assert ax.get_xlim() == (0.5, end)
-    assert shaded_phases(a_trajectory(phase=np.full(400, "free"))) == []
 
 
 def test_a_short_beam_is_drawn_in_the_unit_of_its_axis():
@@ -195,14 +144,6 @@ def test_a_short_beam_is_drawn_in_the_unit_of_its_axis():
     assert (beam.part, beam.x[-1]) == ("beam", pytest.approx(50.0))
 
 
-@pytest.mark.parametrize(("number", "lines"), [(60, True), (61, False)])
-def test_many_events_have_no_lines_through_panels(number, lines):
-    run = a_trajectory(events=[Event(5e-3 * (k + 1), "stop_impact", 0, 0, 0, 0) for k in range(number)])
-    (ax,) = figure_of(run, "positions").axes
-    assert any(isinstance(drawn, LineCollection) for drawn in ax.collections) is lines
-    assert any("opacity" in shape for shape in backdrop(run)) is lines
-
-
 # -- panels: what plots and report draw over time ---------------------------------------------------------------------
 
 
@@ -211,43 +152,8 @@ def panel(name, run):
     return found
 
 
-def levels_in(run):
-    return {curve.name: curve.values[0] for curve in panel("positions", run).curves if curve.name in "Ψφ"}
-
-
 def words_in(found):
     return {curve.look.words for curve in found.curves}
-
-
-def test_a_motion_lost_in_the_other_is_enlarged_and_levels_far_outside_are_left_out():
-    t = a_trajectory().time
-    run, other = (a_trajectory(u_tip=size * np.sin(9.0 * t), y=-1e-2 * np.sin(5.0 * t)) for size in (9.5e-5, 1.05e-4))
-    assert "position [µm]" not in [p.axis for p in panels(other)]  # 2 % is the limit
-    assert [p.axis for p in panels(run)][:3] == ["position [mm]", "position [µm]", "velocity [mm/s]"]
-    assert len(figure_of(run, "positions").axes) == 2
-    assert [p.axis for p in panels(a_trajectory())][:2] == ["position [mm]", "velocity [mm/s]"]
-    assert levels_in(a_trajectory()) == {"Ψ": 0.0, "φ": -0.015}
-    assert levels_in(a_trajectory(with_changes(PAIR, stop={"position": -100.0}))) == {"Ψ": 0.0}
-    for lowest, near in ((1.49, True), (1.51, False), (-2.49, True), (-2.51, False)):  # within 1.5 of a range of 1
-        away = lowest + np.linspace(0.0, 1.0, 400)
-        assert ("Ψ" in levels_in(a_trajectory(u_tip=away, y=away))) is near
-
-
-@pytest.mark.parametrize(
-    ("law", "phase", "force"),
-    [
-        ("compliance", "in contact (u < y)", "of the law λ(y − u)₊ᵖ (1 + χ ṗ)"),
-        ("link", "joined by the link", "of the link λ(y − u) + c(z − v)"),
-        ("tie", "tied (u = y)", "part λ(Ψ − u)₊ᵖ"),
-        ("transmission", "touch (y ≥ Ψ)", "part λ(Ψ − u)₊ᵖ"),
-    ],
-)
-def test_phases_and_forces_have_the_words_of_the_law(law, phase, force):
-    scene = with_changes(PAIR, contact={"law": law, "damping": 0.5 if law in ("compliance", "link") else 0.0})
-    joined = "touch" if law in ("compliance", "transmission") else "tied"
-    run = a_trajectory(scene, phase=np.where(np.arange(400) < 200, joined, "free"))
-    assert [look.words for look, _ in shaded_phases(run)] == [phase, "free"]
-    assert force in words_in(panel("forces", run))
 
 
 def test_energies_are_stacked_to_the_total_unless_one_is_negative():
@@ -263,38 +169,6 @@ def test_energies_are_stacked_to_the_total_unless_one_is_negative():
     assert not any(curve.stacked for curve in lines.curves)
 
 
-def test_loads_are_drawn_by_unit_and_what_the_clamp_does_in_its_own():
-    loads = [{"on": on, "signal": "step"} for on in ("tip", "base", "spring")]
-    run = a_trajectory(with_changes(PAIR, loads=[*loads, {"on": "beam", "at": 0.5}]))
-    assert [words_in(panel(name, run)) for name in ("loads-0", "loads-1")] == [
-        {"load 0, on the tip", "load 2, on the spring", "load 3, on the beam"}, {"load 1, on the base"}
-    ]  # fmt: skip
-    assert (panel("loads-1", run).heading, panel("loads-1", run).axis) == ("Acceleration of the base", "load [mm/s²]")
-    assert [panel(f"clamp-{name}", run).axis for name in ("force", "moment")] == ["force [mN]", "moment [mN·m]"]
-    # Where the beam leans at its start its clamp feels what no mesh settles.
-    assert panel("accelerations", run).curves[0].time[0] == run.time[1]
-
-
-def test_levels_and_gaps_are_those_of_what_is_there():
-    late = a_trajectory(time=np.linspace(0.5, 0.6, 400))
-    assert [curve.time.tolist() for curve in panel("positions", late).curves[2:]] == [[0.5, 0.6]] * 2
-    assert [words_in(panel("gap", a_trajectory(SCENES[has]))) for has in ("all", "no spring")] == [
-        {"u(t, L) − y"}, {"u(t, L) − φ"}
-    ]  # fmt: skip
-    still = {name: np.zeros(400) for name in ("u_tip", "y", "v_tip", "z")}
-    assert [found.name for found in compared({"still": a_trajectory(**still)})][:2] == ["position", "contact force"]
-
-
-@pytest.mark.parametrize(
-    ("least", "limits"), [(1.0 / 29.0, None), (-1.0, None), (1.0 / 31.0, (0.3 / 31.0, 3.0)), (1e-12, (0.3e-8, 3.0))]
-)
-def test_impulses_of_different_sizes_have_a_logarithmic_axis(least, limits):
-    events = [Event(t, "impact", 0, 0, 0, 0, size) for t, size in ((0.1, least), (0.2, 1.0), (0.3, 0.0))]
-    found = panel("impulses", a_trajectory(events=events))
-    assert [curve.values.tolist() for curve in found.curves] == [[least, 1.0]]
-    assert found.logarithmic == (limits and pytest.approx(limits, rel=1e-12))
-
-
 def test_the_residual_is_over_the_largest_energy_where_it_is_not_zero():
     zero, off = np.zeros(400), np.where(np.arange(400) % 2, -6e-9, 0.0)
     run = a_trajectory(e_beam=zero + 2.0, e_spring=zero + 1.0, e_contact=zero, e_total=zero + 3.0, energy_residual=off)
@@ -304,15 +178,6 @@ def test_the_residual_is_over_the_largest_energy_where_it_is_not_zero():
     assert found.logarithmic == pytest.approx((0.6e-9, 6e-9), rel=1e-12)
     least = panel("residual", a_trajectory(energy_residual=1e-300 * run.time)).logarithmic[0]
     assert least == pytest.approx(0.3e-18, rel=1e-12, abs=0.0)
-
-
-def test_the_largest_mean_is_drawn_over_its_window():
-    run = a_trajectory(contact_force=np.where(np.arange(400) == 200, 14.1, 1.0))
-    run.summary |= {"contact_force_max": 9.98, "contact_force_window": 9.9e-3, "contact_force_max_time": 0.3}
-    drawn = panel("forces", run).curves[-1]
-    assert drawn.look.words == "largest mean, over 9.9\u00a0ms"
-    assert drawn.time == pytest.approx([0.3, 0.3099], rel=1e-12)
-    assert drawn.values.tolist() == [9.98, 9.98]
 
 
 # -- thinning -----------------------------------------------------------------------------------------------------

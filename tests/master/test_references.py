@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from exact import coupled, laws
 from exact.alone import clamped_free_frequencies
-from references import dips, integrated_anew
+from references import dips
 from scenes import kinds, soft
 from scipy.integrate import quad
 
@@ -103,63 +103,6 @@ def test_a_damped_contact_lets_go_where_its_ends_part_fast_and_never_pulls():
 
 
 # -- beside scipy ---------------------------------------------------------------------------------------------------
-
-LIFTED = {
-    "equilibrium": 0.01, "mass": 0.1, "external_force": 1.0, "linear_stiffness": 150.0, "cubic_stiffness": 67.0
-}  # fmt: skip
-UNSTABLE = {"linear_stiffness": -3.0, "cubic_stiffness": 2000.0}
-SEATING = {"law": "compliance", "stiffness": 1e3, "exponent": 1.0}
-CASES = {
-    "damped": soft(beam={"alpha_b": 2e-3}, spring={"damping": 0.7}),
-    "overdamped": soft(beam={"alpha_b": 2e-2}, spring={"damping": 5.0}),
-    "seating": soft(
-        beam={"distributed_load": -9.0}, spring={"external_force": -4.0}, stop={"restitution": 0.3}, time={"t_end": 0.5}
-    ),
-    "stiffer": soft(beam={"initial_deflection_slope": 0.02}, spring=LIFTED),
-    "elastic": soft(beam={"initial_deflection_slope": 0.02, "approach": "elastic", "young_modulus": 10.0}),
-    "modes": soft(40, beam={"n_modes": 6, "tip_load_coefficient": -6.0}),
-    "unstable spring": soft(spring=UNSTABLE),
-    "compliance": soft(contact={"law": "compliance", "exponent": 1.5}),
-    "compliance, seating": soft(
-        beam={"alpha_b": 1e-3}, contact=SEATING, spring={"damping": 1.0, "external_force": -5.0},
-        stop={"restitution": 0.3},
-    ),
-    "tie, on a foundation": soft(
-        contact={"law": "tie"}, stop={"restitution": 0.6}, beam={"alpha_b": 1e-4}, spring={"cubic_stiffness": 50.0}
-    ),
-    "tie, seated": linear(
-        contact={"law": "tie"}, stop={"restitution": 0.0}, beam={"alpha_b": 1e-3}, spring={"external_force": -2.0}
-    ),
-    "link, seating": linear(
-        contact={"law": "link", "stiffness": 1e4, "damping": 1.0}, stop={"restitution": 0.3},
-        spring={"external_force": -3.0}, time={"t_end": 0.3},
-    ),
-    "link, damped as its modes": linear(
-        contact={"law": "link", "stiffness": 1e3, "damping": 1.0}, beam={"alpha_b": 1e-3}, stop={"restitution": 0.8}
-    ),
-    "link, damped as its modes, seated": linear(
-        contact={"law": "link", "stiffness": 1e3, "damping": 1.0}, beam={"alpha_b": 1e-3}, stop={"restitution": 0.0},
-        spring={"external_force": -5.0},
-    ),
-    "link, unstable spring": soft(contact={"law": "link"}, spring=UNSTABLE),
-    "stiff link": linear(contact={"law": "link", "stiffness": 1e7}, stop=None),
-    "Hunt and Crossley": linear(
-        contact={"law": "compliance", "exponent": 1.5, "damping": 0.8}, beam={"alpha_b": 1e-3}, spring={"damping": 0.2}
-    ),
-    "Hunt and Crossley, seating": linear(
-        contact={**SEATING, "damping": 2.0}, stop={"restitution": 0.3}, spring={"external_force": -5.0}
-    ),
-    "steel-bumper": load_scene("steel-bumper"),  # damped roots up to 7e7 1/s beside a first mode of 105 rad/s
-    "paper-fig2": load_scene("paper-fig2"),  # κ = 3.6e10, 64 modes
-}  # fmt: skip
-UNTIL = {"stiff link": 0.02, "steel-bumper": 1.9e-3, "paper-fig2": 0.50001}
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_each_phase_is_integrated_as_scipy_does(name, monkeypatch):
-    run = integrated_anew(CASES[name], monkeypatch, UNTIL.get(name, 0.3))
-    assert run.summary["largest_relative_energy_residual"] < 1e-11
-    assert run.summary["counts"]["steps"] < 1000
 
 
 @pytest.mark.parametrize(

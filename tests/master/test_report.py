@@ -17,7 +17,7 @@ from springbeam.pictures.frames import MOST_FRAMES
 from springbeam.pictures.panels import panels
 from springbeam.pictures.report import page
 from springbeam.results.directory import REPORT
-from springbeam.results.trajectory import TOLD, Event
+from springbeam.results.trajectory import TOLD
 from springbeam.scene import scene_from_dict, with_changes
 from springbeam.scene.reading import tomllib
 
@@ -150,23 +150,6 @@ def test_events_are_marked_when_they_happened():
         assert array(curves(found.data)[name]["y"]).tolist() == [np.float32(size)] * len(EVERY_EVENT)
 
 
-def test_a_cascade_of_impacts_is_one_line_that_opens():
-    bounces = [Event(0.1 + 0.01 * i, "stop_impact", 0, 0, 0, 0, 0.0, 0.5**i, 0.25**i) for i in range(5)]
-    events = [Event(0.05, "impact", 0, 0, 0, 0), *bounces, dataclasses.replace(bounces[0], kind="seated")]
-    found = shown(a_trajectory(events=events))
-    assert [len(found.root.find_class(name)) for name in ("fold", "members")] == [1, 1]
-    numbers = found["events"].split("5 × ")[1].split("…")[1].split()
-    assert [float(number) for number in numbers[:2]] == [1.938, 1.332]  # Σ 2⁻ⁱ and Σ 4⁻ⁱ
-
-
-def test_the_page_opens_with_the_scene_the_motion_and_the_results():
-    found = shown(contact_force_max=83.2, contact_force_window=1e-3)
-    assert found.ids[:2] == ["described", "animation"]
-    assert [h2.text_content() for h2 in found.root.xpath("//h2")][:2] == ["Motion", "Results"]
-    assert re.search("peak contact force, mean over 0.001 s.*83.2 N", found["results"])
-    assert "energy of degree 2, macro step 0.00025 s, to 0.6 s" in found["described"]
-
-
 # -- motion -------------------------------------------------------------------------------------------------------
 
 
@@ -180,48 +163,7 @@ def test_frames_are_the_recorded_shapes_with_the_spring_of_the_same_time():
     assert motion["y"] == pytest.approx(run.y[::3], rel=1e-8)
 
 
-def test_a_page_is_small_and_explains_its_words():
-    text = page(a_trajectory(n=20_000, events=EVERY_EVENT))
-    assert len(text) < 2_000_000
-    words = Page(text)["glossary"]
-    assert all(name.replace("_", " ") in words for name in ("tied", "free", "stop_impact", "foundation", "window"))
-    assert "seated" in words
-    assert "touch" not in Page(page(a_trajectory()))["glossary"]
-
-
-def test_a_contact_lost_in_the_motion_is_drawn_once_more_enlarged():
-    t = np.linspace(0.0, 0.6, 400)
-    tip, joined = 0.07 * np.sin(9.0 * t), t > 0.5
-    place = 0.2 * (t - 0.5)
-    scene = with_changes(PAIR, spring={"equilibrium": 0.01}, beam={"initial_deflection_slope": 0.01})
-    run = a_trajectory(scene, u_tip=np.where(joined, place, tip), y=place, phase=np.where(joined, "touch", "free"))
-    found = shown(run).data["charts"]["motion-contact"]
-    (level,) = [curve["y"] for curve in found["data"] if curve["name"] == "rest of the spring Ψ"]
-    assert array(level) == pytest.approx([10.0, 10.0])
-    chart = found["layout"]
-    room = 0.3 * float(np.ptp(place[joined]))
-    assert chart["yaxis"]["range"] == pytest.approx([1e3 * (place[joined][0] - room), 1e3 * (0.02 + room)])
-    assert chart["yaxis"]["title"]["text"] == "height [mm]"
-    whole = a_trajectory(phase=np.full(400, "tied"), y=0.4 * np.sin(9.0 * t), u_tip=0.4 * np.sin(9.0 * t))
-    assert "motion-contact" not in shown(whole).data["motion"]["parts"]
-
-
 # -- what is wrong with them --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("summary", "words"),
-    [
-        ({"status": "done", "warnings": ["take care"]}, "take care"),
-        ({"status": "stopped", "cause": "no convergence", "time": 0.25}, "stopped at t = 0.25 s: no convergence"),
-        ({"status": "running"}, "not finished"),
-    ],
-)
-def test_what_is_wrong_comes_first(summary, words):
-    found = shown(**summary)
-    assert found.ids[0] == "warnings"
-    assert words in found["warnings"]
-    assert "warnings" not in shown().ids
 
 
 def test_every_chart_of_a_run_that_is_not_resolved_carries_the_mark():

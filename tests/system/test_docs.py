@@ -39,7 +39,7 @@ PROGRAMS = {
 NOT_RUN = {
     "./build.sh run": "is what made the FMUs that are tested",
     "./build.sh test": "is what runs this",
-    "./build.sh bench": "measures for minutes; tests/bench/test_bench.py sees that it runs",
+    "./build.sh bench": "measures for minutes",
     "SPRINGBEAM_STEPS=1000000": "takes minutes; test_long.py makes fewer steps",
     ".venv/bin/python docs/accuracy.py": "takes minutes",
     ".venv/bin/python docs/paper_figures.py": "takes minutes",

@@ -1,0 +1,166 @@
+"""Scenes beside what they are compared with: a case of tests/scenes.toml each."""
+
+from pathlib import Path
+
+import bodies
+import numpy as np
+import pytest
+import scenes
+from references import integrated_anew
+
+from springbeam import RunStopped, load_scene, simulate, with_changes
+from springbeam.monolithic import event_driven
+from springbeam.results.contact_times import contact_changes
+from springbeam.scene.reading import tomllib
+
+TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("scenes.toml").read_text(encoding="utf-8"))
+CASES = TABLE["cases"]
+
+
+def scene_of(name):
+    """Return a scene of the table, or one that is shipped."""
+    tables = dict(TABLE["scenes"].get(name, {"of": name}))
+    above = tables.pop("of", None)
+    if above is None:
+        return scenes.scene_from_dict(tables)
+    return with_changes(scene_of(above) if name != above else load_scene(name), **tables)
+
+
+def beside_reference(scene, run_of, bounds, _):
+    """Compare events, motion and energy with those of the event-driven reference."""
+    run = run_of(scene)
+    rows = np.searchsorted(run.time, np.unique(run.time)[:: len(run) // 100 + 1], side="right") - 1
+    exact = event_driven.simulate(scene, sample_times=run.time[rows])
+    starts, among = bounds.get("starts", []), bounds.get("among", [])
+    for found in (scenes.kinds(run), scenes.kinds(exact)):
+        assert found[: len(starts)] == starts
+        assert any(found[k : k + len(among)] == among for k in range(len(found) + 1))
+    first = bounds.get("first") if "times" in bounds else 0
+    pairs = list(zip(run.events[:first], exact.events[:first], strict=True))
+    for ours, theirs in pairs:
+        assert (ours.kind, ours.time) == (theirs.kind, pytest.approx(theirs.time, abs=bounds["times"]))
+        if "velocities" in bounds:
+            assert (ours.z, ours.v_tip) == pytest.approx((theirs.z, theirs.v_tip), abs=bounds["velocities"])
+        assert ours.energy_loss == pytest.approx(theirs.energy_loss, abs=bounds.get("losses", np.inf))
+    given = [sum(pair[k].impulse_foundation for pair in pairs) for k in (0, 1)]
+    assert given[0] == pytest.approx(given[1], rel=bounds.get("stop", np.inf))
+    if "contacts" in bounds:
+        changes = [contact_changes(trajectory, 1e-3) for trajectory in (run, exact)]
+        kinds = [[change.kind for change in found] for found in changes]
+        times = [[change.time for change in found] for found in changes]
+        assert (kinds[0], times[0]) == (kinds[1], pytest.approx(times[1], abs=bounds["contacts"]))
+        assert run.e_impact_loss[-1] == pytest.approx(exact.e_impact_loss[-1], abs=bounds["lost"])
+        for name in ("e_beam", "e_load"):  # also what no place of the tip says
+            assert run[name][0] == pytest.approx(exact[name][0], rel=1e-12, abs=1e-15)
+    rows = rows[run.time[rows] <= bounds.get("until", np.inf)]
+    for column in {"u_tip", "y"} & set(run.columns):
+        there = exact[column][np.searchsorted(exact.time, run.time[rows])]
+        scale = min(np.ptp(exact[column]), np.abs(exact[column]).max())
+        assert np.abs(run[column][rows] - there).max() <= bounds.get("motion", np.inf) * scale, column
+    assert run.summary["max_energy_residual"] < bounds.get("energy", np.inf)
+    assert exact.summary["largest_relative_energy_residual"] < 1e-11
+
+
+def overlap(run):
+    """Return the largest depth of an end below the foundation, of a free tip below the top, or gap of a tie [m]."""
+    free, seated = run.phase == "free", run.phase == "seated"
+    apart = np.where(free, np.maximum(-run.gap, 0.0), np.where(seated, 0.0, np.abs(run.gap)))
+    soft = run.scene.contact.law == "compliance"
+    below = 0.0 if run.scene.stop is None else (run.scene.stop.position - run.y).max()
+    return max(below, 0.0 if soft else apart.max())
+
+
+def within_limits(scene, run_of, _, __):
+    """Bodies neither overlap nor part, by 1e-9 m; energy is kept, to 1e-8."""
+    run = run_of(scene)
+    assert run.time[-1] == scene.time.t_end
+    assert overlap(run) < 1e-9
+    assert run.summary["max_energy_residual"] < 1e-8
+
+
+def beside_scipy(scene, _, bounds, monkeypatch):
+    """The first and the longest step of each phase of the reference are what scipy makes of them."""
+    run = integrated_anew(scene, monkeypatch, bounds.get("until", 0.3))
+    assert run.summary["largest_relative_energy_residual"] < 1e-11
+    assert run.summary["counts"]["steps"] < 1000
+
+
+ORACLES = {"reference": beside_reference, "limits": within_limits, "scipy": beside_scipy}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_scene_is_that_of_its_oracle(name, monkeypatch):
+    case = CASES[name]
+    left_out = dict.fromkeys(case.get("without", []))
+    scene = with_changes(scene_of(case["of"]), **case.get("change", {}), **left_out)
+    run_of = bodies.simulate if case.get("bodies") == "exact" else simulate
+    bounds = {**TABLE["bounds"].get(case.get("within"), {}), **case.get("bounds", {})}
+    ORACLES[case["oracle"]](scene, run_of, bounds, monkeypatch)
+
+
+# -- what a run does where nothing is to be compared with -------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [0.1, 1e-3])
+def test_bouncing_without_end_stops_by_name(monkeypatch, size):
+    """A damped beam on a lossless stop: its rebounds shrink, but never by enough to be the last.
+
+    Also where three of them lie within a macro step: runs like that have gone on for hours.
+    """
+    monkeypatch.setattr("springbeam.run.stepping._MOST_IN_A_ROW", 300)
+    beam = {"density": 672.6, "area": 0.07, "shear_modulus": 53.6, "alpha_b": 1.0, "n_elements": 6}
+    tables = {
+        "time": {"t_end": 1.5},
+        "beam": {**beam, "initial_velocity_slope": -1.0},
+        "stop": {"position": 0.0},
+        "coupling": {"macro_step": size},
+    }
+    with pytest.raises(RunStopped, match=f"chatters: 300 events, each within a macro step of {size:g} s"):
+        simulate(scenes.scene_from_dict(tables))
+
+
+@pytest.mark.parametrize("size", [2e-4, 8e-4])
+def test_impacts_that_die_out_under_a_tie_of_degree_2_end_seated(size):
+    """Each flight is half as long as the one before; the force that reverses the mismatch grows as its inverse.
+
+    Neither may that force hide what presses the spring down, nor may it, fitted on a flight of nanoseconds, be the
+    guess for a macro step: trial steps then went kilometres away, took IDA a million steps, and were halved.
+    """
+    scene = with_changes(load_scene("steel-bumper"), time={"t_end": 0.003}, coupling={"degree": 2, "macro_step": size})
+    run = simulate(scene)
+    assert run.summary["halved_steps"] == 0
+    kinds = [event.kind for event in run.events]
+    bounces = kinds.index("seated") - kinds.index("stop_impact")
+    # A rebound below 1e-8 of the fastest impact is the last, and each is half as fast.
+    assert 10 < bounces <= np.log2(1e8) + 1
+
+
+def test_a_tip_that_is_let_go_does_not_strike_at_once():
+    """It leaves the stop with velocity 0, but for 1e-17 m/s that may point down; the reference has two contacts, each
+    of which ends once."""
+    scene = with_changes(load_scene("beam-on-stop"), time={"t_end": 0.5}, beam={"n_elements": 20})
+    runs = [event_driven.simulate(scene)]
+    for degree, size in ((1, 1e-3), (2, 1e-3), (2, 4e-3)):
+        coupling = {"degree": degree, "macro_step": size}
+        runs.append(simulate(with_changes(scene, coupling=coupling)))
+    for run in runs:
+        kinds = [event.kind for event in run.events if event.kind != "stop_impact"]
+        assert kinds == ["seated", "separation"] * 2, run.scene.coupling
+
+
+def test_a_force_too_large_for_a_double_halves_the_step():
+    """Two masses at 10 km/s, C = λ p¹⁰⁰: over a whole step the tip would go 10 km deep. They leave as after any elastic
+    impact, (m1 − m2)/(m1 + m2) V and 2 m1/(m1 + m2) V."""
+    beam, spring = ({"element": "point_mass", "mass": mass} for mass in (1.0, 2.0))
+    scene = with_changes(
+        load_scene("soft"),
+        time={"t_end": 6.0},
+        beam={**beam, "displacement": 1.0, "velocity": -1e4},
+        spring=spring,
+        stop=None,
+        contact={"law": "compliance", "stiffness": 5e-193, "exponent": 100.0},
+        coupling={"macro_step": 1.0},
+    )
+    run = simulate(scene)
+    assert run.summary["halved_steps"] > 0
+    assert (run.v_tip[-1], run.z[-1]) == pytest.approx((1e4 / 3.0, -2e4 / 3.0), rel=1e-10)
