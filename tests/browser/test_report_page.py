@@ -151,33 +151,12 @@ def test_bodies_are_drawn_where_the_run_has_them(soft):
         assert str(soft.trajectory.phase[row]) in reading
 
 
-def test_play_goes_on_and_pauses(soft):
-    button = soft.page.locator("#play")
-    button.click()
-    soft.page.wait_for_function("Number(document.getElementById('slider').value) > 3")
-    button.click()
-    assert button.get_attribute("aria-label") == "Play"
-    paused = soft.frame()
-    soft.page.wait_for_timeout(300)
-    assert soft.frame() == paused
-
-
 def test_play_ends_with_the_run(soft):
     last = len(soft.data["motion"]["time"]) - 1
     soft.set_slider(last - 3)
     soft.page.locator("#play").click()
     soft.page.wait_for_function(f"document.getElementById('slider').value === '{last}'")
     soft.page.wait_for_function("document.getElementById('play').getAttribute('aria-label') === 'Play'")
-
-
-def test_arrow_keys_and_events_set_the_time(soft):
-    soft.page.locator("#slider").focus()
-    soft.page.keyboard.press("ArrowRight")
-    assert soft.frame() == 1
-    event = soft.trajectory.events[2]
-    soft.page.locator(".jump").nth(2).click()
-    times = np.array(soft.data["motion"]["time"])
-    assert soft.frame() == int(np.searchsorted(times, event.time, side="right")) - 1
 
 
 def test_a_click_into_a_chart_sets_the_time_of_all(soft):

@@ -11,7 +11,7 @@ from PIL import Image
 from runs import SCENES, a_trajectory
 
 from springbeam.pictures import animation
-from springbeam.pictures.animation import AnimationError, animate
+from springbeam.pictures.animation import animate
 from springbeam.pictures.drawing import NOT_RESOLVED
 from springbeam.pictures.frames import frames_of
 
@@ -54,20 +54,6 @@ def test_a_gif_plays_as_long_as_asked(tmp_path, recwarn, scene):
     assert sum(durations) == 500
     assert all(np.any(a != b) for a, b in pairwise(images))
     assert [str(warning.message) for warning in recwarn] == []
-
-
-@pytest.mark.parametrize(
-    ("ffmpeg", "message"),
-    [
-        ("/no/such/ffmpeg", r"needs ffmpeg.*apt-get install ffmpeg.*or write a .gif"),
-        ("false", "ffmpeg could not write it"),
-    ],
-)
-def test_a_missing_or_failing_ffmpeg_is_told_and_leaves_nothing(tmp_path, monkeypatch, ffmpeg, message):
-    monkeypatch.setitem(matplotlib.rcParams, "animation.ffmpeg_path", ffmpeg)
-    with pytest.raises(AnimationError, match=message):
-        animate(a_trajectory(), tmp_path / "run.mp4", seconds=0.2)
-    assert list(tmp_path.iterdir()) == []
 
 
 # -- the command --------------------------------------------------------------------------------------------------

@@ -1,29 +1,23 @@
 """The command: exit codes, what it prints and where, and what an interruption leaves."""
 
 import errno
-import io
 import json
 import os
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from bodies import simulate
 from commands import command, printed
 from matplotlib.figure import Figure
-from rich.console import Console
 from runs import block
 
 import springbeam.run.runner
-from springbeam import Event, RunStopped, cli, load_scene, with_changes
-from springbeam.cli import common
+from springbeam import Event, RunStopped, load_scene, with_changes
 from springbeam.cli.look import results_of
 from springbeam.results.directory import PICTURES
 from springbeam.results.files import load_trajectory
-from springbeam.results.steps import STEP
 from springbeam.results.totals import totals
 
 SUMMARY = {"status": "done", "macro_steps": 31, "wall_time": 0.25, "max_energy_residual": 3e-14, "warnings": []}
@@ -97,34 +91,6 @@ def test_a_picture_that_cannot_be_written_ends_with_3_and_loses_nothing(here, mo
     assert len(load_trajectory(here / "results" / "soft")) == 31
 
 
-def test_report_fits_80_columns_with_whole_numbers_and_warnings_as_they_are(here, monkeypatch):
-    """Strikes in succession are one line with their sums; what rounding leaves of a zero is 0."""
-
-    def many(scene, recorder, progress=None):
-        strike = Event(123.456789, "stop_impact", -1.2345e-5, -1.234e-5, 0.1, 0.1, -1.234e-7, 1e-9, 1e-9)
-        strikes = [replace(strike, time=strike.time + i) for i in range(40)]
-        events = [Event(0.2, "release", -1.355e-20, 0.25, 0.0, 0.25), *strikes]
-        recorder.keep(np.empty(0, STEP), events, np.empty((0, 64)))
-        fake_run(scene, recorder)
-        recorder.finish({**SUMMARY, "warnings": ["[beam] is [bold]coarse[/bold]"]})
-
-    monkeypatch.setattr(springbeam.run.runner, "run", many)
-    shown = printed("run", "soft", "--no-plots")
-    lines = shown.splitlines()
-    assert max(map(len, lines)) <= 80
-    assert lines[3].split() == ["release", "0.20000000", "0", "0.25"]
-    assert " ".join(lines[4].split()) == "stop_impact 123.45678900 -1.234e-05 -1.234e-05 -1.23e-07 1e-09 1e-09"
-    assert " ".join(lines[5].split()) == "+39, until 162.45678900 -4.81e-06 3.9e-08 3.9e-08"  # sums of the others
-    assert "events    40 stop_impact, 1 release, 1 impact" in shown
-    assert "warning   [beam] is [bold]coarse[/bold]" in shown
-
-
-def test_what_can_hardly_be_meant_is_told_before_the_run(here):
-    arguments = ["run", "steel-bumper", "--set", "beam.density=7.85", "--no-plots"]
-    assert command(*arguments).stderr.startswith("warning: [beam] density = 7.85: in kg/m³, no solid has it")
-    assert command(*arguments, "--quiet").stderr == ""
-
-
 # -- stopped early: exit code 3, what was computed is there -------------------------------------------------------
 
 
@@ -148,14 +114,6 @@ def test_a_run_that_stops_early(here, unpainted, monkeypatch, error, fragments):
     assert (here / "results" / "soft" / PICTURES["overview"]).exists()
 
 
-def test_an_unforeseen_error_is_not_hidden(here, monkeypatch):
-    replace_run(monkeypatch, ZeroDivisionError("a bug"))
-    result = command("run", "soft")
-    assert result.exit_code == 1
-    assert isinstance(result.exception, ZeroDivisionError)
-    assert len(load_trajectory(here / "results" / "soft")) == 31
-
-
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
 @pytest.mark.parametrize(
     ("arguments", "unbuffered"), [(["--version"], "1"), (["scenes"], ""), (["run", "soft", "--no-plots"], "")]
@@ -169,21 +127,6 @@ def test_an_output_without_room_is_one_error(here, fmu_folder, arguments, unbuff
     assert done.stderr == "error: standard output: No space left on device\n"
     if arguments[0] == "run":
         assert load_trajectory(here / "results" / "soft").summary["status"] == "done"
-
-
-# -- progress -----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("terminal", [True, False])
-@pytest.mark.parametrize("options", [[], ["--quiet"]])
-def test_progress_is_for_terminals(here, monkeypatch, terminal, options):
-    shown = io.StringIO()
-    bar = Console(file=shown, force_terminal=terminal, width=80)
-    monkeypatch.setattr(common, "Console", lambda stderr=False, **options: bar if stderr else Console(**options))
-    monkeypatch.setattr(cli.run, "_REFRESH_SECONDS", 0.0)
-    printed("run", "soft", "--no-plots", *options)
-    for fragment in ("t = 0.6/0.6 s", "free", "steps/s", "100%"):
-        assert (fragment in shown.getvalue()) is (terminal and not options)
 
 
 # -- the other commands -------------------------------------------------------------------------------------------

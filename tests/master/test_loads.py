@@ -110,20 +110,6 @@ def test_a_chirp_turns_from_one_frequency_to_the_other():
     assert load.value([0.0099, 0.0501]) == pytest.approx([0.0, 0.0])
 
 
-@pytest.mark.parametrize(
-    ("keys", "why"),
-    [
-        ({"signal": "chirp", "frequency": 3.0, "duration": 1.0}, "frequency_end: missing"),
-        ({"signal": "trapezoid", "duration": 1.0}, "rise: missing"),
-        ({"signal": "trapezoid", "duration": 1.0, "rise": 0.6}, "must be at most half"),
-        ({"signal": "sawtooth", "duration": 1.0, "rise": 0.1}, "plays no part"),
-    ],
-)
-def test_a_signal_with_wrong_keys_is_refused(keys, why):
-    with pytest.raises(SceneError, match=rf"^scene: \[loads\.0\] .*{why}"):
-        with_changes(load_scene("soft"), loads=[{"on": "tip", **keys}])
-
-
 def test_steps_end_where_a_load_jumps_or_bends_and_none_is_a_sliver():
     """Kinks that differ by rounding give one row, all others theirs to the last bit; no step is shorter than H/4."""
     scene = with_changes(soft("step", "linear", "burst", t_end=0.06, macro_step=1e-3), stop=None)
@@ -176,13 +162,6 @@ def test_loads_are_changed_by_their_number_and_tables_lie_beside_the_scene(tmp_p
 
 
 LEAVE_OUT = "leave the line out, or begin it with #"
-
-
-@pytest.mark.parametrize("text", ["time [ms];force (kN)\n0;0.001\n20;0.003\n", "# of a scope\n0,1\n\n0.02\t,3\n"])
-def test_a_table_may_name_its_units_and_be_parted_by_semicolons(text):
-    Path("record.csv").write_text(text)
-    load = soft("linear").loads[0]
-    assert load.value([load.start + 0.005, load.start + 0.01]) == pytest.approx([1.5, 2.0], rel=1e-12)
 
 
 def test_a_table_ends_with_its_last_line_and_a_ramp_stays():

@@ -10,7 +10,7 @@ from bodies import DuffingBody, Upper
 from springbeam import SceneError, load_scene, with_changes
 from springbeam.bodies.gate import admit, refusals
 from springbeam.bodies.probe import Bench, _try_slopes
-from springbeam.bodies.protocol import Abilities, Body, StepRefused
+from springbeam.bodies.protocol import Abilities, Body
 
 SIZES = [1.0, 0.1, 0.01]
 
@@ -29,30 +29,10 @@ class SizedBench(Bench):
 BENCH = SizedBench()
 
 
-def refusing(below, value):
-    """What is tried of a body that refuses shorter steps."""
-
-    def tried(size):
-        if size < below:
-            raise StepRefused(f"{size} s is too short")
-        return value(size)
-
-    return tried
-
-
 @pytest.mark.parametrize(("short", "wrong"), [(set(), set()), ({"a", "c"}, {"a"}), ({"b"}, set())])
 def test_what_holds_at_one_size_is_right(short, wrong):
     found = dict(zip(SIZES, ({"a", "b"}, {"a", "c"}, short), strict=True))
     assert BENCH.wrong(found.__getitem__) == wrong
-
-
-def test_a_size_that_is_refused_is_no_verdict_on_another():
-    bench = SizedBench()
-    assert bench.wrong(refusing(0.1, lambda _: {"a"})) == {"a"}
-    assert bench.renewed == 1  # after 0.01
-    assert bench.extrapolated(refusing(0.5, lambda h: 3.0 + h)) == pytest.approx(3.0, rel=1e-13)
-    with pytest.raises(StepRefused, match=r"1\.0 s is too short"):
-        bench.wrong(refusing(2.0, lambda _: set()))
 
 
 def test_an_inertia_is_that_of_no_step():

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pyarrow import parquet
-from runs import PAIR, SCENES, a_trajectory, block
+from runs import PAIR, SCENES, block
 
 from springbeam.results import recording
 from springbeam.results.columns import columns, first_not_finite
@@ -29,7 +29,7 @@ from springbeam.results.directory import (
 from springbeam.results.files import export, load_summary, load_trajectory, read_run
 from springbeam.results.recording import FileRecorder, MemoryRecorder
 from springbeam.results.steps import PHASE_NAMES, STEP_COLUMNS
-from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, TOLD, Event, columns_of
+from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, TOLD, Event
 from springbeam.run.log import Log
 from springbeam.run.outcome import RunStopped
 from springbeam.scene import SceneError, with_changes
@@ -109,20 +109,6 @@ def test_columns_are_what_the_page_says_of_each_record(law):
         assert found["phase"][i] == ("free", "tied", "touch", "seated", "seated", "seated")[int(r["phase"])]
         for name in set(found) - {"phase"}:
             assert found[name][i] == pytest.approx(expected[name], rel=1e-13, abs=1e-14), (name, i)
-
-
-def test_columns_have_the_units_of_what_they_are():
-    loads = [{"on": "beam"}, {"on": "beam", "at": 0.5}, {"on": "tip"}, {"on": "spring"}, {"on": "base"}]
-    section = {"area": None, "second_moment_of_area": None, "width": 0.1, "height": 0.2}
-    scene = with_changes(PAIR, beam={"approach": "elastic", **section}, loads=loads)
-    columns_by_unit = {
-        "s": "time", "": "phase", "m": "u_tip y gap", "m/s": "v_tip z", "Pa": "bending_stress",
-        "N": "contact_force compliance_force tie_reaction foundation_force clamp_force "
-        "load_1 load_2 load_3", "N/m": "load_0", "m/s²": "load_4 a_tip a_y", "N·m": "clamp_moment",
-        "J": "e_beam e_spring e_contact e_dissipated e_impact_loss e_load e_total energy_residual",
-    }  # fmt: skip
-    expected = {name: unit for unit, names in columns_by_unit.items() for name in names.split()}
-    assert columns_of(scene) == expected
 
 
 def test_normal_compliance_above_another_body_counts_from_where_that_has_started():
@@ -207,22 +193,6 @@ def test_files_are_plain_csv_and_json(tmp_path):
     assert summary["scene"]["spring"]["cubic_stiffness"] == -0.2
     assert sorted(p.name for p in (tmp_path / "run").iterdir()) == WRITTEN
     assert (tmp_path / "run" / "steps.bin").read_bytes() == steps.tobytes()
-
-
-def test_summaries_take_numpy_and_name_what_json_has_no_number_for(tmp_path):
-    given = {
-        "count": (np.int64(3), 3),
-        "size": (np.float64(0.5), 0.5),
-        "flag": (np.bool_(True), True),
-        "list": (np.array([0.0, math.nan]), [0.0, "NaN"]),
-        "path": (tmp_path, str(tmp_path)),
-        "nested": ({"worst": -math.inf}, {"worst": "-Infinity"}),
-        "nothing": (None, None),
-    }
-    FileRecorder(PAIR, RunDirectory.create(tmp_path)).finish({name: value for name, (value, _) in given.items()})
-    summary = load_summary(tmp_path)
-    del summary["scene"], summary["files"]
-    assert summary == {name: read for name, (_, read) in given.items()}
 
 
 # -- killed -------------------------------------------------------------------------------------------------------
@@ -364,26 +334,6 @@ def test_damage_of_a_run_that_goes_on_is_named_by_file(tmp_path, name, damage, m
     recorder.keep(*block())
     recorder.close()
     damaged(tmp_path / "run" / name, damage, message)
-
-
-@pytest.mark.parametrize(
-    ("damage", "message"),
-    [
-        (swapped(b"\n0.0,", b"\n0.0.0,"), r"trajectory\.csv: .*row"),
-        (swapped(b"\n0.0,", b"\n0.0,0.5,"), r"csv: after the header: .* row 1"),
-        (swapped(b"\n0.0,", b"\nnan,"), r"trajectory\.csv: time .* not finite"),
-        (lambda content: b"", r"trajectory\.csv: empty"),
-        (swapped(b"time,", b"t,"), r"trajectory\.csv: line 1: no column time"),
-        (swapped(b"\n0.0", b"\n0.\xf1"), r"trajectory\.csv: .*row"),
-        (swapped(b",free", b",freed"), r"trajectory\.csv: phase = freed: no phase; phases are"),
-    ],
-)
-def test_damage_of_the_rows_of_a_reference_is_named(tmp_path, damage, message):
-    a_trajectory().save(tmp_path / "run")
-    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
-    del summary["files"]
-    (tmp_path / "run" / "summary.json").write_text(json.dumps(summary))
-    damaged(tmp_path / "run" / "trajectory.csv", damage, message)
 
 
 def damaged(path, damage, message):

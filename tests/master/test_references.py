@@ -105,20 +105,6 @@ def test_a_damped_contact_lets_go_where_its_ends_part_fast_and_never_pulls():
 # -- beside scipy ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("changes", "arguments", "message"),
-    [
-        ({"beam": {"initial_deflection_slope": -0.1}}, {}, "below"),
-        ({"beam": {"initial_deflection_slope": 0.1, "initial_velocity_slope": 0.0}}, {}, "never"),
-        ({}, {"sample_times": []}, "no row lies between the start of the run, 0 s, and its end, 0.6 s"),
-        ({}, {"sample_times": [0.3], "t_end": 0.1}, "its end, 0.1 s"),
-    ],
-)
-def test_the_reference_refuses_what_it_does_not_define(changes, arguments, message):
-    with pytest.raises(ValueError, match=message):
-        event_driven.simulate(soft(**changes), **arguments)
-
-
 def test_a_spring_that_runs_away_is_a_failure_of_the_reference():
     """½ z² = 12.5 J, the barrier is k1²/4|k2| = 11.25 J high."""
     scene = with_changes(soft(), beam=None, stop=None, time={"t_end": 20.0})

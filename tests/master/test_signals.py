@@ -7,10 +7,10 @@ import pytest
 from runs import a_trajectory
 from scipy.integrate import quad
 
-from springbeam.scene import Load, SceneError
+from springbeam.scene import Load
 from springbeam.signals.curves import signal
 from springbeam.signals.driven import repeating, response
-from springbeam.signals.spectra import power_spectrum, shock_spectrum, spectra
+from springbeam.signals.spectra import shock_spectrum
 
 # -- columns and functions ------------------------------------------------------------------------------------------
 
@@ -36,26 +36,6 @@ def test_a_signal_is_a_column_or_a_function_found_in_the_directory_of_the_comman
     run = a_trajectory()
     assert np.array_equal(signal(run, "u_tip"), run.u_tip)
     assert np.array_equal(signal(run, "functions_of_mine:distance"), np.hypot(run.u_tip, run.y))
-
-
-@pytest.mark.parametrize(
-    ("text", "why"),
-    [
-        ("speed", "speed: is unknown; allowed: time, u_tip"),
-        ("a_tip/g", "a_tip/g: is unknown; .*or your own, module:function"),
-        ("phase", "phase: is unknown"),
-        ("functions_of_mine:highest", "gives no number for each of the 400 rows"),
-        ("functions_of_mine:complex", "gives no number for each of the 400 rows"),
-        ("functions_of_mine:infinite", "is not finite at t = 0.0 s"),
-        ("functions_of_mine:absent", "functions_of_mine:absent: KeyError: .*speed"),
-        ("functions_of_mine:CONSTANT", "is a float, not a function"),
-        ("nothing.here:f", "nothing.here:f: ModuleNotFoundError: No module named 'nothing'"),
-        ("math:nothing", "math:nothing: AttributeError"),
-    ],
-)
-def test_what_is_no_signal_is_refused_with_the_reason(mine, text, why):
-    with pytest.raises(SceneError, match=why):
-        signal(a_trajectory(), text)
 
 
 @pytest.mark.parametrize(("count", "found"), [(31, (6, 3)), (30, None)])
@@ -98,13 +78,6 @@ def test_turns_of_a_chirp_between_two_rows_have_no_response(rows):
     time = np.append(np.linspace(0.0, 0.3, rows), 1.0)  # from 0.3 s on it turns 33 times
     found = response(0, chirp, time, np.sin(time))
     assert len(found.frequency) == len(found.amplitude) == (13 if rows == 4001 else 0)
-
-
-def test_spectra_that_cannot_be_are_refused():
-    with pytest.raises(SceneError, match="the run left no steps"):
-        spectra(a_trajectory())
-    with pytest.raises(SceneError, match=r"u_tip: 1 samples; there must be from 2 to 4,000,000"):
-        power_spectrum(run := a_trajectory(), "u_tip", since=run.time[-2] + 1e-9)
 
 
 # -- shock response spectra ---------------------------------------------------------------------------------------
@@ -169,9 +142,3 @@ def test_a_base_that_moves_on_steadily_is_no_shock():
     """Only its changes of velocity are: before the first sample and after the last it goes on as there."""
     steady = shock_spectrum(np.full(100, 7.0), 1e-3, np.array([20.0]))
     assert steady.maximax == pytest.approx(0.0, abs=1e-9)
-
-
-@pytest.mark.parametrize(("frequency", "quality"), [(0.0, 10.0), (6e5, 10.0), (100.0, 0.5), (100.0, np.inf)])
-def test_what_has_no_spectrum_is_refused(frequency, quality):
-    with pytest.raises(SceneError):
-        shock_spectrum(np.zeros(10), 1e-6, np.array([frequency]), quality)

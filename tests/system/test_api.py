@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -14,7 +13,7 @@ from runs import a_trajectory
 
 import springbeam
 from springbeam import RunStopped, SceneError, Simulation, load_scene, simulate, with_changes
-from springbeam.scene import ArgumentError, scene_from_dict
+from springbeam.scene import scene_from_dict
 from springbeam.scene.statics import SHAPE_POINTS
 
 SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2}, coupling={"macro_step": 1e-3, "degree": 2})
@@ -76,34 +75,6 @@ def test_to_pandas_and_xarray(run):
     assert np.array_equal(dataset["shape_time"].values, run.shapes[0])
     longer = a_trajectory(with_changes(run.scene, beam={"length": 2.0}))
     assert np.array_equal(longer.to_xarray()["x"].values, 2.0 * SHAPE_POINTS)
-
-
-def test_without_the_extra_the_error_names_it(run, monkeypatch):
-    def missing(name):
-        raise ModuleNotFoundError(f"No module named {name!r}")
-
-    monkeypatch.setattr("springbeam.results.trajectory.import_module", missing)
-    for hand_on in (run.to_pandas, run.to_xarray):
-        with pytest.raises(ImportError, match=r"the extra 'data' brings it: pip install -e '\.\[data\]'"):
-            hand_on()
-
-
-def test_pictures_of_a_run(run):
-    figure = run.plot()
-    assert [ax.get_ylabel() != "" for ax in figure.axes]
-    assert len(run.plot("velocities_and_forces").axes) >= 2
-    with pytest.raises(ValueError, match=r"no picture 'colours'; there are shapes_after_contact, .*gap_and_energy"):
-        run.plot("colours")
-    alone = simulate(with_changes(SOFT, beam=None, stop=None, time={"t_end": 0.01}))
-    with pytest.raises(ValueError, match="nothing to show of 'shapes_later'"):
-        alone.plot("shapes_later")
-
-
-def test_a_run_shows_itself(run):
-    assert f"{len(run)} rows, t = 0 … 0.2 s, 3 events, done" in repr(run)
-    shown = replace(run, scene=run.scene.model_copy(update={"title": "<b>"}))._repr_html_()
-    assert "&lt;b&gt;" in shown
-    assert f"<td>{run.summary['contact_impulse']:.5g} N·s</td>" in shown
 
 
 # -- bodies of one's own --------------------------------------------------------------------------------------------
@@ -237,20 +208,6 @@ def test_numbers_of_numpy_are_numbers():
     assert with_changes(load_scene("soft"), loads=[shaped]).loads[0].shape == (1.0, -0.5)
     with pytest.raises(SceneError, match=r"n_elements = 7\.5: must be a whole number"):
         with_changes(load_scene("soft"), beam={"n_elements": np.float64(7.5)})
-
-
-def test_a_column_that_is_not_there_is_named_beside_those_that_are(run):
-    with pytest.raises(KeyError, match=r"yy: no column; did you mean y\? there are time, "):
-        run["yy"]
-
-
-def test_an_error_names_arguments_in_python_and_options_on_the_command_line():
-    error = ArgumentError("--vary spring.mass: takes --samples, not 1--2")
-    assert (str(error), error.typed) == (
-        "vary spring.mass: takes samples, not 1--2", "--vary spring.mass: takes --samples, not 1--2",
-    )  # fmt: skip
-    with pytest.raises(SceneError, match=r"^overrides beam: must be TABLE"):
-        load_scene("soft", ["beam"])
 
 
 def test_a_script_that_asks_for_processes_outside_of_its_guard_is_refused(tmp_path):

@@ -10,9 +10,9 @@ import pytest
 from commands import printed
 from scenes import scene_from_dict
 
-from springbeam import SceneError, load_scene, simulate, with_changes
+from springbeam import load_scene, simulate, with_changes
 from springbeam.signals.driven import poincare, responses, settled
-from springbeam.signals.spectra import power_spectrum, sampled, shock_of_run, shock_spectrum, spectra
+from springbeam.signals.spectra import power_spectrum, shock_of_run, shock_spectrum, spectra
 from springbeam.studies.metrics import METRICS
 from springbeam.studies.study import troubles
 from springbeam.studies.sweep import Sweep
@@ -96,18 +96,6 @@ def test_bouncing_has_no_end_where_the_run_ends_apart():
 
 def spread(run):
     return run.y.max() - run.y.min()
-
-
-def highest_in_space(run):
-    return np.abs(run["a_y"] + run["load_0"]).max()
-
-
-def tip_in_g(run):
-    return run["a_tip"] / 9.80665
-
-
-def twice(run):
-    return 2.0 * run.y
 
 
 @pytest.fixture
@@ -200,15 +188,6 @@ def test_the_power_of_a_settled_oscillator_is_at_its_drive(driven):
     late = driven.at(np.linspace(begin, driven.time[-1], 5000))["y"]
     assert found.density.sum() * found.frequency[1] == pytest.approx(np.var(late), rel=0.02)
     assert tail.since < begin
-
-
-def test_a_run_is_sampled_from_its_first_to_its_last_instant(driven):
-    end = float(driven.time[-1])
-    times, values = sampled(driven, "y", step=end / 10.0)
-    assert times == pytest.approx(np.linspace(0.0, end, 11))
-    assert values[[0, -1]] == pytest.approx(driven.y[[0, -1]])
-    with pytest.raises(SceneError, match="the run ends at"):
-        sampled(driven, "y", since=end)
 
 
 def test_the_shock_of_a_stiff_mount_is_that_of_its_base():

@@ -14,9 +14,8 @@ from runs import a_trajectory
 
 from springbeam.results.trajectory import Event, EventKind
 from springbeam.run.runner import simulate
-from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
+from springbeam.scene import load_scene, scene_from_dict, with_changes
 from springbeam.studies import picture, study, sweep
-from springbeam.studies.converge import converge
 from springbeam.studies.design import design, parse_axis, with_keys
 from springbeam.studies.metrics import METRICS as METRICS_THERE_ARE
 from springbeam.studies.picture import Scale
@@ -129,19 +128,6 @@ def test_any_number_of_axes_is_drawn():
     assert panels[2][1].get_title().strip() == "y, c = 2"
 
 
-@pytest.mark.filterwarnings("error:constrained_layout not applied")  # it was not: of a mark for failures without any
-def test_samples_of_three_axes_are_drawn_over_each():
-    rows = [{"a": 1.0 * k, "b": -1.0 * k, "c": k * k, "y": float(k)} for k in range(5)]
-    panels = [ax for ax in picture.multiples(rows, [Scale(n, n) for n in "abc"], {"y": "y"}, "").axes if ax.get_title()]
-    assert [ax.lines[0].get_xdata().tolist() for ax in panels] == [
-        [0, 1, 2, 3, 4],
-        [-4, -3, -2, -1, 0],
-        [0, 1, 4, 9, 16],
-    ]
-    assert {ax.lines[0].get_linestyle() for ax in panels} == {"None"}  # neighbours on one axis differ in the others
-    assert drawn(1)[0].lines[0].get_linestyle() == "-"
-
-
 def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_doubled_period(tmp_path):
     """A damped oscillator: A sin(2πft) at phase 0 is −A sin φ, its peak A; the bumper doubles the period at 45 Hz."""
     drive = {"on": "spring", "signal": "harmonic", "frequency": 2.0, "amplitude": 3.0, "start": 0.05}
@@ -166,24 +152,6 @@ def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_dou
     dots = found.pictures["sweep"]().axes[0].lines[0]
     assert dots.get_linestyle() == "None"
     assert dots.get_ydata().tolist() == [x for points in columns["stroboscopic"] for x in points]
-
-
-def test_several_numbers_of_a_run_are_for_sweeps_and_none_of_a_run_without_a_drive():
-    with pytest.raises(SceneError, match="stroboscopic: is several numbers"):
-        converge(load_scene("vibro-impact"), metric=("stroboscopic",))
-    assert METRICS_THERE_ARE["stroboscopic"](simulate(small())) is None
-
-
-def test_a_missing_cluster_is_bad_input(tmp_path, monkeypatch):
-    import distributed
-
-    client = distributed.Client
-    monkeypatch.setattr(distributed, "Client", lambda address, timeout: client(address, timeout=0.02 * timeout))
-    away = ["--scheduler", "127.0.0.1:1", "--out", tmp_path / "out"]
-    result = command("sweep", "duffing", "--vary", "spring.mass=1,2", *away)
-    assert result.exit_code == 2
-    assert "--scheduler 127.0.0.1:1: cannot be reached" in result.stderr
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_cluster_with_another_springbeam_is_bad_input(tmp_path, monkeypatch):
