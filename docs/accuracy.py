@@ -1,9 +1,9 @@
-"""Pictures and tables of docs/accuracy.md:  .venv/bin/python docs/accuracy.py [STUDY]…   (all: some ten minutes)
+"""Pictures and tables of docs/measured.md:  .venv/bin/python docs/accuracy.py [STUDY]…   (all: some ten minutes)
 
 The studies are those of `springbeam tradeoff`, and scipy's solvers on the same problem (tests/bench/rivals.py), one
 after the other, timed in processor time, of which what else runs on
 the machine takes none (with OMP_NUM_THREADS=1). Pictures go to docs/images/tradeoff-STUDY.png,
-tables into docs/accuracy.md, between the lines that name the study.
+tables into docs/measured.md, between the lines that name the study.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def main(names: list[str]) -> None:
         notes = [f"* {note}" for note in remarks]
         theirs = list(rivals.rows(study.scene, study.reference, study.times))
         lines = [*choices(rows, theirs), "", *side_by_side(rows, study.scene), *([""] if notes else []), *notes]
-        write_section("accuracy.md", name, lines)
+        write_section("measured.md", name, lines)
         print(f"{name}, up to t = {study.scene.time.t_end:.6g} s", *lines, "", sep="\n", flush=True)
 
 

@@ -1,6 +1,6 @@
 """Errors in the macro step on `soft`, before any event and through three:  .venv/bin/python docs/orders.py   (a minute)
 
-Writes the second table and the picture of docs/measured.md, "Orders".
+Writes two tables and the picture of docs/measured.md, "Orders".
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pages import IMAGES, shrink, table, write_section  # beside this script
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
 
-SCHEMES = (("energy", 0), ("energy", 1), ("energy", 2))
+DEGREES = (0, 1, 2)
 STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
 #: Ends of the phases are events; so far from them rows of all runs are of the same phase [s].
 PHASES = {
@@ -28,20 +28,20 @@ APART = 5e-3
 ROUNDING = 1e-13, 1e-10
 
 
-def measured() -> dict[tuple[str, int], np.ndarray]:
+def measured() -> dict[int, np.ndarray]:
     """Return the largest errors of y [m] and v_tip [m/s], shape (steps, phases, 2)."""
     soft = with_changes(load_scene("soft"), time={"t_end": 0.32})
-    errors: dict[tuple[str, int], np.ndarray] = {}
-    for scheme, degree in SCHEMES:
+    errors: dict[int, np.ndarray] = {}
+    for degree in DEGREES:
         found = []
         for H in STEPS:
-            run = simulate(with_changes(soft, coupling={"scheme": scheme, "degree": degree, "macro_step": H}))
+            run = simulate(with_changes(soft, coupling={"degree": degree, "macro_step": H}))
             reference = event_driven.simulate(soft, sample_times=run.time)
             at = np.searchsorted(reference.time, run.time)
             off = np.abs([run.y - reference.y[at], run.v_tip - reference.v_tip[at]])
             inside = [(run.time > a + APART) & (run.time < b - APART) for a, b in PHASES.values()]
             found.append([off[:, rows].max(axis=1) for rows in inside])
-        errors[scheme, degree] = np.array(found)
+        errors[degree] = np.array(found)
     return errors
 
 
@@ -54,20 +54,31 @@ def orders(errors: np.ndarray) -> str:
     return ", ".join(means)
 
 
-def rows(errors: dict[tuple[str, int], np.ndarray]) -> list[list[str]]:
-    """Return orders phase by phase, those before any event left out."""
-    return [
-        [f"`{scheme}` {degree}", *(orders(values[:, k]) for k in range(1, len(PHASES)))]
-        for (scheme, degree), values in errors.items()
-    ]
+def rows(errors: dict[int, np.ndarray]) -> list[list[str]]:
+    """Return orders, phase by phase."""
+    return [[str(degree), *(orders(values[:, k]) for k in range(len(PHASES)))] for degree, values in errors.items()]
 
 
-def picture(errors: dict[tuple[str, int], np.ndarray]) -> None:
+def late() -> list[list[str]]:
+    """Return errors of the times of the first three events after the start [s], and energy residuals."""
+    soft = with_changes(load_scene("soft"), time={"t_end": 0.28})
+    exact = event_driven.simulate(soft)
+    found = []
+    for degree in DEGREES:
+        for H in (1e-3, 2.5e-4):
+            run = simulate(with_changes(soft, coupling={"degree": degree, "macro_step": H}))
+            pairs = zip(run.events[1:4], exact.events[1:4], strict=True)
+            times = [f"{abs(ours.time - theirs.time):.0e}" for ours, theirs in pairs]
+            found.append([str(degree), f"{H:g}", *times, f"{run.summary['max_energy_residual']:.0e}"])
+    return found
+
+
+def picture(errors: dict[int, np.ndarray]) -> None:
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), sharey=True, layout="constrained")
     for ax, phase in zip(axes, ("tied, before any event", "touch after second meeting"), strict=True):
         k = list(PHASES).index(phase)
-        for ((scheme, degree), values), marker in zip(errors.items(), "os^dv", strict=True):
-            ax.loglog(STEPS, values[:, k, 0], marker=marker, label=f"{scheme} {degree}")
+        for (degree, values), marker in zip(errors.items(), "os^", strict=True):
+            ax.loglog(STEPS, values[:, k, 0], marker=marker, label=f"degree {degree}")
         ax.set(title=phase, xlabel="macro step H [ms]")
         ax.set_xticks(STEPS, [f"{1e3 * H:g}" for H in STEPS])
         ax.minorticks_off()
@@ -82,8 +93,10 @@ def picture(errors: dict[tuple[str, int], np.ndarray]) -> None:
 def main() -> None:
     errors = measured()
     picture(errors)
-    head = ["order of", *(f"{phase}: y, v" for phase in list(PHASES)[1:])]
+    head = ["degree", *(f"{phase}: y, v" for phase in PHASES)]
     write_section("measured.md", "orders", table(head, rows(errors)))
+    head = ["degree", "H [s]", "foundation impact [s]", "release [s]", "second meeting [s]", "energy residual"]
+    write_section("measured.md", "events", table(head, late()))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Run random scenes of all kinds and judge each run by the event-driven reference:  ./build.sh campaign [--seed S]…
 
 Every verdict is a line of the results file as soon as it is known, and a scene that is there is not run again. With
---write the table goes into docs/accuracy.md.
+--write the table goes into docs/measured.md.
 """
 
 import argparse
@@ -67,7 +67,7 @@ def main():
     parser.add_argument("--way", action="append", choices=list(WAYS), help="only runs of this way; repeatable")
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--results", type=Path, default=Path("results/campaign.jsonl"))
-    parser.add_argument("--write", action="store_true", help="write the table into docs/accuracy.md")
+    parser.add_argument("--write", action="store_true", help="write the table into docs/measured.md")
     options = parser.parse_args()
     known = {(v.seed, v.number, v.way) for v in read(options.results)}
     todo = []
@@ -84,7 +84,7 @@ def main():
     verdicts = read(options.results)
     print(*lines(verdicts), "", *worst(verdicts), sep="\n")
     if options.write:
-        write_section("accuracy.md", "campaign", lines(verdicts))
+        write_section("measured.md", "campaign", lines(verdicts))
 
 
 if __name__ == "__main__":

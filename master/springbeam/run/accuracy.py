@@ -2,7 +2,7 @@
 
 The error is that of the coupling and the time integration, for the scene's own mesh and modes: these are the model.
 (Impacts on the foundation converge only slowly with the mesh, since what they meet is the mass of its tip.)
-What is compared, and what two runs that agree cannot know, is in ``docs/accuracy.md``.
+What is compared, and what two runs that agree cannot know, is in ``docs/choose.md``.
 """
 
 from __future__ import annotations
