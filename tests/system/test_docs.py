@@ -20,7 +20,6 @@ PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md")), *sorted(ROOT.glob("src_
 #: What each program prints, as a regular expression, by page and number of the block.
 PROGRAMS = {
     ("README.md", 0): r"deepest tip -0\.015000 m, energy residual \d\.\de-1[0-9]\n0\.000000000 s  impact",
-    ("measured.md", 0): r"energy  0   5\.0e-04  1\.9e-09 (.*\n)+hermite 2   5\.0e-04  1\.1e-12 .* 3\.7e-10 ",
     ("api.md", 0): r"contact_impulse    0\.9873\ncontact_force_max  9\.97\d?\ncontact_duration   0\.1444\n.*\n\[-0\.00",
     ("api.md", 1): r"^0\.1 tied \[-0\.00874",
     ("api.md", 2): r"^[1-9]\d* strokes?, energy residual \d\.\de-1[0-9]",
@@ -53,7 +52,6 @@ NOT_RUN = {
     "springbeam stability": "takes minutes; parts of it are run in test_stability.py",
     "springbeam sweep bumper.toml": "takes half a minute; the command is in test_sweep.py",
     "springbeam crosscheck bumper.toml": "takes some seconds; the command is in test_command_line.py",
-    "springbeam tradeoff soft --until 0.0712": "takes minutes; the command is in test_tradeoff.py",
 }
 
 
