@@ -159,26 +159,6 @@ def test_play_ends_with_the_run(soft):
     soft.page.wait_for_function("document.getElementById('play').getAttribute('aria-label') === 'Play'")
 
 
-def test_a_click_into_a_chart_sets_the_time_of_all(soft):
-    chart = soft.page.locator("#gap .nsewdrag")
-    chart.scroll_into_view_if_needed()
-    area = chart.bounding_box()
-    chart.hover(position={"x": area["width"] / 2, "y": area["height"] / 2})
-    soft.page.wait_for_selector("#gap .hoverlayer .hovertext")
-    chart.click(position={"x": area["width"] / 2, "y": area["height"] / 2})
-    times = np.array(soft.data["motion"]["time"])
-    soft.page.wait_for_function("document.getElementById('slider').value !== '0'")
-    middle = 0.5 * (times[0] + times[-1])
-    assert times[soft.frame()] == pytest.approx(middle, abs=2.0 * np.max(np.diff(times)))
-    # The cursors stand there, to a pixel.
-    for name in soft.data["overTime"]:
-        cursor = soft.page.locator(f"#{name} .cursor").bounding_box()
-        plot = soft.page.locator(f"#{name} .nsewdrag").bounding_box()
-        part = (times[soft.frame()] - times[0]) / (times[-1] - times[0])
-        assert cursor["x"] + 1.0 - plot["x"] == pytest.approx(part * plot["width"], abs=1.0)
-        assert cursor["height"] == pytest.approx(plot["height"], abs=1.0)
-
-
 def test_zooming_one_time_axis_zooms_all(soft):
     ranges = "() => [...document.querySelectorAll('#over-time .chart')].map(c => c.layout.xaxis.range)"
     assert len({tuple(r) for r in soft.page.evaluate(ranges)}) == 1
@@ -186,17 +166,3 @@ def test_zooming_one_time_axis_zooms_all(soft):
     soft.page.wait_for_function(f"({ranges})().every(r => r[0] === 0.05 && r[1] === 0.1)")
     soft.page.evaluate("Plotly.relayout('forces', {'xaxis.autorange': true})")
     soft.page.wait_for_function(f"({ranges})().every(r => r[0] === 0 && r[1] === 0.3)")
-
-
-def test_in_print_everything_fits_the_paper_and_controls_are_gone(soft, tmp_path):
-    widths = "() => [...document.querySelectorAll('.chart')].map(c => c._fullLayout.width)"
-    wide = soft.page.evaluate(widths)
-    soft.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
-    assert set(soft.page.evaluate(widths)) == {680}
-    soft.page.emulate_media(media="print")
-    assert not soft.page.locator("#controls").is_visible()
-    soft.page.emulate_media(media="screen")
-    soft.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
-    soft.page.wait_for_function(f"JSON.stringify(({widths})()) === '{json.dumps(wide, separators=(',', ':'))}'")
-    soft.page.pdf(path=tmp_path / "report.pdf", format="A4")
-    assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")

@@ -182,16 +182,6 @@ def test_reference_files_are_announced_as_the_layered_standard_asks(case):
     assert named == {path for path, role in related.items() if role != "experiment/smoke-test"}
 
 
-def test_documentation_names_every_variable(case):
-    page = (case.folder / "documentation" / "index.html").read_text(encoding="utf-8")
-    assert [name for name in case.variables if f"<code>{name}</code>" not in page] == []
-    licenses = case.folder / "documentation" / "licenses"
-    assert "BSD 3-Clause" in (licenses / "springbeam.txt").read_text(encoding="utf-8")
-    assert "SUNDIALS" in (licenses / "third-party.txt").read_text(encoding="utf-8")
-    icon = "model.png" if case.version == "2.0" else "terminalsAndIcons/icon.png"
-    assert (case.folder / icon).read_bytes().startswith(b"\x89PNG")
-
-
 # -- the Windows binaries under Wine, by the same C host as the Linux ones --------------------------------------------
 
 

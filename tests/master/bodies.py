@@ -8,7 +8,6 @@ is tested by itself:
 """
 
 from functools import cache, partial, reduce
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -304,12 +303,6 @@ def stopping(scene, wrap=lambda beam, spring: (beam, spring)):
         name: body.steps for name, body in (("beam", beam), ("spring", spring)) if hasattr(body, "steps")
     }
     return trajectory, stopped
-
-
-def orders(errors, sizes):
-    """Observed orders between neighbouring step sizes."""
-    pairs = zip(pairwise(errors), pairwise(sizes), strict=True)
-    return [float(np.log(e0 / e1) / np.log(h0 / h1)) for (e0, e1), (h0, h1) in pairs]
 
 
 class Row(NamedTuple):

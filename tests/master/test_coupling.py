@@ -2,22 +2,18 @@
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, Upper, couple, orders, solve, unit_beam
+from bodies import DuffingBody, Upper, couple, solve, unit_beam
 from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.polynomial import legendre
 
-from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Body, Motion
 from springbeam.contact.laws import Compliance, Link
-from springbeam.contact.phases import Joint, Phase
 from springbeam.coupling.exchange import Exchange
 from springbeam.coupling.projection import Projection
 from springbeam.coupling.protocol import NotConverged
 from springbeam.coupling.soft import SoftSolver
 from springbeam.coupling.solver import StepSolver
-from springbeam.run.stepping import Pair
-from springbeam.scene import load_scene
 
 # -- the tie by itself, on bodies exact to rounding: conditions, energy, orders, cost, stability, failures ------------
 
@@ -72,46 +68,6 @@ def test_energy_schemes_conserve_energy(degree, frequency, mass, k2):
     assert max(abs(row.energy - start.energy) for row in rows) < 1e-8 * start.energy
 
 
-# -- orders ---------------------------------------------------------------------------------------------------------
-
-T = 0.064
-
-
-def smooth_phase(degree, count):
-    """Return u, the common velocity and the multiplier C at the macro points inside (0, T), shape (count − 1,) each."""
-    size, (upper, lower) = T / count, after_impact(3)
-    pair, tie, state = Pair(load_scene("soft"), upper, lower), StepSolver(degree, 1e-12), Phase(Joint.TIED)
-    start, contact, found = pair.ends(), NO_FORCE, []
-    for k in range(count):
-        pair.mark()
-        step = tie.solve(upper, lower, k * size, size, start, contact)
-        start, contact = step.end, force.shifted(step.contact, size)
-        tip, _ = pair.ends_together(state)
-        found.append((tip.displacement, tip.velocity, pair.present(state, step, size).contact))
-    return np.array(found[:-1]).T
-
-
-@pytest.fixture(scope="module")
-def reference():
-    """Degree 2 at T/128: displacement and velocity to 1e-15."""
-    return smooth_phase(2, 128)
-
-
-@pytest.mark.parametrize(("degree", "counts", "expected"), [
-    (0, (64, 128), (4, 4, 4)), (1, (32, 64), (4, 4, 4)), (2, (8, 16), (8, 8, 8)),
-])  # fmt: skip
-def test_orders_of_displacement_common_velocity_and_force(degree, counts, expected, reference):
-    """Smooth tied phase. Steps are such that the errors are above rounding and ω_max·H < 1."""
-    errors = []
-    for count in counts:
-        ours, exact = smooth_phase(degree, count), reference
-        if count < 128:
-            exact = exact[:, 128 // count - 1 :: 128 // count]
-        errors.append(np.abs(ours - exact[:, : count - 1]).max(axis=1))
-    observed = [orders(column, (2.0, 1.0))[0] for column in np.array(errors).T]
-    assert observed == pytest.approx(expected, abs=0.4)
-
-
 # -- cost and failures ----------------------------------------------------------------------------------------------
 
 
@@ -156,23 +112,6 @@ def test_energy_is_conserved_at_any_stiffness(stiffness, q, degree):
     """H = 2 ms, up to √(λ/m_tip) H = 10⁴: rounding of 100 steps, C (1e-13 relative) times what p changes."""
     rows, _ = couple_by(Compliance(stiffness, q), degree, 2e-3, 100, unit_beam(4), DuffingBody(k1=3.0, k2=-0.2))
     assert max(row.force[0] for row in rows) > 0.0
-
-
-@pytest.mark.parametrize(("degree", "order"), [(0, 2.0), (1, 4.0), (2, 6.0)])
-@pytest.mark.parametrize("q", [1.5, 2.0, 3.0])
-def test_the_order_is_twice_the_number_of_coefficients(degree, order, q):
-    """y and u at t = 0.08 s, contact throughout, against 128 steps of degree 2; no error is one of rounding."""
-    law, t = Compliance({1.5: 3e2, 2.0: 1e4, 3.0: 1e6}[q], q), 0.08
-    counts = (4, 8, 16) if degree == 2 else (16, 32, 64)
-
-    def last(d, n):
-        rows, _ = couple_by(law, d, t / n, n, unit_beam(2, slope=-0.3), DuffingBody(k1=3.0, k2=-0.2))
-        return np.array([rows[-1].upper.displacement, rows[-1].lower.displacement])
-
-    exact = last(2, 128)
-    errors = [np.abs(last(degree, n) - exact).max() for n in counts]
-    assert errors[-1] > 1e-14
-    assert orders(errors, [1.0 / n for n in counts])[-1] == pytest.approx(order, abs=0.35)
 
 
 @pytest.mark.parametrize("law", [Compliance(1e4, 1.5, 0.5), Compliance(1e6, 1.0, 5.0), Link(1e4, 3.0)], ids=repr)

@@ -103,25 +103,6 @@ def test_a_body_need_not_tell_its_shape_or_energies():
     assert "a body reports no energies, so the energy balance is not checked" in run.summary["warnings"]
 
 
-@pytest.mark.parametrize(
-    ("change", "body", "error", "says"),
-    [
-        ({}, Silent(DuffingBody()), RunStopped, "Silent has no holding_force, which a body seated on a stop needs"),
-        ({}, 1.0, TypeError, r"in place of the spring is a float, not a springbeam\.Body"),
-        ({}, DuffingBody(-1.0), SceneError, r"of the spring: mass = -1\.0; give its end a mass of 0 or more"),
-        ({"spring": None}, DuffingBody(), SceneError, r"\[spring\]: missing"),
-        (
-            {"beam": {"fidelity": "quasi_static"}, "coupling": {"scheme": "energy"}},
-            *(mass(), SceneError, 'beam.fidelity = "quasi_static"'),
-        ),
-        ({"accuracy": 1e-3}, mass(), SceneError, "a body of your own can be run once"),
-    ],
-)
-def test_what_a_body_cannot_do_is_said(change, body, error, says):
-    with pytest.raises(error, match=says):
-        simulate(with_changes(HITS, **{"stop": {"restitution": 0.0}, **change}), lower=body)
-
-
 class Unstruck(DuffingBody):
     """Takes no impulse."""
 

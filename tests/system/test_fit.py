@@ -100,41 +100,6 @@ def test_a_bad_file_is_refused_with_its_line_and_column(tmp_path, text):
     assert BAD[text] in str(error.value)
 
 
-def test_a_file_of_a_bench_is_read_by_the_options_of_the_command(here):
-    """Latin-1, two lines above the names, units in a row, decimal commas, a value missing, and a time that is twice."""
-    run = simulate(OSCILLATOR)
-    run.save("run")
-    lines = [
-        "Prüfstand 3",
-        "",
-        "Zeit;Weg",
-        "ms;µm",
-        *(f"{1e3 * t:.9g};{1e6 * y:.9g}" for t, y in zip(TIMES, exact(), strict=True)),
-    ]
-    lines[10] = lines[10].split(";")[0] + ";"
-    lines.insert(20, lines[20])
-    (here / "m.csv").write_bytes("\n".join(lines).replace(".", ",").encode("latin-1"))
-    options = ("encoding=latin-1", "decimal=,", "skip_lines=2", "units_row=true", "missing=drop", "repeats=first")
-    read = [word for option in options for word in ("--read", option)]
-    told = json.loads(
-        printed("compare", "run", "m.csv", "--map", "Weg=y", *read, "--shift", "0", "--json", "--no-plots")
-    )
-    assert told["residuals"][0]["relative"] < 1e-6
-    assert told["residuals"][0]["points"] == len(TIMES) - 1
-    n = len(TIMES) + 1
-    assert told["read"] == [
-        f"1 lines of {n} dropped, where a value is missing",
-        f"1 lines of {n} dropped, whose time is not after all before",
-    ]
-    assert "give its encoding" in refused("compare", "run", "m.csv")
-    assert "m.csv: no such file" in refused("compare", "run", here / "other" / "m.csv")
-    said = refused("compare", "run", "m.csv", "--read", "skip=2")
-    assert "--read skip: must be one of decimal, encoding, skip_lines" in said
-    assert "--read skip_lines=-1: " in refused(
-        "fit", "duffing", "m.csv", "--vary", "spring.mass=1", "--read", "skip_lines=-1"
-    )
-
-
 def test_the_command_compare_takes_a_measurement(here):
     simulate(OSCILLATOR).save("run")
     written(here / "m.csv", "time [s],position [mm]", TIMES + 0.2, 1e3 * exact())

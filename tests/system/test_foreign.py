@@ -122,17 +122,6 @@ def test_without_integrals_the_force_has_degree_0(fmu):
             simulate(pair(fmu(), spring=spring, contact=TIE, coupling={"degree": degree}))
 
 
-BEAM_NAMES = {
-    "force": "tip_force",
-    "displacement": "tip_displacement",
-    "velocity": "tip_velocity",
-    "impulse": "tip_impulse",
-    "integral": "tip_displacement_integral",
-    "integral_2": "tip_displacement_integral_2",
-    "kinetic_energy": "kinetic_energy",
-    "potential_energy": "strain_energy",
-    "dissipated_energy": "dissipated_energy",
-}
 ELEMENT = {"element": "spring_damper", "mass": M2, "stiffness": K, "damping": C}
 #: A mass of weight 8 N below: its tables, and the stiffness k of what holds it.
 HEAVY = {
@@ -281,12 +270,6 @@ def test_an_fmu_that_a_process_instantiates_once_has_a_process_for_each_instance
     assert first.y.tobytes() == second.y.tobytes()
 
 
-def test_what_an_fmu_prints_before_it_fails_is_told(fmu):
-    path = fmu("unlicensed", edits=(('guid="oscillator"', 'guid="unlicensed"'),))
-    with pytest.raises(FmuError, match=r"unlicensed\.fmu: cannot be instantiated: .*: no licence found$"):
-        simulate(pair(path))
-
-
 #: Units of an FMU that counts in mm, ms and kN, its masses in kg: SI units of each.
 _MM, _MS, _KN = 'm="1" factor="0.001"', 's="1" factor="0.001"', 'kg="1" m="1" s="-2" factor="1000"'
 BASES = {
@@ -325,14 +308,6 @@ def test_units_that_an_fmu_declares_are_converted(fmu, tmp_path):
     assert "the time is in ms, that is 0.001 s" in shown
     assert "x is in mm, that is 0.001 m" in shown
     assert "SI units are assumed" not in shown
-
-
-def test_that_si_units_are_assumed_is_told(fmu, tmp_path):
-    file = tmp_path / "scene.toml"
-    bare = dict.fromkeys(("integral", "integral_2", "impulse", *ENERGIES))
-    scene = pair(fmu(), spring=bare, contact={"damping": 0.0}, coupling={"degree": 0})
-    file.write_text(tomli_w.dumps(scene.model_dump(exclude_none=True)), encoding="utf-8")
-    assert "no unit is declared, so SI units are assumed: F in N, x in m, v in m/s" in printed("doctor", file)
 
 
 #: A unit of which variable, what the FMU says of it, and what is said of that.
@@ -561,12 +536,6 @@ def test_wrong_names_are_one_error(fmu, what):
     with pytest.raises(FmuError) as caught:
         simulate(pair(fmu(), spring=change))
     assert said in str(caught.value)
-
-
-def test_a_number_that_does_not_fit_its_variable_is_refused(fmu_folder):
-    names = {**BEAM_NAMES, "fmu": str(fmu_folder / "beam.fmu"), "parameters": {"n_elements": 2**40}}
-    with pytest.raises(FmuError, match="n_elements = 1099511627776: variable 'n_elements' is Integer and cannot"):
-        simulate(pair("", beam=names, spring={"element": "rigid_wall"}, contact={"law": "link", "stiffness": 1.0}))
 
 
 def test_events_are_those_of_the_element(fmu):

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import command, refused
+from commands import command
 from scenes import SOFT, kinds, soft
 
-from springbeam import SceneError, load, load_scene, with_changes
+from springbeam import load, load_scene, with_changes
 from springbeam.bodies import fmu_bodies
-from springbeam.bodies.protocol import BodyFailed, StepRefused
+from springbeam.bodies.protocol import StepRefused
 from springbeam.paper import co_simulation, monolithic
 from springbeam.paper.problem import AlgorithmFailure
 from springbeam.scene.reading import tomllib
@@ -84,23 +84,6 @@ def test_other_readings_are_other_algorithms():
     with pytest.raises(AlgorithmFailure) as failure:
         monolithic.simulate(load_scene("paper-fig4"), at_contact="tip")
     assert np.max(failure.value.trajectory.e_total) > 1e9
-
-
-@pytest.mark.parametrize("program", PROGRAMS.values())
-def test_what_it_starts_with_and_does_not_have(program):
-    short = soft(10, time={"t_end": 4e-3}, coupling={"macro_step": 4e-3})
-    for at_contact, expected in (("rest", 0.0), ("tip", -1.0)):
-        assert program.simulate(short, at_contact=at_contact).z[0] == expected
-    for changes in (
-        {"loads": [{"on": "tip", "amplitude": 1.0}]},
-        {"beam": {"fidelity": "quasi_static"}},
-        {"spring": None, "stop": None},
-    ):
-        with pytest.raises(SceneError, match=r"needs a \[spring\] and a \[beam\] with fidelity"):
-            program.simulate(with_changes(short, **changes))
-    for coupling in ({"relative_tolerance": 1e-3}, {"macro_step": None, "absolute_tolerance": 1e-6}):
-        with pytest.raises(SceneError, match="has one step size"):
-            program.simulate(with_changes(SOFT, coupling=coupling))
 
 
 # -- one program beside the other
@@ -197,16 +180,6 @@ def test_a_body_that_refuses_a_step_stops_the_command_and_what_was_computed_stay
     assert (run.summary["status"], len(run) > 10) == ("stopped", True)
 
 
-def test_a_body_that_fails_at_the_start_leaves_nothing(tmp_path, monkeypatch):
-    def failing(self):
-        raise BodyFailed("the beam has no shape")
-
-    monkeypatch.setattr(fmu_bodies.FmuBeam, "shape", failing)
-    result = command("paper", 2, "--set=beam.n_elements=4", "--set=beam.n_modes=0", "-o", tmp_path / "none")
-    assert (result.exit_code, result.stdout, (tmp_path / "none").exists()) == (3, "", False)
-    assert "error: the run stopped early: the beam has no shape at t = 0.5 s" in result.stderr
-
-
 # -- the command
 
 
@@ -225,14 +198,3 @@ def test_the_command_writes_what_a_run_writes(options, tmp_path):
     told = ("a_tip", "clamp_force", "clamp_moment", "a_y")  # by bodies at the end of a step of a run
     columns = [name for name in load(tmp_path / "law").columns if name not in told]
     assert list(run.columns) == [*columns, "case", "e_injected_beam", "e_injected_spring"]
-
-
-def test_what_cannot_be_run_is_bad_input(tmp_path):
-    assert "'6' is not one of '2', '3', '4'" in refused("paper", 6)
-    assert "has one step size" in refused("paper", 2, "--set=coupling.relative_tolerance=1e-3", "-o", tmp_path / "no")
-    assert not (tmp_path / "no").exists()
-    for setting, says in {
-        "contact.law=paper": "springbeam paper 2, 3, 4 or 5 runs Algorithm 1",
-        "contact.impact=rest": "leave it out: ends that a rigid law joins meet inelastically",
-    }.items():
-        assert says in refused("run", "paper-fig2", f"--set={setting}")

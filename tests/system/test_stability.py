@@ -1,9 +1,7 @@
 """Stability: what the classes of the grid mean, a small part of it, and critical macro steps as predicted."""
 
-import io
 import itertools
 import pickle
-from collections import Counter
 from dataclasses import replace
 from functools import lru_cache
 
@@ -11,7 +9,6 @@ import numpy as np
 import pytest
 from bodies import couple
 from commands import command
-from matplotlib.colors import to_rgba
 from worked import Few, Part
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
@@ -22,7 +19,6 @@ from springbeam.contact.laws import law_of
 from springbeam.coupling import coupling_of
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.pictures.drawing import BLACK, BLUE, GREEN, ORANGE, SKY, STONE
 from springbeam.run.ledger import APPROXIMATE, EXACT
 from springbeam.run.master import Master
 from springbeam.scene import scene_from_dict
@@ -258,22 +254,6 @@ def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else():
         assert records[name] == record
     assert [(r["kind"], r["reason"]) for r in records.values() if r["kind"] == "garbage"] == []
     assert {r["kind"] for r in records.values()} >= {"conserved", "dissipative", "approximate", "stopped"}
-
-
-def test_pictures_have_units():
-    study = Grid(samples=0, resolution=2)
-    kinds = itertools.cycle(CLASSES)
-    found = study.findings({name: ended(next(kinds)) | {"residual": 1e-9} for name in study.cases()})
-    figures = [draw() for draw in found.pictures.values()]
-    for figure in figures:
-        figure.savefig(io.BytesIO())  # nothing in it that cannot be painted
-    axes = [ax for figure in figures for ax in figure.axes if ax.get_title()]
-    assert len(axes) == 2 * len(SLICES)
-    seen = [tuple(colour) for ax in axes[: len(SLICES)] for colour in ax.collections[0].get_facecolors().tolist()]
-    looks = dict(zip(CLASSES, (BLUE, SKY, GREEN, STONE, ORANGE, BLACK), strict=True))
-    assert Counter(seen) == Counter(to_rgba(looks[row["kind"]]) for row in found.tables["stability"])
-    labels = {label for ax in axes for label in (ax.get_xlabel(), ax.get_ylabel())}
-    assert {"macro_step [s]", "stiffness [N]", "contact_damping [s/m]", "restitution [–]"} <= labels
 
 
 # -- the command ----------------------------------------------------------------------------------------------------

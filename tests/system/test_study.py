@@ -4,7 +4,7 @@ import json
 import re
 
 import pytest
-from commands import Interrupt, command, printed, refused, swept
+from commands import Interrupt, command, printed, swept
 from worked import Deadly
 
 from springbeam.results.directory import ResultsExist, ResultsInUse
@@ -90,38 +90,6 @@ def test_an_interrupted_study_says_how_it_goes_on_and_does(here, monkeypatch):
     other = json.loads(printed(*SWEEP, "--seed", "3", "--json"))  # another study does not take its place
     assert other["directory"] == "results/duffing-sweep-2"
     assert interrupt.left == calls - 5
-
-
-def test_a_full_disk_names_the_cause_and_the_command_that_goes_on(tmp_path, monkeypatch):
-    monkeypatch.setattr(sweep.Sweep, "parallel", False)
-    write, left = Records._write, [3]
-
-    def full(self, line):
-        left[0] -= 1
-        if left[0] < 0:
-            raise OSError(28, "No space left on device")
-        write(self, line)
-
-    monkeypatch.setattr(Records, "_write", full)
-    cut = command(*SWEEP, "--out", tmp_path / "s")
-    assert cut.exit_code == 3
-    assert "No space left on device; 2 of 5 records are in" in cut.stderr
-    assert "the same command goes on" in cut.stderr
-
-
-def test_results_of_another_springbeam_are_not_gone_on_with(tmp_path):
-    with Records(plan(), tmp_path) as records:
-        plan().computed(records)
-    text = (tmp_path / FILE).read_text()
-    (tmp_path / FILE).write_text(text.replace('"springbeam":"', '"springbeam":"9.', 1))
-    with pytest.raises(ResultsExist, match="another springbeam or FMU"):
-        Records(plan(), tmp_path)
-
-
-@pytest.mark.parametrize("text", ['{"study": "sweep"\n', '{"study": "sweep"}\n{"record": {}}\n'])
-def test_a_file_of_records_that_cannot_be_read_is_named(tmp_path, text):
-    (tmp_path / FILE).write_text(text)
-    assert "not a file of records" in refused(*SWEEP, "--out", tmp_path)
 
 
 def test_a_run_that_stops_early_is_a_row_with_its_cause():

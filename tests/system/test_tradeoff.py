@@ -14,7 +14,6 @@ from springbeam.scene import load_scene, with_changes
 from springbeam.studies import tradeoff
 from springbeam.studies.design import with_keys
 from springbeam.studies.metrics import costs
-from springbeam.studies.study import troubles
 from springbeam.studies.tradeoff import Tradeoff, cheapest, pareto
 
 
@@ -46,17 +45,6 @@ def test_what_a_configuration_costs_and_where_it_errs_is_that_of_its_run():
                          for found in (run, exact)]).sum(axis=1)  # fmt: skip
     off = np.abs(impulses[0] - impulses[1]).sum() / np.abs(impulses).sum(axis=1).min()
     assert row["error_impulse"] == pytest.approx(off, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("seconds", "settings", "median", "runs"),
-    [((1.0, 2.9, 2.0), {}, 2.0, 3), ((3.1,), {}, 3.1, 1), ((2.0,), {"quick": True}, 2.0, 1)],
-)
-def test_the_median_of_the_timings_counts_and_long_runs_are_timed_once(monkeypatch, seconds, settings, median, runs):
-    left = iter(seconds)
-    monkeypatch.setattr(Tradeoff, "_measured", lambda study, case: {"cost_wall_time": next(left)})
-    record = Tradeoff(scene=soft(), **settings).record({"family": "energy 0"})
-    assert (record["cost_wall_time"], len(record["times"])) == (median, runs)
 
 
 @pytest.mark.parametrize(("quick", "seconds", "left_out"), [
@@ -118,20 +106,6 @@ def test_command(tmp_path):
     assert all(float(row["error_motion"]) >= 0.0 for row in rows if row["status"] == "done")
     assert all(len(json.loads(row["times"])) == 2 for row in rows if row["status"] == "done")
     assert (tmp_path / "out" / "tradeoff.png").stat().st_size > 10_000
-
-
-def test_what_takes_too_long_is_given_up_and_named(monkeypatch):
-    """With no time at all every run is given up: one of each family is begun, and none is judged."""
-    monkeypatch.setattr(tradeoff, "_LIMIT", 0.0)
-    study = Tradeoff.of(with_changes(load_scene("soft"), beam={"n_elements": 4}), until=0.02, repeats=2)
-    rows = study.rows(study.computed())
-    begun = [row for row in rows if row["status"] == "stopped"]
-    assert len(begun) == len({row["family"] for row in rows}) < len(rows)
-    assert all("takes more than 0 s" in row["error"] or "diverges" in row["error"] for row in begun)
-    assert troubles(study.computed()) == [
-        f"error     in {len(rows)} cases, first in energy 0, H = 0.004: stopped at t = 0.0005 s: takes more than 0 s"
-    ]
-    assert {row["status"] for row in rows} == {"stopped", "skipped"}
 
 
 def test_bounces_that_die_out_end_no_comparison():
