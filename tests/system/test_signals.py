@@ -132,7 +132,7 @@ def test_a_function_that_gives_no_number_spoils_its_row_only(importable):
     study = Sweep(scene=oscillator(t_end=0.1), vary=("spring.mass=0.1,0.2",), metric=("a=test_signals:twice",))
     for row in study.computed().values():
         assert row["status"] == "refused"
-        assert "--metric a=test_signals:twice: gives 5" in row["error"]
+        assert "metric a=test_signals:twice: gives 5" in row["error"]
 
 
 def pulsed(**more):

@@ -15,6 +15,9 @@ from ..studies.tables import Findings
 from .common import STOPPED, ForceOption, JsonOption, NoPlotsOption, QuietOption, SettingsOption, fail
 from .run import carry_out
 
+#: (A) to (E) of the paper's figures.
+_PICTURES = ("shapes_after_contact", "shapes_later", "positions", "velocities_and_forces", "gap_and_energy")
+
 
 def paper(
     figure: Annotated[
@@ -52,7 +55,8 @@ def paper(
         made = failure.trajectory
         made.summary |= {"status": "stopped", "cause": str(failure)}
     directory = _directory(Path("results") / f"paper-fig{figure}", out, force=force)
-    found = carry_out(FileRecorder(scene, directory), made=made, no_plots=no_plots, silent=quiet or as_json)
+    recorder = FileRecorder(scene, directory)
+    found = carry_out(recorder, made=made, pictures=_PICTURES, no_plots=no_plots, silent=quiet or as_json)
     solves = made.summary["iterations_per_solve"]
     printed = figures.TABLE_2[int(figure)][0]
     line = f"Table 2   {solves:.3f} iterations per solve of (53), printed {printed:.3f}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from math import inf
@@ -17,7 +17,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..bodies.protocol import FmuError
-from ..results.directory import RunDirectory
+from ..results.directory import OVERVIEW, RunDirectory
 from ..results.files import load_events, load_summary, load_trajectory
 from ..results.recording import FileRecorder
 from ..results.totals import in_words
@@ -121,10 +121,11 @@ def carry_out(
     recorder: FileRecorder,
     *,
     made: Trajectory | None = None,
+    pictures: Sequence[str] = (OVERVIEW,),
     no_plots: bool,
     silent: bool,
 ) -> Findings:
-    """Run the scene of ``recorder``, or write a run that is ``made``, and draw it.
+    """Run the scene of ``recorder``, or write a run that is ``made``, and draw ``pictures`` of it.
 
     Raises what keeps the run from recording anything.
     """
@@ -151,16 +152,16 @@ def carry_out(
     summary = load_summary(directory.path)
     shown = list(_in_words(recorder.scene, summary, load_events(directory.path)))
     document, files = {"directory": directory.path, **summary}, [("results", directory.path)]
-    draw = None if no_plots else partial(_drawn, directory.path)
+    draw = None if no_plots else partial(_drawn, directory.path, pictures)
     return Findings(document, shown, files, directory.path, STOPPED if error else 0, error, draw)
 
 
-def _drawn(directory: Path) -> Findings:
-    """Draw an overview of the run in ``directory``; an error is that there is no room for it, or no time."""
+def _drawn(directory: Path, names: Sequence[str]) -> Findings:
+    """Draw pictures of the run in ``directory``; an error is that there is no room for them, or no time."""
     from ..pictures.plots import plot_run  # matplotlib takes a second to load
 
     try:
-        pictures = plot_run(load_trajectory(directory), directory)
+        pictures = plot_run(load_trajectory(directory), directory, names)
     except (KeyboardInterrupt, OSError) as trouble:
         lost = f"no picture: {cause_of(trouble, directory)}; what was computed is in {directory}"
         return Findings(code=STOPPED, error=lost)
