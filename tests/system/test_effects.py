@@ -19,7 +19,7 @@ SOFT = with_changes(
 LAW = {"stiffness": 1e3, "exponent": 1.5}
 SCENES = {
     "transmission": SOFT,
-    "compliance": with_changes(SOFT, contact={"law": "compliance", **LAW}),
+    "compliance": with_changes(SOFT, contact={"law": "compliance", **LAW}, coupling={"degree": 0}),
     "link": with_changes(SOFT, contact={"law": "link", "stiffness": 1e3, "exponent": 3.0}),
     "tie": with_changes(SOFT, contact={"law": "tie", "stiffness": 1e4, "exponent": 3.0}),
     "exchange": with_changes(SOFT, contact={"law": "compliance", **LAW}, coupling={"scheme": "jacobi"}),

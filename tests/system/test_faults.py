@@ -178,13 +178,13 @@ def test_a_rollback_that_fails_stops_the_run(run, fmu, law, kind):
 
 @pytest.mark.parametrize(("fmu", "law"), alternating(list(LAWS)[:-1]))
 def test_wild_numbers_stop_the_run(run, fmu, law):
-    """1e300 m is a finite number: it is recorded, as it came, and the energy tells."""
+    """1e300 m is a finite number: it is recorded, as it came, and ends the run by its energy or by its events."""
     code, directory, script = run(law, Fault(fmu, "fmi2GetReal", "touch", "1e300", skip=2))
     script.check()
     assert code == 3
     trajectory = load_trajectory(directory)
     assert trajectory.summary["status"] == "stopped"
-    assert "has changed the energy" in trajectory.summary["cause"]
+    assert any(cause in trajectory.summary["cause"] for cause in ("has changed the energy", "the contact chatters"))
 
 
 @pytest.mark.parametrize("fmu", ["beam", "spring"])

@@ -98,6 +98,14 @@ def spread(run):
     return run.y.max() - run.y.min()
 
 
+def tip_in_g(run):
+    return run["a_tip"] / 9.80665
+
+
+def twice(run):
+    return 2.0 * run.y
+
+
 @pytest.fixture
 def importable(monkeypatch):
     monkeypatch.syspath_prepend(__file__.rpartition("/")[0])
