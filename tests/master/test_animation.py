@@ -1,42 +1,14 @@
 """The animation: its frames are the recorded ones, it plays as long as asked, and it says why it cannot be made."""
 
-from dataclasses import replace
 from itertools import pairwise
 
-import matplotlib
 import numpy as np
 import pytest
 from commands import printed, refused
 from PIL import Image
 from runs import SCENES, a_trajectory
 
-from springbeam.pictures import animation
 from springbeam.pictures.animation import animate
-from springbeam.pictures.drawing import NOT_RESOLVED
-from springbeam.pictures.frames import frames_of
-
-
-def picture_of(run):
-    with matplotlib.rc_context(animation.STYLE):
-        return animation._Picture(run, frames_of(run))
-
-
-def test_each_frame_is_a_recorded_one_and_says_if_the_motion_is_not_resolved():
-    run = a_trajectory()
-    titles = [ax.get_title("right") for ax in picture_of(replace(run, summary={"resolved": False})).figure.axes]
-    assert titles == [NOT_RESOLVED, *[""] * (len(titles) - 1)]
-    shown, motion = picture_of(run), frames_of(run)
-    lowest, highest = run.shapes[1].min(), run.shapes[1].max()
-    assert motion.low == motion.foot == pytest.approx(lowest - 0.4 * (highest - lowest))  # room for the coil
-    for frame in (0, 123, 399):
-        shown.show(frame)
-        for line, part, factor in shown._moving:
-            assert np.array_equal(line.get_ydata(), factor * motion.heights(part, frame))
-        assert np.array_equal(motion.heights("beam", frame), run.shapes[1][frame])
-        assert motion.heights("coil", frame)[[0, -1]] == pytest.approx([motion.foot, run.y[frame]])
-        assert motion.at(run.time[frame]) == frame
-        assert shown._cursor.get_xdata() == [run.time[frame]] * 2
-        assert shown._words.get_text().split() == ["t", "=", f"{run.time[frame]:.4f}", "s", str(run.phase[frame])]
 
 
 @pytest.mark.parametrize("scene", [SCENES["all"], SCENES["spring"]], ids=["all", "spring"])

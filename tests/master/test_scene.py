@@ -2,6 +2,8 @@
 
 import math
 import re
+from copy import deepcopy
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +13,10 @@ from scenes import SOFT, scene_from_dict
 
 import springbeam
 from springbeam.scene import Beam, Scene, SceneError, load_scene, messages, suspicions, with_changes
+from springbeam.scene.reading import tomllib
 from springbeam.scene.suspicions import implausible
+
+TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("scenes.toml").read_text(encoding="utf-8"))
 
 
 def changed(**tables):
@@ -28,58 +33,19 @@ def changed(**tables):
     return data
 
 
-def adaptive(**coupling):
-    """The pair with tolerances instead of a macro step."""
-    return {**changed(), "coupling": coupling}
-
-
 def load_pair():
+    return deepcopy(TABLE["pair"])
+
+
+def without_false(tables):
+    """Return tables of the table of scenes, where false takes one out."""
     return {
-        "time": {"t_end": 0.6},
-        "beam": {"young_modulus": 100.0, "shear_modulus": 100.0, "initial_velocity_slope": -1.0},
-        "spring": {"linear_stiffness": 3.0, "cubic_stiffness": -0.2},
-        "stop": {"position": -0.015},
-        "coupling": {"macro_step": 0.001},
+        key: without_false(value) if isinstance(value, dict) else None if value is False else value
+        for key, value in tables.items()
     }
 
 
-GOOD = {
-    "pair": changed(),
-    "integer for a number": changed(time={"t_end": 1}, stop={"position": -1}),
-    "beam alone, at rest": changed(spring=None, stop=None, beam={"initial_velocity_slope": 0.0}),
-    "beam alone, upward": changed(spring=None, stop=None, beam={"initial_velocity_slope": 3.0}),
-    "beam alone, far below": changed(spring=None, stop=None, beam={"initial_deflection_slope": -5.0}),
-    "spring alone": changed(beam=None, stop=None),
-    "free mass on a stop": changed(beam=None, spring={"linear_stiffness": 0.0, "cubic_stiffness": 0.0}),
-    "double well": changed(beam=None, spring={"linear_stiffness": -1.0, "cubic_stiffness": 1.0}),
-    "just inside the hilltop": changed(beam=None, spring={"equilibrium": 3.872}),
-    # The load leaves no equilibrium, but the stop holds it from below, and a hill is above.
-    "softening, pressed on the stop": changed(beam=None, spring={"external_force": -5.0}),
-    "touching at rest": changed(beam={"initial_velocity_slope": 0.0}),
-    "load from first contact on": changed(
-        beam={"initial_deflection_slope": 0.5}, loads=[{"on": "tip", "signal": "step", "start": 0.5}]
-    ),
-    "elastic, at rest above": changed(
-        beam={"initial_deflection_slope": 0.5, "initial_velocity_slope": 0.0, "approach": "elastic"}
-    ),
-    "contact at t_end": changed(beam={"initial_deflection_slope": 0.6}),
-    "500 elements, all modes": changed(beam={"n_elements": 500}),
-    "1000 elements, 64 modes": changed(beam={"n_elements": 1000, "n_modes": 64}),
-    "1000 elements, midpoint": changed(beam={"n_elements": 1000, "integrator": "midpoint"}),
-    "no compliance part": changed(contact={"stiffness": 0.0}),
-    "tie, ends at one height": changed(
-        contact={"law": "tie"}, spring={"equilibrium": 0.07}, beam={"initial_deflection_slope": 0.1, "length": 0.7}
-    ),
-    "tie, both upwards": changed(contact={"law": "tie"}, beam={"initial_velocity_slope": 1.0}),
-    "tie of degree 2": changed(contact={"law": "tie"}, coupling={"degree": 2}),
-    "tie of a beam without inertia": changed(contact={"law": "tie"}, beam={"fidelity": "quasi_static"}),
-    "link, ends apart": changed(contact={"law": "link", "damping": 2.0}, beam={"initial_deflection_slope": -0.1}),
-    "dashpot": changed(contact={"law": "link", "stiffness": 0.0, "damping": 2.0}),
-    "Hunt and Crossley": changed(contact={"law": "compliance", "damping": 0.5}),
-    "one step": changed(coupling={"macro_step": 0.6}),
-    "adaptive": adaptive(relative_tolerance=1e-4, absolute_tolerance=1e-9),
-    "adaptive, absolute": adaptive(absolute_tolerance=1e-9),
-}
+GOOD = {name: changed(**without_false(changes)) for name, changes in TABLE["accepted"].items()}
 
 
 @pytest.mark.parametrize("data", GOOD.values(), ids=GOOD)
