@@ -114,17 +114,25 @@ class Slave:
 _NUMBERS, _LOGS = count(1), dict[int, Log]()
 
 
+def _number_of(name: bytes | None) -> int:
+    """Return the number at the end of an instance's name; 0 if it is none of ours."""
+    start, _, number = (name or b"").rpartition(b" #")
+    return int(number) if start and number.isdigit() else 0
+
+
 @cache
 def _logger() -> Any:
     """Return callbacks whose logger expands messages as printf does.
 
-    FMPy has one such function in a process, so it is also one that takes what it has expanded.
+    FMPy has one such function in a process, so it is also one that takes what it has expanded, for all instances.
     """
 
-    def take(environment: int | None, _name: bytes, status: int, _category: bytes, text: bytes | None) -> None:
-        # An FMU may forget its environment: then it is the one that was made last.
-        if log := _LOGS.get(environment or max(_LOGS, default=0)):
+    def take(environment: int | None, name: bytes, status: int, category: bytes, text: bytes | None) -> None:
+        # An FMU may forget its environment: then its name says which it is.
+        if log := _LOGS.get(environment or _number_of(name)):
             log(status, text)
+        elif text is not None:  # an instance that somebody else made with FMPy in this process
+            fmi2.printLogMessage(environment, name, status, category, text)
 
     callbacks = fmi2.fmi2CallbackFunctions()
     callbacks.taking = callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(take)  # kept, for the proxy takes its place
@@ -143,6 +151,7 @@ class FMU2(Slave, fmi2.FMU2Slave):  # type: ignore[misc]
     def make(self, log: Log) -> None:
         """Instantiate the FMU."""
         self._number = next(_NUMBERS)
+        self.instanceName += f" #{self._number}"
         _LOGS[self._number] = log
         callbacks = fmi2.fmi2CallbackFunctions()
         callbacks.logger = _logger().logger
