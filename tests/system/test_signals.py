@@ -182,6 +182,28 @@ def test_the_damage_boundary_of_an_oscillator_is_that_of_its_shock_spectrum(
         }
 
 
+@pytest.mark.parametrize(("limit", "peak"), [(0.5, None), (0.8, None), (1.0, 100.0), (1.1, 150.0)])
+def test_the_damage_boundary_counts_what_there_is_without_the_pulse(limit, peak, monkeypatch):
+    """A metric 0.8 + 0.002 A of the peak A: with 0 at A = 0 the limit 0.5 was reached at 125 and 1.0 at 200."""
+    vary = ("loads.0.amplitude=200,400", "loads.0.duration=0.004,0.03")
+    study = Sweep(scene=pulsed(signal="half_sine"), vary=vary, metric=("max_y",), boundary=f"max_y={limit}")
+    monkeypatch.setattr(
+        Sweep,
+        "record",
+        lambda self, case: {
+            "status": "done",
+            "error": "",
+            "warnings": "",
+            "max_y": 0.8 + 0.002 * case["loads.0.amplitude"],
+        },
+    )
+    records = study.computed()
+    assert len(records) == 6
+    findings = study.findings(records)
+    assert [found["peak"] for found in findings.document["boundary"]] == pytest.approx([peak] * 2 if peak else [])
+    assert any("without the pulse" in str(line) for line in findings.shown) == (peak is None)
+
+
 # -- spectra ------------------------------------------------------------------------------------------------------
 
 

@@ -4,7 +4,8 @@ The rows depend on the design alone: not on the number of workers, nor on the or
 
 Over the amplitude and the duration of a pulse a sweep shows the damage boundary of a product: which pulses bring a
 number of it to its limit. A pulse is told by its peak and by the velocity that it changes, ∫ a dt. At each duration the
-critical peak is that at which the metric first reaches its limit, linear between the amplitudes swept.
+critical peak is that at which the metric first reaches its limit, linear between the amplitudes swept and 0: each
+duration has a run without the pulse.
 """
 
 from __future__ import annotations
@@ -72,7 +73,12 @@ class Sweep(Study):
         for name in names:
             self._refuse_lacking(name)
         values = design(self.axes, self.samples, self.seed, self.sampling)
-        return {str(index): dict(zip(names, several, strict=True)) for index, several in enumerate(values)}
+        cases = [dict(zip(names, several, strict=True)) for several in values]
+        if self.boundary:
+            amplitude = f"{self._pulse}.amplitude"
+            still = [case | {amplitude: 0.0} for case in cases]
+            cases += [case for k, case in enumerate(still) if case not in cases + still[:k]]
+        return {str(index): case for index, case in enumerate(cases)}
 
     def _refuse_lacking(self, name: str) -> None:
         """Raise ArgumentError if ``name`` is a key of a load that the scene does not have."""
@@ -94,7 +100,7 @@ class Sweep(Study):
         tables = {self.kind: rows}
         if self.boundary:
             document["boundary"] = critical = self._critical(rows)
-            shown += _told(critical, self.boundary)
+            shown += _told(critical, self.boundary, self._exceeded(rows))
         if critical:
             tables["sweep-boundary"] = critical
         if self.metric:
@@ -165,13 +171,19 @@ class Sweep(Study):
         known = [row for row in rows if row[metric] is not None]
         for length in sorted({row[duration] for row in known}):
             pairs = sorted((abs(row[amplitude]), abs(row[metric])) for row in known if row[duration] == length)
-            peaks, values = np.array([(0.0, 0.0), *pairs]).T
-            if k := int(np.argmax(values >= limit)):
+            peaks, values = np.array(pairs).T
+            if peaks[0] == 0.0 and (k := int(np.argmax(values >= limit))):
                 peak = float(np.interp(limit, values[k - 1 : k + 1], peaks[k - 1 : k + 1]))
                 unit = load.model_copy(update={"amplitude": 1.0, "duration": length, "start": 0.0})
                 mean = float(unit.value((np.arange(_POINTS) + 0.5) * length / _POINTS).mean())
                 found.append({"duration": length, "velocity_change": peak * mean * length, "peak": peak})
         return found
+
+    def _exceeded(self, rows: Sequence[Row]) -> bool:
+        """Return whether a run without the pulse reaches the limit."""
+        metric, limit = self._limit
+        still = [row[metric] for row in rows if row[f"{self._pulse}.amplitude"] == 0.0]
+        return any(value is not None and abs(value) >= limit for value in still)
 
 
 def _varies(values: np.ndarray) -> bool:
@@ -179,8 +191,10 @@ def _varies(values: np.ndarray) -> bool:
     return found.size > 1 and bool(np.ptp(found) > _ROUNDING * np.abs(found).max())
 
 
-def _told(found: Sequence[Mapping[str, float]], limit: str) -> list[str]:
-    """Return what the boundary says: both of its sides."""
+def _told(found: Sequence[Mapping[str, float]], limit: str, exceeded: bool) -> list[str]:
+    """Return what the boundary says: both of its sides, or that there is none."""
+    if exceeded:
+        return [f"boundary  none: {limit} is reached without the pulse; raise the limit"]
     if not found:
         return [f"boundary  {limit} is not reached in any run that has a value of it"]
     slowest, least = (min(found, key=lambda pulse: pulse[side]) for side in ("velocity_change", "peak"))
