@@ -149,6 +149,10 @@ def pulsed(**more):
     return with_changes(oscillator(t_end=0.3, **pulse), spring={"damping": 0.0, "initial_velocity": 0.0})
 
 
+def highest_in_space(run):
+    return np.abs(run["a_y"] + run["load_0"]).max()
+
+
 @pytest.mark.parametrize(("signal", "more"), [("half_sine", {}), ("sawtooth", {}), ("trapezoid", {"rise": 1e-3})])
 def test_the_damage_boundary_of_an_oscillator_is_that_of_its_shock_spectrum(
     signal, more, unpainted, importable, tmp_path
