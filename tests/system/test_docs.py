@@ -51,7 +51,6 @@ NOT_RUN = {
     "springbeam sweep soft": "starts a process for each core; the command is in test_command_line.py",
     "springbeam stability": "takes minutes; parts of it are run in test_stability.py",
     "springbeam sweep bumper.toml": "takes half a minute; the command is in test_sweep.py",
-    "springbeam crosscheck bumper.toml": "takes some seconds; the command is in test_command_line.py",
 }
 
 
@@ -122,12 +121,54 @@ def desk(tmp_path_factory):
     return folder
 
 
+def shown(text, output):
+    """Return the first line of a console block that the output does not have, or None. A line ``⋮`` stands for any
+    lines, ``…`` in a line for any text; blanks at the end of a line do not count."""
+    lines = [line.rstrip() for line in output.splitlines()]
+    at = 0
+    skips = False
+    for line in text.splitlines():
+        if line.strip() == "⋮":
+            skips = True
+            continue
+        pattern = ".*".join(map(re.escape, line.rstrip().split("…")))
+        reach = lines[at:] if skips else lines[at : at + 1]
+        found = next((k for k, printed in enumerate(reach) if re.fullmatch(pattern, printed)), None)
+        if found is None:
+            return line
+        at += found + 1
+        skips = False
+    return None if skips or at == len(lines) else f"the end, before {lines[at]}"
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        ("one\ntwo\nthree\n", None),
+        ("⋮\nthree\n", None),
+        ("one\n⋮\n", None),
+        ("one\nt…\nt…\n", None),
+        ("one\nthree\n", "three"),
+        ("⋮\nthree\ntwo\n", "two"),
+        ("one\ntwo\n", "the end, before three"),
+    ],
+)
+def test_a_line_that_is_not_printed_is_found(text, wrong):
+    assert shown(text, "one  \ntwo\nthree\n") == wrong
+
+
 @pytest.mark.parametrize("page", shell_pages(), ids=lambda page: page.name)
 def test_commands_of_the_documentation_run(desk, page, unpainted, monkeypatch):
+    """They end well, complain of nothing, and print what the block ``console`` after them shows."""
     monkeypatch.chdir(desk)
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
-    for block in blocks(page, "sh"):
-        shutil.rmtree("results", ignore_errors=True)
+    shutil.rmtree("results", ignore_errors=True)
+    output = ""
+    for language, block in re.findall(r"^```(sh|console)\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S):
+        if language == "console":
+            assert (missing_line := shown(block, output)) is None, f"{page.name}: {missing_line}\n{output}"
+            continue
+        output = ""
         for line in filter(str.strip, block.splitlines()):
             if reason_not_to_run(line):
                 continue
@@ -139,6 +180,7 @@ def test_commands_of_the_documentation_run(desk, page, unpainted, monkeypatch):
                 assert program == "springbeam"
                 result = command(*arguments)
                 code, said = result.exit_code, result.stderr
+                output += result.stdout
             assert (code, said) == (0, ""), f"{page.name}: {line}"
 
 
