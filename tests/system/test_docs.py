@@ -1,5 +1,6 @@
 """The documentation is followed literally: programs and commands run, links lead somewhere, its table is current."""
 
+import ast
 import importlib.util
 import json
 import os
@@ -261,3 +262,34 @@ def missing(text):
 def test_files_and_names_of_the_code_are_there(page):
     without_blocks = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
     assert [*missing(without_blocks)] == []
+
+
+def avoided():
+    """Return the patterns of docs/words.txt, each with what to use."""
+    lines = (DOCS / "words.txt").read_text(encoding="utf-8").splitlines()
+    return [line.split(" -> ") for line in lines if not line.startswith("#")]
+
+
+def first_lines():
+    """Return the first lines of the docstrings of the package, by file and name."""
+    for path in sorted((ROOT / "master/springbeam").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (said := ast.get_docstring(node)):
+                yield f"{path.name}: {getattr(node, 'name', '')}", said.splitlines()[0]
+
+
+def test_pages_and_docstrings_use_no_word_to_avoid():
+    texts = [(page.name, page.read_text(encoding="utf-8")) for page in PAGES]
+    texts.extend(first_lines())
+    found = [
+        (place, match[0], use)
+        for place, text in texts
+        for pattern, use in avoided()
+        for match in re.finditer(pattern, text)
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize("text", ["both ends are let go", "what it passes on", "the master is told", "is off by 3 %"])
+def test_a_word_to_avoid_is_found(text):
+    assert any(re.search(pattern, text) for pattern, _ in avoided())

@@ -136,7 +136,7 @@ class EventFunctions:
 
 
 def position_tolerance(ends: Ends, macro_step: float) -> float:
-    """What positions can be told apart to [m]: rounding of the displacements, and of what moves them."""
+    """Resolution of positions [m]: rounding of the displacements, and of what moves them."""
     (u, v, _, _), (y, z, _, _) = ends
     return 8.0 * EPS * max(u, -u, y, -y) + 1e-15 * max(v, -v, z, -z) * macro_step
 

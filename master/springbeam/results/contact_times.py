@@ -170,7 +170,7 @@ def _contacts_and_strokes(run: Trajectory, end: float) -> Iterator[tuple[list[In
 
 
 def _felt(intervals: list[Interval], times: np.ndarray, passed: np.ndarray, window: float) -> list[Interval]:
-    """Join ``intervals`` closer than ``window`` [s]; return those that last longer or pass on `SLIGHT` of the impulses.
+    """Join ``intervals`` closer than ``window`` [s]; return those longer or transmitting `SLIGHT` of all impulses.
 
     Other parameters as of `_contacts_and_strokes`.
     """

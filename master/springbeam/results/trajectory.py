@@ -87,7 +87,7 @@ class EventKind(str, Enum):
 
     @property
     def opens(self) -> bool:
-        """Whether tied ends are let go."""
+        """Whether tied ends are released."""
         return self in (EventKind.RELEASE, EventKind.SEPARATION)
 
     @property

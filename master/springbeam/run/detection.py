@@ -41,7 +41,7 @@ class Detector:
         self._functions = EventFunctions(scene, pair.law, pair.tip_share, pair.equilibrium)
 
     def tolerance(self, ends: Ends) -> float:
-        """What positions can be told apart to [m]."""
+        """Resolution of positions [m]."""
         return position_tolerance(ends, self._steps.size)
 
     def simultaneity_tolerance(self, ends: Ends) -> float:

@@ -165,7 +165,10 @@ def _share(
     weights: np.ndarray,
     places: np.ndarray,
 ) -> float:
-    """Return how far an end is moved that was at ``places`` [m], over its way; ``forces`` are those of loads of 1."""
+    """Return the displacement of an end that was at ``places`` [m], relative to its motion.
+
+    ``forces`` are those of loads of 1.
+    """
     way = float(np.abs(places - places[0]).max())
     acting = [(load, force) for load, force in zip(tables, forces, strict=True) if force > 0.0]
     if way == 0.0 or not acting:

@@ -236,7 +236,7 @@ def filled(scene: Scene, text: str, **numbers: Any) -> str:
 
 
 class Rule(NamedTuple):
-    """When something is told of a scene, and what; `filled` explains ``text``.
+    """Condition and text of a message about a scene; `filled` explains ``text``.
 
     ``when`` and ``numbers`` get the scene, and what of it the rule is for. If ``when`` returns a dict, these are the
     numbers. ``{load.key}`` is a key of the load that the rule is for.

@@ -182,7 +182,7 @@ def window_of(scene: Scene, omega: float) -> float:
 
 
 def peak_force_doubt(scene: Scene) -> str | None:
-    """Return in words why the run cannot vouch for its peak contact force, and what would; ``None`` if it can.
+    """Return why the peak contact force of the run is unreliable, and the remedy; ``None`` if it can.
 
     At a rigid impact the force at an instant grows with the mesh. Its mean over a window settles where the window is
     longer than `SETTLED` periods of the fastest wave kept (``docs/choose.md`` has the numbers).

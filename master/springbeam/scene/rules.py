@@ -72,7 +72,7 @@ def _averages(scene: Scene) -> bool:
 
 
 def _let_go(scene: Scene) -> bool:
-    """Return whether our beam has no inertia and is let go at the start."""
+    """Return whether our beam has no inertia and is released at the start."""
     return scene.beam is not None and scene.massless and scene.beam.approach == "elastic"
 
 
