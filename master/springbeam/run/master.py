@@ -31,7 +31,7 @@ from .ledger import Balance
 from .log import TOGETHER, Log
 from .macro_steps import AdaptiveSteps, MacroGrid
 from .misplaced import misplaced
-from .observed import force_window, not_shown, unknown, why_not_resolved
+from .observed import coarse_force, force_window, not_shown, unknown, why_not_resolved
 from .outcome import RunStopped, cause_of
 from .stepping import Pair, Present, State
 
@@ -306,7 +306,7 @@ class Master:
         off = misplaced(scene, self._pair, steps, events)
         unresolved = why_not_resolved(scene, self._pair, self._steps.size, steps, events, off)
         warnings += filter(None, [unresolved or peak_force_doubt(scene), not_shown(scene, self._pair, steps)])
-        warnings += filter(None, [unknown(scene, self._pair)])
+        warnings += filter(None, [unknown(scene, self._pair), coarse_force(self._pair)])
         window = force_window(scene, self._pair, steps)
         amounts = totals(scene, steps, events, window) if len(steps) else {}
         ruled_out = contradictions(scene, steps, events, amounts.get("contact_duration_total", 0.0))

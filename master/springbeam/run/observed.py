@@ -88,6 +88,19 @@ def unknown(scene: Scene, pair: Pair) -> str | None:
     return said
 
 
+def coarse_force(pair: Pair) -> str | None:
+    """Return a warning that names the body whose acceleration is not known, so that C is that of the steps."""
+    places = (("beam", pair.upper), ("spring", pair.lower))
+    silent = [f"[{table}]" for table, body in places if body in pair.without_acceleration]
+    if not silent:
+        return None
+    return (
+        f"the body in {' and '.join(silent)} does not say its acceleration; the force between joined ends, and when "
+        "they part, is only as exact as the force of a step: name its variable in acceleration, or take a smaller "
+        "coupling.macro_step"
+    )
+
+
 def force_window(scene: Scene, pair: Pair, steps: np.ndarray) -> float:
     """Return over which time the contact force is averaged before its peak is taken [s].
 

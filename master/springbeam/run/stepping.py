@@ -127,6 +127,8 @@ class Pair:
         self.law = law_of(scene)
         #: μ of ends that a rigid law joins, whose mismatch of velocities a step turns round [kg]; else 0.
         self.turned_mass = self.reduced_mass(Phase()) if self.law is None else 0.0
+        #: The bodies that could not say an acceleration when it was asked for.
+        self.without_acceleration: list[Body] = []
         #: Whether they are joined for good.
         self.lasting = scene.coupled and scene.contact.lasting
         #: Whether contact opens and closes inside steps, without an event that ends them.
@@ -284,6 +286,8 @@ class Pair:
             told = None if changed else body.acceleration()
             free = body.trial_acceleration(time, macro_step) if told is None else told - sign * acting / body.mass
             if free is None:
+                if body not in self.without_acceleration:
+                    self.without_acceleration.append(body)
                 return acting
             apart += sign * free
             mobility += 1.0 / body.mass
