@@ -43,6 +43,8 @@ SMALL = {"time": {"t_end": 0.05}, "beam": {"n_elements": 5}, "coupling": {"macro
 def done(scheme="energy", degree=0, **beam):
     changes = {**SMALL, "beam": {**SMALL["beam"], **beam}}
     changes["coupling"] = {"macro_step": 2e-3, "scheme": scheme, "degree": degree}
+    if scheme != "energy":  # an exchange needs a soft law
+        changes["contact"] = {"law": "compliance", "stiffness": 100.0, "exponent": 1.5}
     return simulate(with_changes(load_scene("soft"), **changes))
 
 
@@ -81,7 +83,8 @@ def test_energy_that_changes_is_judged_by_the_scheme_and_by_what_is_said(scheme,
     outcome = judged(changed(run, warnings, energy_residual=share * np.linspace(0.0, run.e_total[0], len(run))), cause)
     assert outcome["kind"] == kind
     if kind != "stopped":
-        assert outcome["residual"] == pytest.approx(abs(share), rel=1e-6)
+        # Over the largest energy of the run, which an exchange has changed by less than 1e-4 of it.
+        assert outcome["residual"] == pytest.approx(abs(share), rel=1e-6 if scheme == "energy" else 1e-4)
 
 
 def test_a_cell_is_stopped_by_what_its_last_steps_show_when_it_is_cut(monkeypatch):

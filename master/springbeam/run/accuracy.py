@@ -103,9 +103,10 @@ def pick(scene: Scene) -> Trajectory:
             continue
         if coarse is not None:
             before, errors = _estimated(coarse, fine, asked, before)
-            # Runs that share a step, as from an event to a macro point, agree on its curve whether it is right or not.
+            # Runs that share a step, as from an event to a macro point, agree on its curve whether it is right or not;
+            # so may runs whose steps are long beside a period.
             errors["motion"] = max(errors["motion"], fine.summary.get("misplaced_ends", 0.0))
-            if _SAFETY * max(errors.values()) <= asked:
+            if _SAFETY * max(errors.values()) <= asked and fine.summary["resolved"]:
                 return _told(fine, asked, errors, pilots)
         pilots.append(fine)
         coarse = fine

@@ -178,6 +178,10 @@ class Detector:
             return force, -scale / size
 
         locate(evaluate, guess, size, _SHARP * scale, state.time)
+        if last.size < SAME * H and start > _SHARP * scale:
+            # The sign at the start decides. Short trial steps turn the mismatch of the ends' velocities round, which
+            # damping turns into a force: the parabola through the whole step then shows better when it vanishes.
+            last = pair.attempt(state, guess, step.start)
         return (last if last.size >= SAME * H else self._no_step(last)), kind
 
     # -- events told by positions -----------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ LAG = 0.015
 #: Share of its way that an end may be from where the law of the contact would have it, by degree of the force: a soft
 #: law, a tie. At degree 0 it is mostly known to some tenths of itself; it leaves out what the force of a higher degree
 #: feels of the fastest waves, and what ends that part decide from one step to the next.
-MISPLACED, MISPLACED_TIED = (0.006, 0.002, 0.001), (0.004, 0.002, 0.001)
+MISPLACED, MISPLACED_TIED = (0.006, 0.002, 0.001), (0.0025, 0.002, 0.001)
 #: Share of its way by which what the steps leave out of measured loads may move an end; that is known to a factor of 3.
 LEFT_OUT = 0.01
 #: Share of its way by which an end may be off between the rows, as `springbeam.results.dense.between_rows` tells it.
