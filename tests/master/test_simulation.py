@@ -7,7 +7,7 @@ from scenes import kinds, scene_from_dict
 
 import springbeam
 from springbeam.bodies.gate import admit
-from springbeam.bodies.protocol import NO_FORCE, Abilities, StepRefused
+from springbeam.bodies.protocol import Abilities, StepRefused
 from springbeam.contact.phases import Joint, Phase
 from springbeam.results.steps import STEP
 from springbeam.run.ledger import bounds, errors
@@ -67,28 +67,6 @@ def test_a_soft_contact_within_a_step_is_told_where_the_path_of_the_ends_has_it(
     assert there.gap == pytest.approx([0.0, 0.0], abs=1e-14)
     for name in ("y", "z", "u_tip", "v_tip"):
         assert [getattr(event, name) for event in run.events] == pytest.approx(there[name], rel=1e-10), name
-
-
-class Sinking(DuffingBody):
-    """Sinks in steps shorter than 50 ms by 8 m/s, from 0.19 s on: where a step does not resolve a motion, its end tells
-    little of what a shorter one does."""
-
-    def advance(self, time, size, contact, foundation=NO_FORCE):
-        super().advance(time, size, contact, foundation)
-        if time > 0.19 and size < 0.049:
-            self.y -= 8.0 * size
-        return self.motion()
-
-
-def test_a_step_that_a_separation_cuts_may_meet_something_before():
-    """Two masses swing as one, x = 0.1 cos ωt with ω² = 50, and would part at x = 0. The step cut there falls through Ψ
-    at −0.05 m before, and there the ends are tied."""
-    coupling, spring = {"macro_step": 0.05}, {"equilibrium": -0.05, "cubic_stiffness": 0.0}
-    tables = {"beam": {"approach": "elastic"}, "spring": spring, "time": {"t_end": 0.25}, "stop": None}
-    ends = Upper(1.0, 100.0, 0.0, y=0.1), Sinking(1.0, 0.0, 0.0, y=0.1)
-    run, _ = stopping(with_changes(load_scene("soft"), coupling=coupling, **tables), lambda *_: ends)
-    assert kinds(run) == ["impact", "retie"]  # and stops there, for the energy that sinking takes
-    assert 0.2 < run.events[1].time < 0.5 * np.pi / np.sqrt(50.0)
 
 
 # -- steps that fail ------------------------------------------------------------------------------------------------

@@ -103,10 +103,9 @@ def pick(scene: Scene) -> Trajectory:
             continue
         if coarse is not None:
             before, errors = _estimated(coarse, fine, asked, before)
-            # Runs that share a step, as from an event to a macro point, agree on its curve whether it is right or not;
-            # so may runs whose steps are long beside a period.
+            # Runs that share a step, as from an event to a macro point, agree on its curve whether it is right or not.
             errors["motion"] = max(errors["motion"], fine.summary.get("misplaced_ends", 0.0))
-            if _SAFETY * max(errors.values()) <= asked and fine.summary["resolved"]:
+            if _SAFETY * max(errors.values()) <= asked:
                 return _told(fine, asked, errors, pilots)
         pilots.append(fine)
         coarse = fine
@@ -136,7 +135,10 @@ def _estimated(
 
 
 def _first(scene: Scene) -> float:
-    """Return the number of macro steps of the first run: half as many as one needs that calls itself resolved."""
+    """Return the number of macro steps of the first run: half as many as one needs that calls itself resolved.
+
+    Without a beam, whose slowest oscillation is known, as many: a body may turn faster than it does at rest.
+    """
     rates = [omega / TURN for _, omega, _ in slow_oscillations(scene)]
     if scene.beam is not None and not scene.partners:
         if scene.massless:
@@ -145,7 +147,8 @@ def _first(scene: Scene) -> float:
             rates.append(_contact_frequency(scene) / _CONTACT_TURN)
         elif scene.coupled or scene.stop is not None:
             rates.append(lasting_frequency(scene.beam) / _WAVE_TURN)
-    return max(_FEWEST, math.ceil(0.5 * max(rates, default=0.0) * scene.duration))
+    share = 1.0 if scene.beam is None else 0.5
+    return max(_FEWEST, math.ceil(share * max(rates, default=0.0) * scene.duration))
 
 
 def _contact_frequency(scene: Scene) -> float:
