@@ -1,4 +1,4 @@
-"""Pictures and tables of docs/measured.md:  .venv/bin/python docs/accuracy.py [STUDY]…   (all: some ten minutes)
+"""Pictures and tables of docs/measured.md:  .venv/bin/python docs/accuracy.py [STUDY]…   (all: some minutes)
 
 The studies are those of `springbeam tradeoff`, and scipy's solvers on the same problem (tests/bench/rivals.py), one
 after the other, timed in processor time, of which what else runs on
@@ -37,8 +37,6 @@ class Window(NamedTuple):
 WINDOWS = {
     "soft": Window("soft", {}, None),
     "steel-bumper": Window("steel-bumper", {}, None),
-    "bar-impact": Window("bar-impact", {}, None),
-    "paper-fig2": Window("paper-fig2", {"coupling": {"macro_step": 1e-7}}, 0.50002),
 }
 runner.perf_counter = tradeoff.perf_counter = rivals.perf_counter = process_time  # type: ignore[attr-defined]
 #: Schemes at the scene's own macro step and at 4 times of it.
