@@ -71,7 +71,7 @@ def test_what_a_heavier_tip_takes_up_at_once_has_struck_for_the_last_time_unless
     transitions = transitions_of(tip_mass=10.0, stop={"restitution": e, "position": -0.015})
     ends = tuple(Motion(-0.015, w, 0.0, 0.0) for w in (v, -0.5))
     found, *_ = transitions.after(EventKind.STOP_IMPACT, Phase(Joint.TIED), ends, 0.0, ends, 0.0, 1e-17)
-    assert (found, transitions.state) == (kind, max(abs(v), 0.5))
+    assert found == kind
 
 
 @pytest.mark.parametrize("e", [0.0, 0.9, 1.0])

@@ -90,6 +90,7 @@ def pick(scene: Scene) -> Trajectory:
     pilots: list[Trajectory] = []
     coarse: Trajectory | None = None
     before: dict[str, float] = {}
+    agreed = False
     while steps <= _MOST:
         prepared = _prepared(scene, scene.duration / steps)
         steps *= 2.0
@@ -105,8 +106,11 @@ def pick(scene: Scene) -> Trajectory:
             before, errors = _estimated(coarse, fine, asked, before)
             # Runs that share a step, as from an event to a macro point, agree on its curve whether it is right or not.
             errors["motion"] = max(errors["motion"], fine.summary.get("misplaced_ends", 0.0))
-            if _SAFETY * max(errors.values()) <= asked:
+            agrees = _SAFETY * max(errors.values()) <= asked
+            # Where a body turns too far in a step, one more halving shows whether the runs agreed by chance.
+            if agrees and (agreed or fine.summary["resolved"]):
                 return _told(fine, asked, errors, pilots)
+            agreed = agrees
         pilots.append(fine)
         coarse = fine
     reached = f"runs still differ by {max(before.values()):.1e}" if before else f"a run that may do takes {steps:.1g}"
@@ -135,10 +139,7 @@ def _estimated(
 
 
 def _first(scene: Scene) -> float:
-    """Return the number of macro steps of the first run: half as many as one needs that calls itself resolved.
-
-    Without a beam, whose slowest oscillation is known, as many: a body may turn faster than it does at rest.
-    """
+    """Return the number of macro steps of the first run: half as many as one needs that calls itself resolved."""
     rates = [omega / TURN for _, omega, _ in slow_oscillations(scene)]
     if scene.beam is not None and not scene.partners:
         if scene.massless:
@@ -147,8 +148,7 @@ def _first(scene: Scene) -> float:
             rates.append(_contact_frequency(scene) / _CONTACT_TURN)
         elif scene.coupled or scene.stop is not None:
             rates.append(lasting_frequency(scene.beam) / _WAVE_TURN)
-    share = 1.0 if scene.beam is None else 0.5
-    return max(_FEWEST, math.ceil(share * max(rates, default=0.0) * scene.duration))
+    return max(_FEWEST, math.ceil(0.5 * max(rates, default=0.0) * scene.duration))
 
 
 def _contact_frequency(scene: Scene) -> float:
