@@ -36,7 +36,6 @@ class Window(NamedTuple):
 
 WINDOWS = {
     "soft": Window("soft", {}, None),
-    "steel-bumper": Window("steel-bumper", {}, None),
 }
 runner.perf_counter = tradeoff.perf_counter = rivals.perf_counter = process_time  # type: ignore[attr-defined]
 #: Schemes at the scene's own macro step and at 4 times of it.
