@@ -126,8 +126,8 @@ def test_ends_that_part_with_different_velocities_are_said_to_be_off():
     assert said == pytest.approx(off, rel=0.4)
 
 
-def test_ends_that_are_let_go_while_they_pull_are_off_by_the_time_of_it():
-    """The tie pulls by 100 N where y passes Ψ: y is off, so it is let go late, which both ends keep."""
+def test_a_late_release_of_a_tie_that_pulls_is_counted():
+    """The tie pulls by 100 N where y passes Ψ: an error of y shifts the release, and both ends keep that impulse."""
     tables = {
         "time": {"t_end": 0.38},
         "beam": {

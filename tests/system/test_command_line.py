@@ -213,7 +213,7 @@ def test_without_fmus_the_error_says_what_builds_them(here, monkeypatch, line):
 
 @pytest.mark.parametrize("line", ["keys", "keys --json"])
 def test_an_output_that_is_closed_is_no_success(line):
-    """As of `| head`: it had ended with 1, as a check that has failed."""
+    """A reader that stops, as `head` does, ends the command with 3; 1 would be a check that failed."""
     receiver, sender = os.pipe()
     os.close(receiver)
     done = subprocess.run([sys.executable, "-m", "springbeam", *line.split()], stdout=sender, stderr=subprocess.PIPE)

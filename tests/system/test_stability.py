@@ -287,7 +287,7 @@ def test_command(tmp_path, monkeypatch, unpainted, kinds, code):
         assert load_scene(path).time.t_end > 0.0
 
 
-# -- critical macro steps: measured with the FMUs as docs/stability.md predicts them ---------------------------------
+# -- critical macro steps: measured with the FMUs, as they are predicted -----------------------------------------
 
 
 def linear_scene(law, stiffness, scheme, degree, H=4e-3):

@@ -100,7 +100,9 @@ def pick(scene: Scene) -> Trajectory:
             if steps > _MOST or error.run is None:
                 raise
             pilots.append(error.run)
-            coarse, before = None, {}
+            coarse = None
+            before = {}
+            agreed = False
             continue
         if coarse is not None:
             before, errors = _estimated(coarse, fine, asked, before)

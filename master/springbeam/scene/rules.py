@@ -6,8 +6,7 @@ Longer than other modules, since nearly all of it is one table of such rules.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from itertools import product
+from collections.abc import Mapping
 from typing import Any
 
 from .laws import laws_that
@@ -74,15 +73,6 @@ def _averages(scene: Scene) -> bool:
 def _let_go(scene: Scene) -> bool:
     """Return whether our beam has no inertia and is released at the start."""
     return scene.beam is not None and scene.massless and scene.beam.approach == "elastic"
-
-
-def _of_others(when: Callable[[Scene], bool], text: str) -> Iterator[Rule]:
-    """Yield a rule for each body that is not our own, which ``{body}`` in its text names."""
-    for table, key in product(("beam", "spring"), ("fmu", "element")):
-        yield Rule(
-            lambda s, table=table, key=key: hasattr(s.under(table), key) and when(s),
-            text.replace("{body}", f"{{{table}.{key}}}"),
-        )
 
 
 def _ends(scene: Scene) -> Mapping[str, Any]:
@@ -368,9 +358,13 @@ FORBIDDEN: tuple[Rule, ...] = (
         lambda s: {"energy": spring_energy(s.spring), "depth": well_depth(s)},
     ),
     # Bodies that are not our own
-    *_of_others(
-        lambda s: s.massless and s.contact.facts.strikes,
-        '{body}: {contact.law} needs our own spring below {beam.fidelity}; use law = "tie", or fidelity = "dynamic"',
+    *(
+        Rule(
+            lambda s, key=key: s.massless and s.contact.facts.strikes and hasattr(s.lower, key),
+            f"{{spring.{key}}}: {{contact.law}} needs our own spring below {{beam.fidelity}}; "
+            'use law = "tie", or fidelity = "dynamic"',
+        )
+        for key in ("fmu", "element")
     ),
     # Steps; an accuracy picks scheme, degree and steps that go together
     Rule(
