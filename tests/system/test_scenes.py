@@ -156,3 +156,12 @@ def test_a_force_too_large_for_a_double_halves_the_step():
     run = simulate(scene)
     assert run.summary["halved_steps"] > 0
     assert (run.v_tip[-1], run.z[-1]) == pytest.approx((1e4 / 3.0, -2e4 / 3.0), rel=1e-10)
+
+
+def test_ends_that_can_only_push_have_no_negative_force():
+    """Also in the row at 0.3485 s of `soft`, where the ends meet and part at once."""
+    run = simulate(load_scene("soft"))
+    assert run.contact_force[run.phase == "touch"].min() == 0.0
+    assert run.contact_force[run.phase == "tied"].min() < -1.0
+    at_once = [event.time for event, after in zip(run.events, run.events[1:], strict=False) if event.time == after.time]
+    assert len(at_once) == 1

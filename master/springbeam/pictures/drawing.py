@@ -89,7 +89,7 @@ POSITIONS = {
 VELOCITIES = {"v_tip": Look(BLUE, "tip v(t, L)", Line(1.5)), "z": Look(VERMILLION, "spring top z", Line(0.8))}
 ACCELERATIONS = {"a_tip": Look(BLUE, "tip", Line(1.4)), "a_y": Look(VERMILLION, "spring top", Line(0.8))}
 FORCES = {
-    "contact_force": Look(ORANGE, "contact C, as applied", Line(2.6, opacity=0.7)),
+    "contact_force": Look(ORANGE, "contact C", Line(2.6, opacity=0.7)),
     "compliance_force": Look(GREEN, "of the law", Line(1.0, dashed=True)),  # in the words of the law: `panels.forces`
     "foundation_force": Look(BLACK, "foundation N", Line(0.9)),
 }

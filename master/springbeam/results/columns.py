@@ -36,9 +36,13 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     """
     u, v, y, z = (steps[f"{name}_after"] for name in ("u_tip", "v_tip", "y", "z"))
     apart, rigid, zeros = ~joined(steps), scene.contact.rigid, np.zeros(len(steps))
-    contact, inside = steps["contact_force_after"], steps["contact_force_after"]
+    contact = steps["contact_force_after"]
     if rigid:
         v, z = (np.where(apart, own, common(steps, steps["phase"] >= 3.0, "v_tip_after", "z_after")) for own in (v, z))
+    phase = PHASE_NAMES[steps["phase"].astype(int)]
+    if rigid:  # ends that touch and part at once: what they would pull by is no contact force
+        contact = np.where(phase == "touch", np.maximum(contact, 0.0), contact)
+    inside = contact
     if scene.coupled and rigid and not scene.contact.lasting:
         inside = np.minimum(normal_compliance(scene, u, first), MOST_SHOWN)
     energies = ledger(scene, steps)
@@ -53,7 +57,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
         "tie_reaction": contact - inside if rigid else zeros,
         "foundation_force": steps["foundation_force_after"],
         "gap": u - y,
-        "phase": PHASE_NAMES[steps["phase"].astype(int)],
+        "phase": phase,
         **energies,
         "energy_residual": energies["e_total"] - steps["energy_at_start"],
         **{f"load_{i}": load.value(steps["time"]) for i, load in enumerate(scene.loads)},

@@ -1,7 +1,7 @@
 """The numbers of a run that engineers ask for: how hard, how long, how fast back, and where the energy went.
 
-They go into ``summary.json``, and each is a metric of sweeps. The contact force C between the steps' ends is the
-polynomial that was applied, so its integral, and its mean over any window, are those of the run, to rounding.
+They go into ``summary.json``, and each is a metric of sweeps. The impulse of a
+step is that of the polynomial that was applied, without the part that turns a mismatch of velocities round (`impulse`).
 """
 
 from __future__ import annotations
