@@ -59,7 +59,7 @@ class HeldContact {
   };
   const std::array<int, kinds>& missed() const { return missed_; }  ///< steps so far, by kind; no part of the state
 
-  /// Everything that a step changes; doubles only, see flat.hpp.
+  /// The whole state: all that a step changes, in doubles.
   struct State {
     double tip = 0.0, next = 0.0;        ///< u_tip now and after the coming step [m]
     double force = 0.0;                  ///< over that step [N]

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "flat.hpp"
 #include "rest.hpp"
 #include "text.hpp"
 
@@ -199,10 +198,11 @@ void Spring::strike(double time) {
 }
 
 bool Spring::finite() const {
-  bool all = std::isfinite(acceleration()) && std::isfinite(reaction()) && std::isfinite(kinetic_energy()) &&
-             std::isfinite(potential_energy()) && std::isfinite(contact_energy());
-  for (double value : flat(state_)) all = all && std::isfinite(value);
-  return all;
+  // A sum is not finite where one of its terms is not.
+  const State& s = state_;
+  return std::isfinite(s.y + s.z + s.integral + s.integral_2 + s.dissipated + s.impact_loss + s.load_work +
+                       s.stop_force + s.stop_impulse + s.force + s.tip + s.tip_rate + s.tip_curvature + acceleration() +
+                       reaction() + kinetic_energy() + potential_energy() + contact_energy());
 }
 
 /// What acts at `t` is what accelerations and reactions refer to.
@@ -242,16 +242,5 @@ double Spring::kinetic_energy() const { return parameters_.mass / 2 * state_.z *
 double Spring::potential_energy() const { return motion_.potential_energy(state_.y); }
 double Spring::spring_force() const { return motion_.spring_force(state_.y); }
 double Spring::contact_energy() const { return motion_.compliance().energy(depth()); }
-
-void Spring::save(std::vector<double>& state) const {
-  const auto numbers = flat(state_);
-  state.assign(numbers.begin(), numbers.end());
-}
-
-void Spring::restore(const std::vector<double>& state) {
-  if (state.size() != Flat<State>{}.size())
-    throw std::invalid_argument("spring: a saved state of " + std::to_string(state.size()) + " numbers is none of its");
-  state_ = from_flat<State>(state.data());
-}
 
 }  // namespace spring

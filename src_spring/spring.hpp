@@ -9,7 +9,6 @@
 
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "flight.hpp"
 #include "motion.hpp"
@@ -83,13 +82,7 @@ class Spring {
   /// Whether the tip is where the last step left it, and none has been observed since.
   bool extrapolated() const { return state_.extrapolated != 0.0; }
 
-  /// The whole dynamic state as a flat vector of fixed length.
-  void save(std::vector<double>& state) const;
-  /// A state that a spring with the same parameters has saved. @throws std::invalid_argument if its length does not fit
-  void restore(const std::vector<double>& state);
-
- private:
-  /// Everything that a step changes; doubles only, see flat.hpp.
+  /// The whole dynamic state: all that a step changes, in doubles.
   struct State {
     double y, z;
     double integral = 0.0, integral_2 = 0.0;
@@ -103,6 +96,11 @@ class Spring {
     double steps = 0.0;         ///< IDA's, since the start
     double meeting = 0.0;       ///< 1: the last step ended early where contact begins or ends
   };
+  const State& state() const { return state_; }
+  /// @pre the state is of a spring with the same parameters
+  void restore(const State& state) { state_ = state; }
+
+ private:
   class Step;
   void see(const Loads& loads, double t, bool extrapolated);
   double depth() const { return parameters_.compliant() ? state_.y - state_.tip : -1.0; }

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "../../src_spring/compliance.hpp"
-#include "../../src_spring/flat.hpp"
 #include "../../src_spring/held_contact.hpp"
 #include "../../src_spring/parameters.hpp"
 #include "../../src_spring/spring.hpp"
+#include "../adapter/flat.hpp"
 #include "../adapter/table.hpp"
 #include "../adapter/text.hpp"
 
@@ -146,19 +146,22 @@ struct SpringModel final : fmi::Model {
   }
 
   void save(std::vector<double>& state) const override {
-    spring->save(state);
-    if (!held) return;
-    const auto more = spring::flat(held->state());
-    state.insert(state.end(), more.begin(), more.end());
+    if (held)
+      fmi::flatten(state, spring->state(), held->state());
+    else
+      fmi::flatten(state, spring->state());
   }
 
   void restore(const std::vector<double>& state) override {
-    using Held = HeldContact::State;
-    const std::size_t own = held ? spring::Flat<Held>{}.size() : 0;
-    if (state.size() < own) throw std::invalid_argument("spring: a saved state is too short");
-    const auto mine = state.end() - static_cast<std::ptrdiff_t>(own);
-    if (held) held->restore(spring::from_flat<Held>(&*mine));
-    spring->restore({state.begin(), mine});
+    Spring::State top = spring->state();
+    if (held) {
+      HeldContact::State contact = held->state();
+      fmi::restore(state, top, contact);
+      held->restore(contact);
+    } else {
+      fmi::restore(state, top);
+    }
+    spring->restore(top);
     settle();  // what was seen of the inputs is part of the state
   }
 
@@ -245,8 +248,7 @@ struct SpringModel final : fmi::Model {
 
   /// Where the top would be after the next step, other inputs staying as they are; the spring is left as it was.
   HeldContact::Top trial() const {
-    std::vector<double> start;
-    spring->save(start);
+    const Spring::State start = spring->state();
     spring::Inputs next = acting();
     for (auto* input : {&next.foundation_force, &next.external_force, &next.base_acceleration})
       (*input)[1] = (*input)[2] = 0.0;

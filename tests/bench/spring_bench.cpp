@@ -134,8 +134,7 @@ void compare(const char* name, const Problem& p, double relative, const bench::O
   BareIda bare(p, relative, 1e-2 * relative);
   spring::Inputs inputs;
   inputs.contact_force[0] = p.C;
-  std::vector<double> start;
-  spring.save(start);
+  const spring::Spring::State start = spring.state();
   const auto ours = [&] {
     spring.restore(start);
     spring.step(p.H, inputs);

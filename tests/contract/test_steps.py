@@ -244,6 +244,29 @@ def test_foreign_bytes_are_refused_with_the_reason(case, damage, why):
     assert why in k.message
 
 
+def fnv(data):
+    """FNV-1a, the checksum of a saved state."""
+    value = 0xCBF29CE484222325
+    for byte in data:
+        value = (value ^ byte) * 0x100000001B3 % 2**64
+    return value.to_bytes(8, "little")
+
+
+@pytest.mark.parametrize("change", [lambda numbers: numbers[:-8], lambda numbers: numbers + bytes(8)])
+def test_a_state_of_another_length_is_refused_and_changes_nothing(case, change):
+    """Bytes that are whole, as the checksum says, of an instance that has other parameters."""
+    k = case.moving()
+    before = k.outputs()
+    blob = k.serialized()
+    end = len(case.description.guid) + 8
+    numbers = change(blob[end:])
+    state = k.deserialized(blob[: end - 8] + fnv(numbers) + numbers)
+    assert k.status(k.restore, state) == ERROR
+    assert "numbers does not belong to this instance" in k.message
+    k.restore(k.deserialized(blob))
+    assert k.outputs() == before
+
+
 def test_a_state_of_the_other_fmu_is_refused(beam, spring):
     blob = beam.running().serialized()
     k = spring.running()

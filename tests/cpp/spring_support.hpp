@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <vector>
 
@@ -102,10 +103,12 @@ inline double roughness(const std::vector<double>& values) {
   return static_cast<double>(worst);
 }
 
-inline std::vector<double> saved(const spring::Spring& s) {
-  std::vector<double> state;
-  s.save(state);
-  return state;
+/// A state as numbers, to compare.
+template <class State>
+std::vector<double> numbers(const State& state) {
+  std::vector<double> all(sizeof state / sizeof(double));
+  std::memcpy(all.data(), &state, sizeof state);
+  return all;
 }
 
 }  // namespace spring_test

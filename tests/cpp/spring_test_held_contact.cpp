@@ -12,15 +12,14 @@
 #include <vector>
 
 #include "compliance.hpp"
-#include "flat.hpp"
 #include "held_contact.hpp"
 #include "spring.hpp"
 #include "spring_support.hpp"
 
 using spring::Compliance;
-using spring::flat;
 using spring::HeldContact;
 using spring::TipMessage;
+using spring_test::numbers;
 using spring_test::pi;
 
 namespace {
@@ -180,8 +179,7 @@ TEST(HeldContact, EnergyIsConservedThroughImpactsOfTheTop) {
   spring::Spring top(p);
   FreeMass tip{m_tip, 0.0, v};
   const auto foresee = [&] {
-    std::vector<double> state;
-    top.save(state);
+    const spring::Spring::State state = top.state();
     return [&top, state, H](double force) {
       spring::Inputs inputs;
       inputs.contact_force[0] = force;
@@ -243,8 +241,7 @@ TEST(HeldContact, EnergyIsConservedOnAStiffSpring) {
     const TipMessage seen{1e-4, 0.0};
     long trials = 0;
     const auto foresee = [&] {
-      std::vector<double> state;
-      top.save(state);
+      const spring::Spring::State state = top.state();
       return [&top, &trials, state, H](double force) {
         ++trials;
         spring::Inputs inputs;
@@ -282,7 +279,7 @@ TEST(HeldContact, AForceOutOfRangeIsNoForce) {
   c.contact.begin(c.seen, true, 0.0, c.foresee());
   EXPECT_NEAR(c.contact.force(), force, 1e-12 * force);
   c.contact.restore(state);
-  EXPECT_EQ(flat(c.contact.state()), flat(state));
+  EXPECT_EQ(numbers(c.contact.state()), numbers(state));
 }
 
 TEST(HeldContact, ATipThatLeavesTheRangeIsNoForce) {
@@ -303,7 +300,7 @@ TEST(HeldContact, ARestoredStateGoesOnBitByBit) {
   for (int i = 0; i < 5; ++i) {
     c.step();
     other.step();
-    EXPECT_EQ(flat(c.contact.state()), flat(other.contact.state()));
+    EXPECT_EQ(numbers(c.contact.state()), numbers(other.contact.state()));
   }
   EXPECT_GT(c.tip.v, 0.0);  // the collision was among these steps
 }

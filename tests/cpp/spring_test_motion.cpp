@@ -248,7 +248,7 @@ TEST(Spring, DisplacementDependsSmoothlyOnTheForce) {
                         Case{150, 67, 0.05, 1.0, 4e-3, 50.0}, Case{3, -0.2, 0.5, 0.3, 0.1, 1.0}}) {
     for (const double range : {1e-10, 1e-6}) {
       Spring s(duffing(c.k1, c.k2, c.y, c.z));
-      const auto start = saved(s);
+      const auto start = s.state();
       std::vector<double> y, z;
       for (int i = 0; i < 200; ++i) {
         Inputs inputs;

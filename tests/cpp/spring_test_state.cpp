@@ -61,11 +61,11 @@ Parameters everything() {
 
 /// What a step says that cannot be completed; the state must be as before.
 std::string failure(Spring& spring, double size, const Inputs& inputs = {}) {
-  const auto before = saved(spring);
+  const auto before = spring.state();
   try {
     spring.step(size, inputs);
   } catch (const spring::StepFailure& error) {
-    EXPECT_EQ(saved(spring), before);
+    EXPECT_EQ(numbers(spring.state()), numbers(before));
     return error.what();
   }
   return "the step was completed";
@@ -100,9 +100,9 @@ TEST(SpringState, RepeatedStepsAreBitIdentical) {
     inputs.tip_displacement = {-0.012, 0.05, 0.0};
     s.step(1e-3, inputs);
     s.apply_impulse(-0.01);
-    const auto start = saved(s);
+    const auto start = s.state();
     s.step(3e-2, inputs);
-    const auto once = saved(s);
+    const auto once = s.state();
 
     // Other sizes and forces in between, on the same object.
     for (const double size : {0.2, 1e-7, 5e-3}) {
@@ -111,9 +111,9 @@ TEST(SpringState, RepeatedStepsAreBitIdentical) {
       s.step(size, other);
     }
     s.restore(start);
-    EXPECT_EQ(saved(s), start);
+    EXPECT_EQ(numbers(s.state()), numbers(start));
     s.step(3e-2, inputs);
-    EXPECT_EQ(saved(s), once);
+    EXPECT_EQ(numbers(s.state()), numbers(once));
 
     // On another object, fresh or with a history.
     Spring fresh(p), used(p);
@@ -121,18 +121,11 @@ TEST(SpringState, RepeatedStepsAreBitIdentical) {
     for (Spring* other : {&fresh, &used}) {
       other->restore(start);
       other->step(3e-2, inputs);
-      EXPECT_EQ(saved(*other), once);
+      EXPECT_EQ(numbers(other->state()), numbers(once));
       EXPECT_EQ(other->acceleration(), s.acceleration());
       EXPECT_EQ(other->reaction(), s.reaction());
     }
   }
-}
-
-TEST(SpringState, AStateOfAnotherLengthIsRefused) {
-  Spring s(softening());
-  const auto before = saved(s);
-  EXPECT_THROW(s.restore({1.0, 2.0}), std::invalid_argument);
-  EXPECT_EQ(saved(s), before);
 }
 
 TEST(SpringState, ImpulseChangesTheVelocityByJOverM) {
@@ -208,14 +201,14 @@ TEST(SpringEscape, BeyondTheHilltopItRunsAway) {
     double t = 0.0;
     bool escaped = false;
     for (int i = 0; i < 400 && !escaped; ++i) {
-      const auto before = saved(s);
+      const auto before = s.state();
       try {
         s.step(0.02, Inputs{});
         t += 0.02;
       } catch (const spring::StepFailure& failure) {
         escaped = true;
         EXPECT_NEAR(t + failure.reached, T, 1e-9);
-        EXPECT_EQ(saved(s), before);
+        EXPECT_EQ(numbers(s.state()), numbers(before));
         expect(failure.what(), {"run away, past its hilltop |y| = 3.87298", "a step of 0.02 s fails after"});
       }
     }
