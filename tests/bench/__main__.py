@@ -14,6 +14,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import against_scipy
+import command_line
 import fmus
 import master
 import sweeps
@@ -23,6 +24,7 @@ sys.path.append(str(Path(__file__).parents[2] / "docs"))
 from pages import table, write_section
 
 GROUPS = {
+    "cli": command_line.commands,
     "beam": fmus.beam,
     "spring": fmus.spring,
     "master": master.master,
