@@ -16,7 +16,12 @@ from commands import COMMAND, HANGS, command
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md")), *sorted(ROOT.glob("src_*/README.md"))]
+PAGES = [
+    ROOT / "README.md",
+    *sorted(DOCS.glob("*.md")),
+    *sorted(ROOT.glob("src_*/README.md")),
+    ROOT / "master/springbeam/paper/README.md",
+]
 
 #: What each program prints, as a regular expression, by page and number of the block.
 PROGRAMS = {
@@ -42,7 +47,7 @@ NOT_RUN = {
     "./build.sh bench": "measures for minutes",
     "SPRINGBEAM_STEPS=1000000": "takes minutes; test_long.py makes fewer steps",
     ".venv/bin/python docs/accuracy.py": "takes minutes",
-    ".venv/bin/python docs/paper_figures.py": "takes minutes",
+    ".venv/bin/python docs/paper.py": "takes minutes",
     "./build.sh campaign": "takes minutes; test_accuracy.py judges a scene with it",
     "springbeam animate results/soft": "draws for half a minute; the command is in test_animation.py",
     "springbeam sweep vibro-impact": "takes a minute; the command is in test_sweep.py",

@@ -1,4 +1,4 @@
-"""Algorithm 1 of Ahn & Tate, and the cases of their Figures 2–5 (``docs/paper.md``; command ``springbeam paper``).
+"""Algorithm 1 of Ahn & Tate, and the cases of their Figures 2–5 (``README.md``; command ``springbeam paper``).
 
 The algorithm decides in each step what touches, overwrites states, and changes the energy by that, so it is no contact
 law of a run. ``co_simulation`` advances the beam and the spring FMU by it, ``monolithic`` solves the same steps as one

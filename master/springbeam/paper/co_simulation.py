@@ -3,7 +3,7 @@
 The beam FMU steps by the midpoint rule, which is (62); the spring's midpoint rule (53) is replaced by IDA over the
 step, and wherever the algorithm overwrites y or z a new instance of the spring FMU begins there. The tip is moved to y
 (lines 18, 21) by the constant tip force that does so; nothing opposes that force, so its work is energy from nowhere,
-and ``energy_residual`` shows it. Readings where the print leaves something open: ``docs/paper.md``.
+and ``energy_residual`` shows it. Readings where the print leaves something open: ``README.md``.
 """
 
 from __future__ import annotations

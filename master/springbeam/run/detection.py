@@ -133,7 +133,7 @@ class Detector:
     def _pulled(self, state: State, present: Present, ends: Ends) -> EventKind | None:
         """Return the event that is due where a force that can only push would pull by more than rounding."""
         kind, pair, H = self._pair.let_go_by(state.phase), self._pair, self._steps.size
-        if kind is None:
+        if kind is None or state.met_again == state.time:
             return None
         pull = -present.held_by(kind)
         if pull <= 0.0:
@@ -182,7 +182,9 @@ class Detector:
             # The sign at the start decides. Short trial steps turn the mismatch of the ends' velocities round, which
             # damping turns into a force: the parabola through the whole step then shows better when it vanishes.
             last = pair.attempt(state, guess, step.start)
-        return (last if last.size >= SAME * H else self._no_step(last)), kind
+        if last.size >= SAME * H:
+            return last, kind
+        return None if state.met_again == state.time else (self._no_step(last), kind)
 
     # -- events told by positions -----------------------------------------------------------------------------------
 

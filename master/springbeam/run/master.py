@@ -219,6 +219,9 @@ class Master:
         )
         # Another event at the time of an impact settles what that has begun.
         state.struck = state.time if kind.collision and pair.divides else -inf
+        if kind.collision and state.parted == state.time:
+            state.met_again = state.time
+        state.parted = state.time if kind.opens else -inf
         pair.apply_impulses(impact.on_beam, impact.on_spring)
         lost = impact.energy_loss + pair.follow_phase(phase)
         state.lost += lost

@@ -55,6 +55,10 @@ class State:
     begun: bool = False  #: whether the row of the start is made
     energy_at_start: float = 0.0  #: before an impact there [J]
     struck: float = -inf  #: when ends have met, if that was the last event [s]: they may part again soon
+    parted: float = -inf  #: when ends have parted, or a seat was left, if that was the last event [s]
+    #: When ends have met again at the time at which they had parted [s]: the accelerations there, those of waves that
+    #: the steps do not follow, show nothing of where the ends go, and the contact stays closed over the next step.
+    met_again: float = -inf
     #: Events in a row, each within a macro step of the one before: how many, and when the last was [s].
     in_a_row: tuple[int, float] = (0, -inf)
     macro_steps: int = 0
