@@ -34,7 +34,8 @@ void validate(const Parameters& p) {
   const int most_elements = 2 * max_elements / (p.element_degree * (p.element_degree + 1));
   if (p.n_elements > most_elements) {
     reject("n_elements", p.n_elements,
-           "between 1 and " + std::to_string(most_elements) + " with element_degree = " + std::to_string(p.element_degree));
+           "between 1 and " + std::to_string(most_elements) +
+               " with element_degree = " + std::to_string(p.element_degree));
   }
   if (p.integrator != Integrator::modal) return;
   const int unknowns = 2 * p.n_elements * p.element_degree;
@@ -142,7 +143,12 @@ void Beam::step(double size, const Polynomial& c, const Loads& loads) {
   look_at(c);
   loads.for_each([&look_at](std::size_t, const Polynomial& f) { look_at(f); });
   if (!small) throw_too_large(size, c, loads);
-  move(size, c, loads);
+  try {
+    move(size, c, loads);
+  } catch (const std::domain_error&) {
+    restore(start_);
+    throw;
+  }
   // By the largest one first, as squares may overflow; of their sum, as that is what NaN shows in.
   const auto in_range = [](const VectorXd& x) {
     return x.lpNorm<Eigen::Infinity>() < largest && x.squaredNorm() < largest * largest;

@@ -154,7 +154,7 @@ class Beam {
   // Step sizes, forces and impulses are finite, sizes > 0: whoever takes them from outside has checked that.
 
   /// Advance by `size` [s] under the tip force C [N] and the loads.
-  /// @throws std::domain_error (state unchanged) if the step is too long: a shorter one can be computed
+  /// @throws std::domain_error (state unchanged) if the step is too long: a shorter one may be computed
   /// @throws std::overflow_error (state unchanged) if the inputs or the result are too large
   void step(double size, const Polynomial& tip_force, const Loads& loads);
 

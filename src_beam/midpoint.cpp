@@ -1,13 +1,24 @@
 #include "midpoint.hpp"
 
+#include <stdexcept>
 #include <utility>
 
 #include "step_cache.hpp"
+#include "text.hpp"
 
 namespace beam {
 namespace {
 
 using Eigen::VectorXd;
+
+/// Last correction of the mean velocity, relative to it: what a step leaves of the energy errs by twice as much.
+constexpr double solved = 1e-8;
+/// Steps of iterative refinement: one up to KAG L²/EI = 1e10 with 1000 elements. Where 20 gain less than 8 digits, the
+/// factors are little but rounding.
+constexpr int most_refinements = 20;
+
+/// NaN if one value is.
+double largest(const VectorXd& x) { return x.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(); }
 
 /// S = M + k K of one step size, factorised.
 struct StepMatrix {
@@ -19,7 +30,7 @@ class MidpointBeam final : public Beam {
  public:
   /// `mesh` is that of `owned`.
   MidpointBeam(const Timoshenko& mesh, std::unique_ptr<const Timoshenko> owned, const Parameters& p)
-      : Beam(std::move(owned), p), mesh_(mesh), rhs_(mesh.size()) {
+      : Beam(std::move(owned), p), mesh_(mesh), shear_modulus_(p.shear_modulus), rhs_(mesh.size()) {
     const auto most = [](const Eigen::MatrixXd& values) { return values.lpNorm<Eigen::Infinity>(); };
     const double mu = p.density * p.area;
     require_coefficients({most(mesh_.element(1.0, 1.0)), most(mesh_.load(Loads::distributed)), most(struck_), mu,
@@ -61,20 +72,33 @@ class MidpointBeam final : public Beam {
     return free_ + tip_force * response_;
   }
 
-  /// x = S⁻¹ rhs_ with one step of iterative refinement.
+  /// x = S⁻¹ rhs_ with iterative refinement.
+  /// @throws std::domain_error
   void solve(const StepMatrix& S, VectorXd& x) {
     x = rhs_;
     S.factors.solve_in_place(x);
-    mesh_.add_products(-1.0, x, -S.k, x, rhs_);
-    S.factors.solve_in_place(rhs_);
-    x += rhs_;
+    for (int i = 0; i < most_refinements; ++i) {
+      correction_ = rhs_;
+      mesh_.add_products(-1.0, x, -S.k, x, correction_);
+      S.factors.solve_in_place(correction_);
+      x += correction_;
+      if (largest(correction_) <= solved * largest(x)) return;
+    }
+    free_size_ = 0.0;
+    throw std::domain_error(
+        "beam: rounding leaves no solution of the midpoint rule's equations in a step of this size: "
+        "shear_modulus = " +
+        number(shear_modulus_) +
+        " is too large beside young_modulus; use a "
+        "smaller shear_modulus, fewer elements, shorter steps, or the integrator modal");
   }
 
   const Timoshenko& mesh_;
+  double shear_modulus_;    // [Pa]
   double free_size_ = 0.0;  // of the step that the next three are of; 0: none
   Loads::Values free_loads_{};
-  VectorXd free_, response_;  // w without tip force, and of a unit tip force
-  VectorXd rhs_, w_;          // work space
+  VectorXd free_, response_;       // w without tip force, and of a unit tip force
+  VectorXd rhs_, correction_, w_;  // work space
   StepCache<StepMatrix> cache_;
 };
 
