@@ -48,32 +48,20 @@ def row(key: messages.Key) -> tuple[str, ...]:
     return f"`{key.name}`{unit}", value, default, key.meaning.replace("|", "\\|")
 
 
-def elements() -> list[str]:
-    """Return one table of the keys of all bodies that need no FMU."""
-    names = [name for name in messages.MODELS if name in messages.PARTNERS and name != "fmu"]
-    of: dict[tuple[str, ...], list[str]] = {}
-    for name in names:
-        for key in messages.listed(name):
-            if key.name != "element":
-                of.setdefault(row(key), []).append(f"`{name}`")
-    about = [f'* `element = "{name}"`: {messages.about(name)}' for name in names]
-    rows = [(*cells, ", ".join(of[cells])) for cells in of]
-    return ["## [beam] or [spring] with element\n", *about, "", *table((*COLUMNS, "of"), rows), ""]
-
-
 def page() -> str:
     """Return the text of scene.md."""
     lines = [HEAD]
-    for name, model in messages.MODELS.items():
-        if name in messages.PARTNERS and name != "fmu":
-            continue
+    for name in messages.MODELS:
         heading = messages.heading(name)
         lines += [f"## {heading}\n\n{messages.about(name)}\n" if name else f"## {heading.capitalize()}\n"]
-        for ways in model.WAYS:
+        for ways in [ways for model in messages.models_of(name).values() for ways in model.WAYS]:
             marked = ", or ".join(" and ".join(f"`{key}`" for key in group) for group in ways)
             lines.append(f"Give only one of these: {marked}.\n")
-        lines += [*table(COLUMNS, map(row, messages.listed(name))), ""]
-    return "\n".join([*lines, *elements()])
+        keys = messages.listed(name)
+        some = any(key.of for key in keys)
+        rows = [(*row(key), key.of) if some else row(key) for key in keys]
+        lines += [*table((*COLUMNS, "with") if some else COLUMNS, rows), ""]
+    return "\n".join(lines)
 
 
 def files() -> dict[Path, str]:

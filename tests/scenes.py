@@ -1,6 +1,7 @@
 """Scenes of tests: `soft` with changes; and scenes in units of their own, where what a body does not say is 1."""
 
 from springbeam import scene
+from springbeam.scene.laws import LAW
 
 CONTACT = {"stiffness": 1.0e4, "exponent": 3.0}
 SOFT = scene.load_scene("soft")
@@ -15,7 +16,8 @@ def soft(n_elements=6, **tables):
 
 def completed(tables):
     """Return the tables of a scene with what they leave out; of the contact a stiffness of 1e4 and an exponent of 3."""
-    below = {"beam": scene.Beam.ones(), "spring": scene.Spring.ones(), "contact": CONTACT}
+    contact = LAW.kept(CONTACT, LAW.kind(tables.get("contact", {})))
+    below = {"beam": scene.Beam.ones(), "spring": scene.Spring.ones(), "contact": contact}
     return {
         name: {**below[name], **content} if name in below and isinstance(content, dict) else content
         for name, content in tables.items()

@@ -142,7 +142,7 @@ def test_runs_are_compared_by_the_keys_and_results_that_differ(here, monkeypatch
 
     monkeypatch.setattr(springbeam.run.runner, "run", run)
     printed("run", "soft", "--no-plots", "--out", "a")
-    printed("run", "soft", "--no-plots", "--out", "b", "--set", "spring.mass=2.5", "--set", "contact.damping=0")
+    printed("run", "soft", "--no-plots", "--out", "b", "--set", "spring.mass=2.5", "--set", "spring.damping=0.0")
     found = json.loads(printed("compare", "a", "b", "--out", "p.png", "--json"))
     assert found["keys"] == {"spring.mass": [1.0, 2.5]}
     assert found["results"] == {

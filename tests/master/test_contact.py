@@ -5,7 +5,6 @@ from math import inf
 import pytest
 
 from springbeam import Motion, load_scene, with_changes
-from springbeam.contact.laws import Compliance, Link, depth
 from springbeam.contact.phases import (
     Impact,
     Joint,
@@ -14,6 +13,7 @@ from springbeam.contact.phases import (
 )
 from springbeam.results.steps import PHASE_NAMES
 from springbeam.results.trajectory import EventKind
+from springbeam.scene.laws import Compliance, Link, depth
 
 
 def transitions_of(scene="soft", tip_mass=0.01, mass=1.0, equilibrium=0.0, **tables):

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from numpy.polynomial import legendre
 
 from springbeam.bodies.protocol import NO_FORCE, Body, Motion
-from springbeam.contact.laws import Compliance, Link
 from springbeam.coupling.exchange import Exchange
 from springbeam.coupling.projection import Projection
 from springbeam.coupling.protocol import NotConverged
 from springbeam.coupling.soft import SoftSolver
 from springbeam.coupling.solver import StepSolver
+from springbeam.scene.laws import Compliance, Link
 
 # -- the tie by itself, on bodies exact to rounding: conditions, energy, orders, cost, stability, failures ------------
 

@@ -9,7 +9,6 @@ from bodies import DuffingBody, Upper
 
 from springbeam.bodies.protocol import NO_FORCE, Motion, StepRefused
 from springbeam.contact.events import EventFunctions, locate, no_dip, position_tolerance
-from springbeam.contact.laws import law_of
 from springbeam.contact.phases import Joint, Phase, common_velocity
 from springbeam.coupling.protocol import Step
 from springbeam.results.paths import Path
@@ -99,7 +98,7 @@ def test_what_may_happen_in_a_phase_is_as_far_away_as_it_is_and_comes_as_fast_as
 ):
     """Ψ is at 0.1 m, the stop at −15 mm; joined ends move with the velocity of their momentum."""
     scene = with_changes(load_scene(scene), **tables)
-    functions = EventFunctions(scene, law_of(scene), common_velocity(1.0, 0.0, 0.01, 1.0), 0.1)
+    functions = EventFunctions(scene, scene.soft_law, common_velocity(1.0, 0.0, 0.01, 1.0), 0.1)
     samples = functions.samples(phase, RISING)
     found = dict(zip((kind for kind, _ in functions.of(phase)), samples, strict=True))
     assert found == {kind: pytest.approx(sample, rel=1e-14) for kind, sample in expected.items()}

@@ -7,12 +7,12 @@ import pytest
 from bodies import DuffingBody, ModalBody, solve, unit_beam
 from scipy.linalg import expm
 
-from springbeam.contact.laws import Link
 from springbeam.coupling.exchange import Exchange
 from springbeam.coupling.soft import SoftSolver
 from springbeam.coupling.solver import StepSolver
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import load_scene, with_changes
+from springbeam.scene.laws import Link
 from springbeam.scene.statics import tip_inertia
 from springbeam.studies.stability.predict import (
     LinearBody,

@@ -67,7 +67,7 @@ def test_rows_are_themselves_and_between_them_every_column_holds(changes):
         mean = sum(weight * there[name] for weight, there in zip(weights, inside, strict=True)) / 2.0
         applied = impulse(run.steps, name)[rows] / steps["size"]
         compared = free | ~together
-        if run.scene.contact.facts.opens and not run.scene.contact.rigid:
+        if run.scene.contact.opens and not run.scene.contact.rigid:
             compared &= np.min([there[name] for there in inside], axis=0) > 0.0  # no part of it is cut off
         assert mean[compared] == pytest.approx(applied[compared], rel=1e-9, abs=1e-9 * np.abs(applied).max())
     for name in {"u_tip", "y"} & set(run.columns):

@@ -10,8 +10,8 @@ from scipy.integrate import quad
 from scipy.special import airy
 
 from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
-from springbeam.contact.laws import Compliance
 from springbeam.coupling import solver
+from springbeam.scene.laws import Compliance
 
 
 @pytest.mark.parametrize("section", exact.SECTIONS, ids=lambda section: section.solution.__name__)

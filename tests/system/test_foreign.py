@@ -96,7 +96,7 @@ def error(run, exact, *arguments):
     return np.abs(np.array([run.u_tip, run.y]) - exact(run.time, *arguments)).max()
 
 
-TIE = {"law": "tie", "stiffness": 1e4, "damping": 0.0}
+TIE = {"law": "tie"}
 
 
 @pytest.mark.parametrize("without", WITHOUT)
@@ -192,7 +192,7 @@ REFUSED = {
         PLAIN, {"coupling": {"scheme": "jacobi", "degree": 0}, "stop": {"position": -1.0}}, "[stop]", "leave it out",
     ),
     "impulse": (
-        {}, {"spring": {"impulse": None}, "contact": {"law": "transmission", "damping": 0.0}},
+        {}, {"spring": {"impulse": None}, "contact": {"law": "transmission"}},
         'law = "transmission"', "no impulse", 'use "compliance", "link" or "tie"',
     ),
 }  # fmt: skip
@@ -544,7 +544,7 @@ def test_events_are_those_of_the_element(fmu):
     tables = {
         "beam": {"displacement": 0.01, "velocity": -1.0, "external_force": -5.0},
         "stop": {"position": -0.05, "restitution": 0.6},
-        "contact": {"law": "transmission", "damping": 0.0},
+        "contact": {"law": "transmission"},
         "coupling": {"macro_step": 0.01},
     }
     below = {"parameters": {"m": M2, "k": 400.0, "c": C}}

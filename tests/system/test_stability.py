@@ -15,7 +15,6 @@ from springbeam import RunStopped, load_scene, simulate, with_changes
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.fmu_bodies import FmuBeam
 from springbeam.bodies.protocol import NO_FORCE
-from springbeam.contact.laws import law_of
 from springbeam.coupling import coupling_of
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import modal_beam
@@ -315,7 +314,7 @@ def growth(scene, steps=2000):
         impulses = -reduced, reduced
     for body, impulse in zip((beam, top), impulses, strict=True):
         body.apply_impulse(impulse)
-    rows = couple(coupling_of(scene, law_of(scene)), scene.coupling.H, steps, beam, top)
+    rows = couple(coupling_of(scene, scene.soft_law), scene.coupling.H, steps, beam, top)
     beam.close()
     top.close()
     return (rows[-1].energy / rows[steps // 2].energy) ** (1.0 / steps)

@@ -68,10 +68,10 @@ LACKING: tuple[Rule, ...] = (
         "state",
     ),
     *_needs("{coupling.degree}", lambda s: _exchanges(s) and s.degree > 0, _LEFT_OUT, "velocity"),
-    *_needs("{contact.damping}", lambda s: _exchanges(s) and s.contact.damping > 0.0, _LEFT_OUT, "velocity"),
+    *_needs("{contact.damping}", lambda s: _exchanges(s) and s.contact.damped, _LEFT_OUT, "velocity"),
     *_needs(
         "{contact.law}",
-        lambda s: s.joins and s.contact.facts.strikes,
+        lambda s: s.joins and s.contact.strikes,
         'use "compliance", "link" or "tie"',
         *_TO_BE_STRUCK,
     ),

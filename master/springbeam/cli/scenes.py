@@ -83,7 +83,8 @@ def keys(
         for key in group:
             unit = "" if key.unit == "–" else f" [{key.unit}]"
             left_out = key.default if key.default.startswith("needed") else f"default: {key.default}"
-            shown += [f"{key.name}{unit}: {key.meaning}", Text(f"    {key.allowed}; {left_out}", style="dim")]
+            of = f" (with {key.of})" if key.of else ""
+            shown += [f"{key.name}{unit}: {key.meaning}{of}", Text(f"    {key.allowed}; {left_out}", style="dim")]
     return Findings([key._asdict() for key in known], shown)
 
 

@@ -14,8 +14,8 @@ from ..bodies.protocol import Ends
 from ..results.paths import EPS, Means, Sample
 from ..results.trajectory import EventKind
 from ..scene import Beam, Scene, Spring
+from ..scene.laws import SoftLaw
 from ..scene.statics import tip_compliance, tip_load_deflection
-from .laws import SoftLaw
 from .phases import Joint, Phase
 
 _MAX_EVALUATIONS = 60

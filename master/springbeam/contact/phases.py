@@ -14,8 +14,8 @@ from math import inf
 from ..bodies.protocol import Ends, Motion
 from ..results.trajectory import EventKind
 from ..scene import Scene
+from ..scene.laws import SoftLaw
 from ..scene.statics import tip_compliance, tip_load_deflection
-from .laws import SoftLaw
 
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only); slower than the
 #: second, if it would also rise no higher than positions can be told apart.

@@ -8,8 +8,8 @@ is over a step. ``exchange`` is what ordinary masters do. Imports `contact`, `bo
 
 from __future__ import annotations
 
-from ..contact.laws import SoftLaw
 from ..scene import Scene
+from ..scene.laws import SoftLaw
 from ..scene.statics import tip_reach
 from ..scene.tables import ORDINARY_SCHEMES
 from .exchange import Exchange

@@ -13,7 +13,7 @@ for the second body of ``gauss_seidel`` towards the force at the step's end with
 from __future__ import annotations
 
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force
-from ..contact.laws import SoftLaw
+from ..scene.laws import SoftLaw
 from .projection import Booked
 from .protocol import Step
 

@@ -22,8 +22,8 @@ from operator import sub
 import numpy as np
 
 from ..bodies.protocol import Ends
-from ..contact.laws import SoftLaw
 from ..results.paths import EPS, sign_changes
+from ..scene.laws import SoftLaw
 from .protocol import Booking, Counts, Coupling, Step
 from .small import Matrix, Vector, transposed
 from .solver import CONDITIONS

@@ -18,7 +18,7 @@ from operator import add, neg, sub
 import numpy as np
 
 from ..bodies.protocol import Ends
-from ..contact.laws import SoftLaw
+from ..scene.laws import SoftLaw
 from .projection import Booked
 from .protocol import NotConverged
 from .small import Matrix, Vector, inverse, less, times

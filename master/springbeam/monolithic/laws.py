@@ -73,8 +73,9 @@ class Law:
     start: Contact = "free"
 
     def __init__(self, scene: Scene) -> None:
-        contact = scene.contact
-        self.stiffness, self.exponent, self.damping = contact.stiffness, contact.exponent, contact.damping
+        self.stiffness: float = getattr(scene.contact, "stiffness", 0.0)
+        self.exponent: float = getattr(scene.contact, "exponent", 1.0)
+        self.damping: float = getattr(scene.contact, "damping", 0.0)
         self.equilibrium = 0.0 if scene.spring is None else scene.spring.equilibrium
 
     def acts(self, contact: Contact) -> bool:

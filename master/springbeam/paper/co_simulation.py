@@ -19,6 +19,7 @@ from ..bodies.fmu_bodies import FmuBeam, FmuSpring
 from ..bodies.protocol import NO_FORCE, BodyFailed, StepRefused
 from ..results.trajectory import Event, EventKind, Trajectory
 from ..scene import Scene
+from ..scene.laws import TransmissionContact
 from . import problem
 from .problem import AlgorithmFailure, AtContact
 
@@ -96,7 +97,11 @@ class _Algorithm:
     def __init__(self, scene: Scene, at_contact: AtContact) -> None:
         assert scene.beam is not None
         assert scene.spring is not None
-        self._scene, self._spring, self._at_contact = scene, scene.spring, at_contact
+        assert isinstance(scene.contact, TransmissionContact)
+        self._scene = scene
+        self._spring = scene.spring
+        self._contact = scene.contact
+        self._at_contact = at_contact
         self._phi = -inf if scene.stop is None else scene.stop.position
         self.time = scene.contact_time or 0.0  #: where the present step begins [s]
         slope = scene.beam.initial_deflection_slope + self.time * scene.beam.initial_velocity_slope
@@ -166,7 +171,7 @@ class _Algorithm:
 
     def _first_contact(self) -> None:
         """Make lines 5 and 6."""
-        self._touched, self._stiffness = True, self._scene.contact.stiffness
+        self._touched, self._stiffness = True, self._contact.stiffness
         self._y = self._spring.equilibrium
         if self._at_contact == "tip":
             self._z = self._beam.motion().velocity
@@ -191,7 +196,7 @@ class _Algorithm:
                 joined = u_new <= reached.y  # line 14
         if joined:
             case, phase = 14, "tied"
-            self._stiffness = acting = self._scene.contact.stiffness  # line 15
+            self._stiffness = acting = self._contact.stiffness  # line 15
             reached = self._spring_step(u_new, z)  # lines 16, 17
             if reached.y <= self._phi:  # lines 20–24
                 phase = "seated"
@@ -280,12 +285,12 @@ class _Algorithm:
     def _law(self, w: float, stiffness: float | None = None) -> float:
         """Return λ (Ψ − w)₊^p [N] with the λ_nc that lines 12 and 15 have left, or with ``stiffness``."""
         acting = self._stiffness if stiffness is None else stiffness
-        return float(acting * max(self._spring.equilibrium - w, 0.0) ** self._scene.contact.exponent)
+        return float(acting * max(self._spring.equilibrium - w, 0.0) ** self._contact.exponent)
 
     def _slope(self, w: float, force: float) -> float:
         """Return the derivative of `_law` by w [N/m], from its ``force`` there."""
         depth = self._spring.equilibrium - w
-        return -self._scene.contact.exponent * force / depth if depth > 0.0 else 0.0
+        return -self._contact.exponent * force / depth if depth > 0.0 else 0.0
 
     def _spring_energy(self) -> float:
         """Return ½ m z² + ½ k1 y² + ¼ k2 y⁴ [J]."""

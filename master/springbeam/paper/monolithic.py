@@ -30,6 +30,7 @@ import scipy.sparse.linalg as spla
 from ..monolithic.semi_discrete import assemble, constant_forces, inner_forces
 from ..results.trajectory import Event, EventKind, Trajectory
 from ..scene import Scene
+from ..scene.laws import TransmissionContact
 from . import problem
 from .problem import AlgorithmFailure, AtContact
 
@@ -97,7 +98,11 @@ class _Algorithm:
     def __init__(self, scene: Scene, at_contact: AtContact = "rest", y_temp: YTemp = "equation") -> None:
         assert scene.beam is not None
         assert scene.spring is not None
-        self.scene, self.beam, self.spring = scene, scene.beam, scene.spring
+        assert isinstance(scene.contact, TransmissionContact)
+        self.scene = scene
+        self.beam = scene.beam
+        self.spring = scene.spring
+        self.contact = scene.contact
         self.at_contact, self.y_temp = at_contact, y_temp
         self.discrete = d = assemble(scene.beam)
         self.load = d.nodal(*constant_forces(scene.beam))
@@ -122,7 +127,7 @@ class _Algorithm:
 
     def _compliance(self, w: float, stiffness: float) -> tuple[float, float]:
         """Return λ (Ψ − w)₊^p and its derivative by w."""
-        depth, p = max(self.spring.equilibrium - w, 0.0), self.scene.contact.exponent
+        depth, p = max(self.spring.equilibrium - w, 0.0), self.contact.exponent
         return stiffness * depth**p, -p * stiffness * depth ** (p - 1.0) if depth > 0.0 else 0.0
 
     def _newton(self, f: Callable[[float], tuple[float, float]], guess: float, solve: str) -> float:
@@ -178,7 +183,7 @@ class _Algorithm:
 
     def _first_contact(self, row: _Row) -> _Row:
         """Make lines 5 and 6."""
-        self.stiffness = self.scene.contact.stiffness
+        self.stiffness = self.contact.stiffness
         z = float(row.v[-1]) if self.at_contact == "tip" else row.z
         row = row._replace(y=self.spring.equilibrium, z=z)
         self._note("impact", row)
@@ -219,7 +224,7 @@ class _Algorithm:
             case, self.stiffness = 11, 0.0
         elif u_new <= psi or u_new <= y_new:  # line 14
             case = 14
-            self.stiffness = acting = self.scene.contact.stiffness  # line 15
+            self.stiffness = acting = self.contact.stiffness  # line 15
             y_used = y if self.y_temp == "guess" else u_new  # line 16
             y_new = self._newton(partial(self._foundation_force, y_used, z), u_new, "joined")  # line 17
             u_new = y_new  # line 18

@@ -10,6 +10,7 @@ import numpy as np
 from ..monolithic.rows import finished
 from ..results.trajectory import Event, Trajectory
 from ..scene import Scene, SceneError
+from ..scene.laws import TransmissionContact
 from ..scene.resolution import not_resolved
 
 #: z at t_c: ``"rest"``, as it is, which is 0 of a spring at rest (section 6); ``"tip"``, the tip's velocity (line 5).
@@ -37,6 +38,8 @@ def refuse(scene: Scene) -> None:
             'Algorithm 1 needs a [spring] and a [beam] with fidelity = "dynamic", and knows neither [[loads]] nor a '
             "start at rest"
         )
+    if not isinstance(scene.contact, TransmissionContact):
+        raise SceneError(f'[contact] law = "{scene.contact.law}": Algorithm 1 has its own law; leave law out')
     if scene.accuracy is not None or scene.coupling.adaptive:
         raise SceneError("Algorithm 1 has one step size; give [coupling] macro_step, no accuracy and no tolerance")
 

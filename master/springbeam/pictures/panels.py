@@ -136,8 +136,8 @@ def enlarged(trajectory: Trajectory) -> Panel:
 def forces(trajectory: Trajectory) -> Panel:
     """Return the forces that are not zero throughout, in the words of the run's law, and the largest mean."""
     contact, summary = trajectory.scene.contact, trajectory.summary
-    words = contact.facts.force + contact.facts.damper * (contact.damping > 0.0)
-    looks = FORCES | {"compliance_force": FORCES["compliance_force"]._replace(words=words)}
+    legend = contact.legend + contact.damper * contact.damped
+    looks = FORCES | {"compliance_force": FORCES["compliance_force"]._replace(words=legend)}
     curves = _not_zero(_curves(trajectory, looks))
     if "contact_force_max_time" in summary and curves and curves[0].name == "contact_force":
         begin, peak = float(summary["contact_force_max_time"]), float(summary["contact_force_max"])

@@ -43,7 +43,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     if rigid:  # ends that touch and part at once: what they would pull by is no contact force
         contact = np.where(phase == "touch", np.maximum(contact, 0.0), contact)
     inside = contact
-    if scene.coupled and rigid and not scene.contact.lasting:
+    if scene.coupled and scene.contact.strikes:
         inside = np.minimum(normal_compliance(scene, u, first), MOST_SHOWN)
     energies = ledger(scene, steps)
     found = {
@@ -118,9 +118,8 @@ def trajectory_of(
 
 def normal_compliance(scene: Scene, u: np.ndarray, first: np.ndarray) -> np.ndarray:
     """Return λ (Ψ − u)₊^p [N], the part of a rigid contact's force that the paper calls normal compliance."""
-    contact, psi = scene.contact, first["y_after"] if scene.spring is None else scene.spring.equilibrium
-    with np.errstate(over="ignore"):
-        return np.asarray(contact.stiffness * np.maximum(psi - u, 0.0) ** contact.exponent)
+    psi = first["y_after"] if scene.spring is None else scene.spring.equilibrium
+    return scene.contact.compliance(psi - u)
 
 
 def ledger(scene: Scene, steps: np.ndarray, *, of_interface: bool = False) -> dict[str, np.ndarray]:

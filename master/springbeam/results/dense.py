@@ -249,7 +249,7 @@ def _between(
     found["time"], found["size"] = times, share * after["size"]
     for name, series in forces(scene, before, after).items():
         found[f"{name}_after"] = legval(2.0 * share - 1.0, series, tensor=False)
-        if name == "contact_force" and scene.contact.facts.opens and not scene.contact.rigid:
+        if name == "contact_force" and scene.contact.opens:
             found[f"{name}_after"] = np.maximum(found[f"{name}_after"], 0.0)
     curves = {name: polyval(share, powers, tensor=False) for name, powers in motion(scene, before, after).items()}
     for name in ("u_tip", "v_tip", "y", "z"):

@@ -15,10 +15,10 @@ from typing import Any
 
 from ..bodies.factory import load_bodies
 from ..bodies.protocol import Body
-from ..contact.laws import depth, law_of
 from ..results.distance import distance
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, as_scene, with_changes
+from ..scene.laws import stiffest
 from ..scene.linearised import contact_energy
 from ..scene.resolution import TURN, joined_frequency, lasting_frequency, slow_oscillations
 from . import runner
@@ -155,9 +155,9 @@ def _first(scene: Scene) -> float:
 
 def _contact_frequency(scene: Scene) -> float:
     """Return √(k (1/m_tip + 1/m)) of beam and spring on a soft law [rad/s], where it is stiffest."""
-    law = law_of(scene)
+    law = scene.soft_law
     assert law is not None
-    stiffness = law.slope(depth(law, contact_energy(scene)) if law.one_sided else 0.0)
+    stiffness = stiffest(law, contact_energy(scene))
     bodies = [body for body in load_bodies(scene, scene.contact_time or 0.0) if body is not None]
     try:
         return math.sqrt(stiffness * sum(1.0 / body.mass for body in bodies))

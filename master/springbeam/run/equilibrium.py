@@ -5,7 +5,6 @@ from __future__ import annotations
 from contextlib import closing
 
 from ..bodies.factory import load_bodies, top_at_rest
-from ..contact.laws import law_of
 from ..scene import Scene
 from ..scene.statics import tip_compliance
 
@@ -20,7 +19,9 @@ def contact_at_rest(scene: Scene) -> float:
         return 0.0
     from scipy.optimize import brentq  # takes a tenth of a second to load: only for who starts at rest
 
-    law, free, top = law_of(scene), _tip(scene, 0.0), top_at_rest(scene, 0.0)
+    law = scene.soft_law
+    free = _tip(scene, 0.0)
+    top = top_at_rest(scene, 0.0)
     deep = top - free
     if deep == 0.0 or (deep < 0.0 and not scene.contact.lasting):
         return 0.0

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from ..bodies.protocol import Modes
-from ..contact.laws import SoftLaw
 from ..results.distance import HELD
 from ..results.paths import Path
 from ..results.steps import force as applied
 from ..results.steps import joined
 from ..results.trajectory import Event, EventKind
 from ..scene import Scene
+from ..scene.laws import SoftLaw
 from ..scene.statics import tip_reach
 from .stepping import Pair
 

@@ -7,13 +7,13 @@ from math import inf, sqrt
 
 import numpy as np
 
-from ..contact.laws import stiffest
 from ..results.columns import MOST_SHOWN, normal_compliance
 from ..results.dense import between_rows
 from ..results.totals import shortest_contact
 from ..results.trajectory import Event
 from ..scene import Load, Scene
-from ..scene.linearised import spring_frequency
+from ..scene.laws import stiffest
+from ..scene.linearised import contact_energy, spring_frequency
 from ..scene.modes import tip_modes
 from ..scene.resolution import SHORT, SHORT_IMPULSE, not_resolved, oscillating, slowest_frequency, window_of
 from ..scene.statics import tip_inertia
@@ -113,7 +113,7 @@ def force_window(scene: Scene, pair: Pair, steps: np.ndarray) -> float:
     upper, lower = pair.upper, pair.lower
     if pair.opens_softly and pair.law is not None:
         deepest = float((steps["y"] - steps["u_tip"]).max(initial=0.0))
-        stiffness = max(stiffest(scene), pair.law.slope(deepest))
+        stiffness = max(stiffest(pair.law, contact_energy(scene)), pair.law.slope(deepest))
         omega = sqrt(stiffness * (1.0 / upper.inertia + 1.0 / lower.inertia))
     else:
         omega, _ = upper.oscillation() or (0.0, 0.0)

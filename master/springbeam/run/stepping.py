@@ -9,7 +9,6 @@ from typing import NamedTuple
 from ..bodies import force
 from ..bodies.elements import RigidWall
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force
-from ..contact.laws import law_of
 from ..contact.phases import Joint, Phase, common_velocity
 from ..coupling import coupling_of
 from ..coupling.protocol import Step, Uncoupled
@@ -128,7 +127,7 @@ class Pair:
         self._last: Step | None = None  #: at whose end the bodies are
         self._holding = 0.0  #: what holds a seated lower end, without loads and contact [N]
         #: The soft law between the ends; a rigid one has no force of its own, and ties them while they are joined.
-        self.law = law_of(scene)
+        self.law = scene.soft_law
         #: μ of ends that a rigid law joins, whose mismatch of velocities a step turns round [kg]; else 0.
         self.turned_mass = self.reduced_mass(Phase()) if self.law is None else 0.0
         #: The bodies that could not say an acceleration when it was asked for.

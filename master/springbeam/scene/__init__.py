@@ -7,12 +7,13 @@ each load as a function of time; ``recorded`` reads its file) â†’ ``statics`` â†
 come with the package.
 """
 
+from .laws import Contact
 from .loads import Load
 from .messages import key_kind, scene_keys
 from .reading import as_scene, load_scene, parse_value, scene_from_dict, shipped_scenes, with_changes
 from .scene import SAME, Scene
 from .suspicions import suspicions
-from .tables import ArgumentError, Beam, Contact, Coupling, SceneError, Spring, Stop, Time
+from .tables import ArgumentError, Beam, Coupling, SceneError, Spring, Stop, Time
 
 __all__ = [
     "SAME",

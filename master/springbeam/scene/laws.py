@@ -1,83 +1,288 @@
-"""Facts of the interface laws: what scenes, couplings and pictures must know of a law without having its force.
+"""Interface laws: which contact force belongs to the penetration of the two ends, and what it stores and dissipates.
 
-The forces themselves are in `springbeam.contact.laws`, and again, independently, in `springbeam.monolithic.laws`.
-``docs/contributing.md`` says how a law is added. Nothing outside these three modules asks a law for its name.
+The penetration p = y − u_tip [m] is positive where the tip has sunk into what lies below it, its rate ṗ = z − v_tip
+[m/s]; the contact force C [N] lifts the tip and presses the lower end. ``docs/model.md`` states the laws. A *rigid* law
+has no force of its own: it holds the ends together, and C is whatever that takes. A *soft* one is a function of both,
+
+    C = F(p) + D(p, ṗ),     F = Φ′,     D ṗ ≥ 0,
+
+so that Φ is what it stores and ∫ D ṗ dt what it dissipates. A law is one table of keys, a `Contact` named in `LAWS`; a
+soft one makes its force, a `SoftLaw`. Nothing outside this module and `springbeam.monolithic.laws`, which has each law
+again, independently, asks for a law's name. ``docs/contributing.md`` says how a law is added.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Literal, NamedTuple
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import model_validator
+from typing_extensions import Self
+
+from .tables import OneOf, Table, key
+
+# -- forces ------------------------------------------------------------------------------------------------------------
 
 
-class LawFacts(NamedTuple):
-    """What a law is, which keys of ``[contact]`` it has, and what people call it."""
+class SoftLaw:
+    """A contact force that is a function of the penetration and its rate."""
 
-    #: rigid: ends that have met share one position, C is a reaction; soft: C is a function of the penetration and its
-    #: rate.
-    kind: Literal["rigid", "soft"]
-    #: Whether it joins the ends from the start and for good, for either sign of C.
-    lasting: bool = False
-    #: Keys that the motion depends on.
-    takes: tuple[str, ...] = ()
-    #: Those of them that must be given.
-    needs: tuple[str, ...] = ()
-    #: Keys that only the column ``compliance_force`` depends on.
-    shows: tuple[str, ...] = ()
-    #: Legend of the column ``compliance_force``, and what it has besides where ``damping`` is not 0.
-    force: str = "part λ(Ψ − u)₊ᵖ"
-    damper: str = ""
-    #: What it does, in a few words.
-    words: str = ""
+    #: Whether F vanishes for p ≤ 0; if not, F is linear.
+    one_sided: ClassVar[bool] = True
 
-    def has(self, key: str) -> bool:
-        """Return whether the motion or a column depends on ``key`` of ``[contact]``."""
-        return key in (*self.takes, *self.shows)
+    @property
+    def damped(self) -> bool:
+        """Whether D is not zero."""
+        return False
+
+    def force(self, p: float, rate: float = 0.0) -> float:
+        """Return C [N] at a penetration p [m] that grows at ``rate`` [m/s]. Raises OverflowError past all doubles."""
+        raise NotImplementedError
+
+    def potential(self, p: float) -> float:
+        """Return Φ(p) [J]. Raises OverflowError past all doubles."""
+        raise NotImplementedError
+
+    def slope(self, p: float) -> float:
+        """Return F′(p) [N/m]."""
+        raise NotImplementedError
+
+    def resistance(self, p: float, rate: float) -> tuple[float, float, float]:
+        """Return D [N], ∂D/∂p [N/m] and ∂D/∂ṗ [N·s/m]; asked for only if `damped`."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Compliance(SoftLaw):
+    """Normal compliance C = λ p₊^q (1 + χ ṗ)₊ (Ahn & Tate, (5), with the moving obstacle y; χ: Hunt & Crossley 1975).
+
+    Parameters
+    ----------
+    stiffness
+        λ [N/m^q].
+    exponent
+        q ≥ 1.
+    damping
+        χ ≥ 0 [s/m]; the force never pulls.
+    """
+
+    stiffness: float
+    exponent: float
+    damping: float = 0.0
+
+    @property
+    def damped(self) -> bool:
+        return self.damping > 0.0
+
+    def force(self, p: float, rate: float = 0.0) -> float:
+        if p <= 0.0:
+            return 0.0
+        elastic: float = self.stiffness * p**self.exponent
+        return elastic if rate == 0.0 else elastic * max(1.0 + self.damping * rate, 0.0)
+
+    def potential(self, p: float) -> float:
+        q = self.exponent + 1.0
+        return float(self.stiffness * p**q / q) if p > 0.0 else 0.0
+
+    def slope(self, p: float) -> float:
+        return float(self.exponent * self.stiffness * p ** (self.exponent - 1.0)) if p > 0.0 else 0.0
+
+    def resistance(self, p: float, rate: float) -> tuple[float, float, float]:
+        force = self.force(p)
+        share = max(self.damping * rate, -1.0)
+        return force * share, self.slope(p) * share, self.damping * force if share > -1.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Link(SoftLaw):
+    """An elastic link C = k p + c ṗ, whatever the sign of p.
+
+    Parameters
+    ----------
+    stiffness
+        k [N/m].
+    damping
+        c ≥ 0 [N·s/m].
+    """
+
+    stiffness: float
+    damping: float = 0.0
+
+    one_sided: ClassVar[bool] = False
+
+    @property
+    def damped(self) -> bool:
+        return self.damping > 0.0
+
+    def force(self, p: float, rate: float = 0.0) -> float:
+        return self.stiffness * p + self.damping * rate
+
+    def potential(self, p: float) -> float:
+        return 0.5 * self.stiffness * p * p
+
+    def slope(self, p: float) -> float:
+        return self.stiffness
+
+    def resistance(self, p: float, rate: float) -> tuple[float, float, float]:
+        return self.damping * rate, 0.0, self.damping
+
+
+def depth(law: SoftLaw, energy: float) -> float:
+    """Return the penetration [m] at which a one-sided ``law`` stores ``energy`` [J], to rounding."""
+    if energy <= 0.0:
+        return 0.0
+
+    def stores_less(p: float) -> bool:
+        try:
+            return law.potential(p) < energy
+        except OverflowError:
+            return False
+
+    low = 0.0
+    high = 1.0
+    while stores_less(high):
+        low = high
+        high = 2.0 * high
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if stores_less(middle) else (low, middle)
+    return high
+
+
+def stiffest(law: SoftLaw, energy: float) -> float:
+    """Return F′ [N/m] where ``law`` stores ``energy`` [J]; one that is not one-sided is linear."""
+    return law.slope(depth(law, energy) if law.one_sided else 0.0)
+
+
+# -- tables ------------------------------------------------------------------------------------------------------------
+
+
+class Contact(Table):
+    """What force C belongs to the penetration p = y − u_tip (``docs/model.md``, "Interface laws")."""
+
+    law: str
+    force_window: float | None = key(
+        "s", "time over which the force is averaged before its peak is taken", None, gt=0.0,
+        otherwise="a fiftieth of the period of a compliant contact, else of the beam's slowest",
+    )  # fmt: skip
+
+    #: Whether ends that have met share one position, so that C is a reaction.
+    rigid: ClassVar[bool] = True
+    #: Whether the law joins the ends from the start and for good, for either sign of C.
+    lasting: ClassVar[bool] = False
+    #: Legend of the column ``compliance_force``, and what it has besides where the law is damped.
+    legend: ClassVar[str] = ""
+    damper: ClassVar[str] = ""
+
+    def force(self) -> SoftLaw | None:
+        """Return C as a function of the penetration and its rate; ``None`` of a rigid law."""
+        return None
+
+    def compliance(self, p: np.ndarray) -> np.ndarray:
+        """Return the part of a rigid law's force that the paper calls normal compliance [N], at depths p [m] below Ψ.
+
+        That is the column ``compliance_force``.
+        """
+        return np.zeros_like(p)
+
+    @property
+    def words(self) -> str:
+        """What the law does, in a few words."""
+        return str(type(self).model_fields["law"].description)
+
+    @property
+    def own_keys(self) -> dict[str, float]:
+        """Keys that the law has beside those of any law."""
+        fields = type(self).model_fields
+        return {name: getattr(self, name) for name in fields if name not in Contact.model_fields}
 
     @property
     def soft(self) -> bool:
         """Whether C is a function of the penetration and its rate."""
-        return self.kind == "soft"
+        return not self.rigid
 
     @property
     def opens(self) -> bool:
-        """Whether it is soft, and contact begins and ends."""
+        """Whether the law is soft, and contact begins and ends."""
         return self.soft and not self.lasting
 
     @property
     def strikes(self) -> bool:
         """Whether ends that meet are struck: their velocities differ before, and are one from then on."""
-        return self.kind == "rigid" and not self.lasting
+        return self.rigid and not self.lasting
+
+    @property
+    def damped(self) -> bool:
+        """Whether the law dissipates."""
+        force = self.force()
+        return force is not None and force.damped
+
+
+class TransmissionContact(Contact):
+    """Tip and spring top move together while they touch; the keys are of the column ``compliance_force`` alone."""
+
+    law: Literal["transmission"] = key("–", "the tip and the spring move together while they touch", "transmission")
+    stiffness: float = key("N/m^p", "λ_nc of the part of C that is normal compliance", 1.0e4, ge=0.0)
+    exponent: float = key("–", "exponent p of normal compliance", 3.0, ge=1.0, le=100.0)
+
+    legend = "part λ(Ψ − u)₊ᵖ"
+
+    def compliance(self, p: np.ndarray) -> np.ndarray:
+        with np.errstate(over="ignore"):
+            return np.asarray(self.stiffness * np.maximum(p, 0.0) ** self.exponent)
+
+
+class ComplianceContact(Contact):
+    """Normal compliance, C = λ p₊^q (1 + χ ṗ)₊."""
+
+    law: Literal["compliance"] = key("–", "normal compliance", "compliance")
+    stiffness: float = key("N/m^p", "stiffness λ_nc of normal compliance", gt=0.0)
+    exponent: float = key("–", "exponent p of normal compliance", ge=1.0, le=100.0)
+    damping: float = key("s/m", "χ (Hunt & Crossley 1975)", 0.0, ge=0.0)
+
+    rigid = False
+    legend = "of the law λ(y − u)₊ᵖ"
+    damper = " (1 + χ ṗ)"
+
+    def force(self) -> Compliance:
+        return Compliance(self.stiffness, self.exponent, self.damping)
+
+
+class TieContact(Contact):
+    """Ends that are one from the start and for good."""
+
+    law: Literal["tie"] = key("–", "tied for good", "tie")
+
+    lasting = True
+
+
+class LinkContact(Contact):
+    """An elastic link with a damper, C = k p + c ṗ, from the start and for good."""
+
+    law: Literal["link"] = key("–", "an elastic link", "link")
+    stiffness: float = key("N/m", "stiffness k of the link", ge=0.0)
+    damping: float = key("N·s/m", "damping c of the link", 0.0, ge=0.0)
+
+    rigid = False
+    lasting = True
+    legend = "of the link λ(y − u)"
+    damper = " + c(z − v)"
+
+    @model_validator(mode="after")
+    def _links(self) -> Self:
+        if self.stiffness == self.damping == 0.0:
+            raise ValueError('stiffness = 0.0: law = "link" needs a stiffness or a damping greater than 0')
+        return self
+
+    def force(self) -> Link:
+        return Link(self.stiffness, self.damping)
 
 
 #: By their names in a scene.
-LAWS: dict[str, LawFacts] = {
-    "transmission": LawFacts(
-        "rigid",
-        shows=("stiffness", "exponent"),
-        words="the tip and the spring move together while they touch",
-    ),
-    "compliance": LawFacts(
-        "soft",
-        takes=("stiffness", "exponent", "damping"),
-        needs=("stiffness", "exponent"),
-        force="of the law λ(y − u)₊ᵖ",
-        damper=" (1 + χ ṗ)",
-        words="normal compliance",
-    ),
-    "tie": LawFacts("rigid", lasting=True, words="tied for good"),
-    "link": LawFacts(
-        "soft",
-        lasting=True,
-        takes=("stiffness", "damping"),
-        needs=("stiffness",),
-        force="of the link λ(y − u)",
-        damper=" + c(z − v)",
-        words="an elastic link",
-    ),
+LAWS: dict[str, type[Contact]] = {
+    "transmission": TransmissionContact,
+    "compliance": ComplianceContact,
+    "tie": TieContact,
+    "link": LinkContact,
 }
-
-
-def laws_that(are: Callable[[LawFacts], bool]) -> str:
-    """Return the names of the laws for which ``are`` holds, as an error offers them: ``"a" or "b"``."""
-    return " or ".join(f'"{name}"' for name, law in LAWS.items() if are(law))
+LAW = OneOf(Contact, "law", "the interface law (docs/choose.md says which)", LAWS, "transmission")

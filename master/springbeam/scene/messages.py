@@ -9,19 +9,32 @@ import difflib
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import tomli_w
 
+from .laws import LAW
 from .loads import Load
-from .partners import OWN, PARTNERS
+from .partners import LOWER, PARTNERS, UPPER, ForeignFmu
 from .scene import TABLES, Scene
-from .tables import SceneError, Table
+from .tables import OneOf, SceneError, Table
 
-#: Tables by their names, "" is what stands outside of them, and by theirs the bodies that are not our own.
-MODELS: dict[str, type[Table]] = {"": Scene, **TABLES, "loads": Load, **PARTNERS}
+#: What a table is one of, by its name.
+VARIANTS: dict[str, OneOf] = {"beam": UPPER, "spring": LOWER, "contact": LAW}
+_ELEMENTS = replace(UPPER, tables={name: PARTNERS[name] for name in UPPER.named}, default="")
+#: Tables by their names, "" is what stands outside of them, and by theirs the bodies that are not our own; or what a
+#: table is one of.
+MODELS: dict[str, type[Table] | OneOf] = {
+    "": Scene,
+    **TABLES,
+    "contact": LAW,
+    "loads": Load,
+    "fmu": ForeignFmu,
+    "element": _ELEMENTS,
+}
 #: Values by their types in the JSON Schema, in words.
 _NOUNS = {
     "number": "a finite number",
@@ -43,7 +56,10 @@ _BOUNDS = {
 
 
 class Key(NamedTuple):
-    """One key of a scene file; ``table`` is "" for those outside a table."""
+    """One key of a scene file; ``table`` is "" for those outside a table.
+
+    ``of`` says which tables have the key, where a table is one of several and not all do.
+    """
 
     table: str
     name: str
@@ -51,6 +67,7 @@ class Key(NamedTuple):
     allowed: str
     default: str
     meaning: str
+    of: str = ""
 
 
 @lru_cache(maxsize=1)
@@ -69,18 +86,28 @@ def schema() -> dict[str, Any]:
             for name, empty in (("title", key.get("title")), ("default", None), ("otherwise", "")):
                 if name in key and (key[name] == empty or isinstance(key[name], dict)):
                     del key[name]
+    for choice in VARIANTS.values():
+        for kind in set(choice.named) - {choice.default}:  # a table without the key is the default
+            found["$defs"][choice.tables[kind].__name__]["required"] = [choice.name]
     return found
 
 
-def model_of(table: str) -> type[Table] | None:
-    """Return the table of that name, ``"loads.0"`` being the first of ``[[loads]]``; ``None`` if there is none."""
-    return MODELS.get(table.partition(".")[0])
+def models_of(table: str) -> dict[str, type[Table]]:
+    """Return what the table of that name may be, by the values of its key that says so.
+
+    ``"loads.0"`` is the first of ``[[loads]]``. Empty if there is no such table.
+    """
+    name = table.partition(".")[0]
+    model = VARIANTS.get(name) or MODELS.get(name)
+    return model.tables if isinstance(model, OneOf) else {"": model} if model else {}
 
 
-def keys_of(model: type[Table]) -> dict[str, dict[str, Any]]:
-    """Return what the JSON Schema says of each key of a table."""
-    properties: dict[str, dict[str, Any]] = schema()["$defs"].get(model.__name__, schema())["properties"]
-    return properties
+def keys_of(*models: type[Table]) -> dict[str, dict[str, Any]]:
+    """Return what the JSON Schema says of each key of tables; of a key that several have, what it says of the first."""
+    found: dict[str, dict[str, Any]] = {}
+    for model in models:
+        found = {**schema()["$defs"].get(model.__name__, schema())["properties"], **found}
+    return found
 
 
 def allowed(key: Mapping[str, Any]) -> str:
@@ -94,29 +121,56 @@ def allowed(key: Mapping[str, Any]) -> str:
 
 def listed(table: str | None = None) -> list[Key]:
     """Return the keys of one table, or all."""
-    return [
-        Key(name, key, said["unit"], allowed(said), _default(model, key, said), said["description"])
-        for name, model in MODELS.items()
-        for key, said in keys_of(model).items()
-        if table in (None, name) and key not in MODELS
-    ]
+    return [key for name in MODELS if table in (None, name) for key in _keys(name)]
+
+
+def _keys(table: str) -> Iterator[Key]:
+    """Yield the keys of one of `MODELS`; one that several of its tables have alike once."""
+    model = MODELS[table]
+    choice = model if isinstance(model, OneOf) else OneOf(model, "", "", {"": model}, "")
+    found: dict[Key, list[str]] = {}
+    for kind, one in choice.tables.items():
+        for name, said in keys_of(one).items():
+            if not table and name in MODELS:  # a table, not a key
+                continue
+            if name == choice.name:
+                key = Key(table, name, "–", either(choice.named), choice.default or "needed", choice.meaning)
+            else:
+                key = Key(table, name, said["unit"], allowed(said), _default(one, name, said), said["description"])
+            found.setdefault(key, []).append(kind)
+    for key, kinds in found.items():
+        yield key if len(kinds) == len(choice.tables) else key._replace(of=f"{choice.name} = {either(kinds)}")
+
+
+def either(texts: Iterable[str]) -> str:
+    """Return texts as an error offers them: ``"a" or "b"``."""
+    return " or ".join(json.dumps(text, ensure_ascii=False) for text in texts)
 
 
 def heading(table: str) -> str:
     """Return how a table of `MODELS` stands in a file."""
-    if table in PARTNERS:
-        return "[beam] or [spring] with " + ("fmu" if table == "fmu" else f'element = "{table}"')
+    if table in ("fmu", "element"):
+        return f"[beam] or [spring] with {table}"
     return "outside the tables" if not table else "[[loads]], any number" if table == "loads" else f"[{table}]"
 
 
 def unit_of(table: str, key: str) -> str:
     """Return the unit of a key of a table, or of a load by its number ("loads.0"); "–" if it has none."""
-    return str(keys_of(model_of(table) or Scene)[key]["unit"])
+    return str(keys_of(*models_of(table).values())[key]["unit"])
 
 
 def about(table: str) -> str:
-    """Return what a table describes."""
-    return " ".join((MODELS[table].__doc__ or "").split()).replace("``", "`")
+    """Return what a table describes, and what each of those that it may be."""
+    model = MODELS[table]
+    if not isinstance(model, OneOf):
+        return described(model)
+    kinds = [f'`{model.name} = "{kind}"`: {described(one)}' for kind, one in model.tables.items()]
+    return "\n".join([described(model.common), "", *(f"* {kind}" for kind in kinds)]).strip()
+
+
+def described(model: type) -> str:
+    """Return the docstring of a table as one line."""
+    return " ".join((model.__doc__ or "").split()).replace("``", "`")
 
 
 def _default(model: type[Table], name: str, key: Mapping[str, Any]) -> str:
@@ -151,47 +205,53 @@ _KINDS: dict[str, type] = {"integer": int, "boolean": bool, "number": float}
 
 
 def scene_keys() -> list[str]:
-    """Return all keys as ``table.key``."""
-    return [f"{table}.{key}" for table in (*TABLES, "loads.0") for key in keys_of(model_of(table) or Scene)]
+    """Return all keys of our own bodies and of the other tables as ``table.key``."""
+    places = {**{table: table for table in TABLES}, "loads": "loads.0"}
+    return list(dict.fromkeys(f"{places[key.table]}.{key.name}" for key in listed() if key.table in places))
 
 
 def key_kind(table: str, key: str) -> type:
     """Return which of int, float, bool and str ``[table] key`` takes. Raises SceneError if there is no such key."""
-    own = model_of(table)
-    if own is None:
+    models = models_of(table)
+    if not models:
         raise SceneError(_unknown(f"[{table}]", table, TABLES))
-    for model in (own, *(PARTNERS.values() if table in ("beam", "spring") else ())):
-        if key in keys_of(model):
-            return _KINDS.get(keys_of(model)[key]["type"], str)
-        if key.startswith("parameters.") and "parameters" in keys_of(model):
-            return float
-    raise SceneError(_unknown(f"[{table}] {key}", key, keys_of(own)))
+    keys = keys_of(*models.values())
+    if key in keys:
+        return _KINDS.get(keys[key]["type"], str)
+    if key.startswith("parameters.") and "parameters" in keys:
+        return float
+    raise SceneError(_unknown(f"[{table}] {key}", key, keys_of(next(iter(models.values())))))
 
 
 def explain(error: Any) -> str:
     """Return a line ``[table] key = value: what is wrong and what would be allowed`` for one of pydantic's errors."""
     kind, value = error["type"], error["input"]
     table, *keys = map(str, error["loc"])
-    body = keys.pop(0) if keys and table in ("beam", "spring") else OWN
+    choice = VARIANTS.get(table)
     if keys and table == "loads":
         table = f"loads.{keys.pop(0)}"
+    variant = keys.pop(0) if keys and choice is not None else ""
     if kind == "value_error":  # one of ours, which says all
         return f"[{table}] {error['msg'].removeprefix('Value error, ')}"
-    there = keys_of(PARTNERS.get(body) or model_of(table) or Scene) if keys else keys_of(Scene)
+    there = keys_of(models_of(table)[variant]) if keys else keys_of(Scene)
     name = keys[0] if keys else table
     said = there.get(name, {"type": "table"})
-    if kind == "union_tag_invalid":
-        keys, value, said = ["element"], value["element"], {"enum": [body for body in PARTNERS if body != "fmu"]}
+    if kind == "union_tag_invalid" and choice is not None:
+        keys, value, said = [choice.name], value[choice.name], {"enum": choice.named}
     if name == "parameters" and len(keys) > 1:
         keys, said = keys[:2], {"type": "parameter"}
     place = one_line(f"[{table}] {'.'.join(keys)}" if keys else table)
+    given = f"{place} = {toml_of(value)}"
+    chosen = f'{choice.name} = "{variant}"' if choice is not None and variant in choice.named else ""
     if kind == "extra_forbidden":
+        if choice is not None and chosen and (others := choice.that_have(name)):
+            return f"{given}: is for {either(others)}, this is {chosen}, which takes {', '.join(there)}"
         return _unknown(place, name, there)
     if kind == "missing":
+        needed = f"{chosen} needs it; " if chosen else ""
         otherwise = f" ({said['otherwise']})" if "otherwise" in said else ""
         what = f"the {said['description']} [{said['unit']}]{otherwise}: " if keys else ""
-        return f"{place}: missing; give {what}{allowed(said)}"
-    given = f"{place} = {toml_of(value)}"
+        return f"{place}: missing; {needed}give {what}{allowed(said)}"
     return f"{given}: {GONE.get(given) or 'must be ' + allowed(said)}"
 
 

@@ -6,11 +6,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
-from pydantic import Discriminator, Tag
-
-from .tables import Beam, Spring, Table, key
+from .tables import Beam, OneOf, Spring, Table, key
 
 
 class ForeignFmu(Table):
@@ -106,11 +104,18 @@ def kind_of(table: Any) -> str:
     return "fmu" if "fmu" in table else str(table["element"]) if "element" in table else OWN
 
 
-_Partners = (
-    Annotated[ForeignFmu, Tag("fmu")]
-    | Annotated[PointMass, Tag("point_mass")]
-    | Annotated[SpringDamper, Tag("spring_damper")]
-    | Annotated[RigidWall, Tag("rigid_wall")]
-)
-UpperBody = Annotated[Annotated[Beam, Tag(OWN)] | _Partners, Discriminator(kind_of)]
-LowerBody = Annotated[Annotated[Spring, Tag(OWN)] | _Partners, Discriminator(kind_of)]
+class _Body(OneOf):
+    def kind(self, content: Any) -> str:
+        return kind_of(content)
+
+    def kept(self, content: dict[str, Any], kind: str) -> dict[str, Any]:
+        """Return nothing: what another body's keys say is not said of this one."""
+        return {}
+
+
+def _body(own: type[Table]) -> OneOf:
+    return _Body(Table, "element", "which body takes the place of our own", {OWN: own, **PARTNERS}, OWN)
+
+
+UPPER = _body(Beam)
+LOWER = _body(Spring)

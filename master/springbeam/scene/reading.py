@@ -12,8 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from .messages import explain, model_of, nearest, one_line
-from .partners import kind_of
+from .messages import VARIANTS, explain, models_of, nearest, one_line
 from .rules import impossible
 from .scene import TABLES, Scene, split_key
 from .tables import PICKED_BY_ACCURACY, ArgumentError, SceneError
@@ -155,20 +154,25 @@ def _change(data: dict[str, Any], table: str, changes: Mapping[str, Any]) -> Non
     """
     loads = {f"loads.{i}": load for i, load in enumerate(_loads(data))}
     content = loads.get(table) or data.setdefault(table, {})
-    model = model_of(table)
-    if not isinstance(content, dict) or model is None or (table not in loads and table not in TABLES):
+    models = models_of(table)
+    if not isinstance(content, dict) or not models or (table not in loads and table not in TABLES):
         there = (*TABLES, *loads)
         raise SceneError(f"[{table}]: no table of this scene; {nearest(table, there)}allowed: {', '.join(there)}")
     if data.get("accuracy") is not None and (picked := changes.keys() & set(PICKED_BY_ACCURACY.get(table, ()))):
         raise SceneError(
             f"[{table}] {min(picked)}: accuracy = {data['accuracy']} picks it itself; leave one of the two out"
         )
-    if not {"fmu", "element"}.isdisjoint(changes) and kind_of(dict(changes)) != kind_of(content):
-        content.clear()  # another body has other keys
+    choice = VARIANTS.get(table.partition(".")[0])
+    if choice is not None and not {"fmu", choice.name}.isdisjoint(changes):
+        kind = choice.kind(dict(changes))
+        kept = content if kind == choice.kind(content) else choice.kept(content, kind)
+        for key in content.keys() - kept.keys():
+            del content[key]
     given = {key for key, value in changes.items() if value is not None}
     for key in given:
-        for other in model.other_ways(key) - given:
-            content.pop(other, None)
+        for model in models.values():
+            for other in model.other_ways(key) - given:
+                content.pop(other, None)
     for key, value in changes.items():
         outer, dot, parameter = key.partition(".")
         if dot and outer == "parameters":

@@ -9,10 +9,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from .laws import laws_that
+from .laws import LAWS
 from .linearised import hilltop, largest_load, spring_energy, well_depth
 from .loads import MOST_POINTS, SIGNALS, Load
-from .messages import Rule, at, told, told_of_loads
+from .messages import Rule, at, either, told, told_of_loads
 from .partners import RigidWall
 from .scene import Scene
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
@@ -26,7 +26,6 @@ from .tables import (
     ORDINARY_SCHEMES,
     TOLERANCE_KEYS,
     Beam,
-    Contact,
     Spring,
 )
 
@@ -189,29 +188,10 @@ FORBIDDEN: tuple[Rule, ...] = (
     # Laws
     *(
         Rule(
-            lambda s, key=key: key in s.contact.facts.needs and key not in s.contact.model_fields_set,
-            f"[contact] {key}: missing; {{contact.law}} needs it",
-        )
-        for key in Contact.model_fields
-    ),
-    Rule(
-        lambda s: s.contact.damping > 0.0 and "damping" not in s.contact.facts.takes,
-        f"{{contact.damping}}: {{contact.law}} has none; use 0.0, {laws_that(lambda law: 'damping' in law.takes)}",
-    ),
-    *(
-        Rule(
             lambda s, table=table: s.contact.lasting and s.under(table) is None and not s.elastic_stop,
             f"{{contact.law}}: joins a [beam] and a [spring]; this scene has no [{table}]",
         )
         for table in ("beam", "spring")
-    ),
-    Rule(
-        lambda s: s.contact.lasting and s.contact.soft and s.contact.stiffness == s.contact.damping == 0.0,
-        "{contact.stiffness}: {contact.law} needs a stiffness or a damping greater than 0",
-    ),
-    Rule(
-        lambda s: s.contact.facts.opens and s.contact.stiffness == 0.0,
-        "{contact.stiffness}: with {contact.law} nothing would hold the bodies apart; it must be greater than 0",
     ),
     Rule(
         lambda s: s.elastic_stop and s.stop is not None and s.stop.restitution != 1.0,
@@ -225,8 +205,8 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     Rule(
         lambda s: s.coupling.scheme in ORDINARY_SCHEMES and not s.contact.soft,
-        f"{{coupling.scheme}}: needs [contact] law = {laws_that(lambda law: law.soft)}; "
-        'use scheme = "energy" with {contact.law}',
+        '{coupling.scheme}: needs [contact] law = {soft}; use scheme = "energy" with {contact.law}',
+        lambda s: {"soft": either(name for name, law in LAWS.items() if not law.rigid)},
     ),
     Rule(
         lambda s: _averages(s) and s.degree > 0,
@@ -243,7 +223,7 @@ FORBIDDEN: tuple[Rule, ...] = (
         'law = "tie" or fidelity = "dynamic"',
     ),
     Rule(
-        lambda s: s.massless and s.contact.facts.opens,
+        lambda s: s.massless and s.contact.opens,
         "{beam.fidelity}: the tip between the beam and {contact.law} would have no inertia; use "
         'law = "transmission" or fidelity = "dynamic"',
     ),
@@ -360,7 +340,7 @@ FORBIDDEN: tuple[Rule, ...] = (
     # Bodies that are not our own
     *(
         Rule(
-            lambda s, key=key: s.massless and s.contact.facts.strikes and hasattr(s.lower, key),
+            lambda s, key=key: s.massless and s.contact.strikes and hasattr(s.lower, key),
             f"{{spring.{key}}}: {{contact.law}} needs our own spring below {{beam.fidelity}}; "
             'use law = "tie", or fidelity = "dynamic"',
         )

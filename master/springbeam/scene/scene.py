@@ -8,10 +8,11 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
+from .laws import LAW, Contact, SoftLaw, TransmissionContact
 from .loads import Load
-from .partners import ForeignFmu, LowerBody, Partner, UpperBody
+from .partners import LOWER, UPPER, ForeignFmu, Partner
 from .statics import tip_load_deflection
-from .tables import ORDINARY_SCHEMES, Beam, Contact, Coupling, Spring, Stop, Table, Time, key
+from .tables import ORDINARY_SCHEMES, Beam, Coupling, Spring, Stop, Table, Time, key
 
 #: Times closer than the first of these fractions of H are one; a step shorter than the second would drown in rounding.
 SAME, SHORTEST_STEP = 1e-9, 1e-6
@@ -38,10 +39,10 @@ class Scene(Table):
         gt=0.0, lt=1.0,
     )  # fmt: skip
     time: Time
-    upper: UpperBody | None = Field(None, alias="beam")
-    lower: LowerBody | None = Field(None, alias="spring")
+    upper: Annotated[Beam | Partner, UPPER] | None = Field(None, alias="beam")
+    lower: Annotated[Spring | Partner, LOWER] | None = Field(None, alias="spring")
     stop: Stop | None = None
-    contact: Contact = Contact()
+    contact: Annotated[Contact, LAW] = TransmissionContact()
     coupling: Coupling = Coupling()
     loads: Annotated[tuple[Load, ...], Field(strict=False)] = ()
 
@@ -116,6 +117,11 @@ class Scene(Table):
         if self.beam is not None and self.beam.integrator != "modal" and not self.massless:
             return 0
         return min((body.integrals for body in self.foreign.values()), default=2)
+
+    @property
+    def soft_law(self) -> SoftLaw | None:
+        """The contact force, where it is a function of the penetration; ``None`` of a rigid law, or of no contact."""
+        return self.contact.force() if self.coupled else None
 
     @property
     def elastic_stop(self) -> bool:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from .laws import laws_that
+from .laws import LAW
 from .linearised import beam_energy, spring_energy, well_depth
 from .messages import Rule, told, told_of_loads
 from .scene import TABLES, Scene
@@ -209,31 +209,25 @@ def _counts(
     """Return rules for keys that are given, and not as their default, in scenes where they do not count."""
 
     def rule(table: str, key: str) -> Rule:
-        default = TABLES[table].model_fields[key].default
-
         def idle(scene: Scene) -> bool:
             content = scene.under(table)
-            return type(content) is TABLES[table] and getattr(content, key) != default and not counts(scene)
+            return (
+                isinstance(content, TABLES[table])
+                and key in (fields := type(content).model_fields)
+                and getattr(content, key) != fields[key].default
+                and not counts(scene)
+            )
 
         return Rule(idle, f"{{{table}.{key}}}: plays no part here; {where}", numbers)
 
     return [rule(*place.split(".")) for place in places.split()]
 
 
-def _of_law(key: str) -> list[Rule]:
-    """Return the rule for ``key`` of ``[contact]``, which counts, or shows in a column, with some laws."""
-    return _counts(
-        f"contact.{key}",
-        lambda s: s.coupled and s.contact.facts.has(key) and (s.joins or s.contact.soft),
-        "it counts between two bodies with law = {laws}",
-        lambda s: {"laws": laws_that(lambda law: law.has(key))},
-    )
-
-
 def _dynamic(scene: Scene) -> bool:
     return scene.beam is not None and not scene.massless
 
 
+_JOINS = "it counts between two bodies, or a beam and a stop"
 #: Where the keys count that do not always. ``[[loads]]`` refuses such keys itself; here they are told, so that a key
 #: can be changed with ``--set`` although another one then counts no more.
 EFFECTS: tuple[Rule, ...] = (
@@ -257,9 +251,8 @@ EFFECTS: tuple[Rule, ...] = (
         lambda s: _dynamic(s) and s.beam.integrator == "modal",
         'it counts with fidelity = "dynamic" and integrator = "modal", the midpoint rule keeps all modes',
     ),
-    *_counts("contact.law", lambda s: s.coupled, "it counts between two bodies, or a beam and a stop"),
-    *_of_law("stiffness"),
-    *_of_law("exponent"),
+    Rule(lambda s: not s.coupled and s.contact.law != LAW.default, f"{{contact.law}}: plays no part here; {_JOINS}"),
+    *_counts("contact.stiffness contact.exponent contact.damping", lambda s: s.coupled, _JOINS),
     *_counts(
         "contact.force_window",
         lambda s: s.coupled or (s.upper is not None and s.stop is not None),

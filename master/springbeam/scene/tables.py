@@ -9,26 +9,29 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import reduce
 from itertools import chain
 from math import pi
+from operator import or_
 from sys import float_info
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import (
     BaseModel,
     ConfigDict,
+    Discriminator,
     Field,
+    GetCoreSchemaHandler,
     ModelWrapValidatorHandler,
     SerializerFunctionWrapHandler,
-    field_validator,
+    Tag,
     model_serializer,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import CoreSchema
 from typing_extensions import Self
-
-from .laws import LAWS, LawFacts
 
 #: Up to this many unknowns all modes may be kept; the full eigenproblem grows with the cube.
 ALL_MODES_UP_TO = 1000
@@ -65,17 +68,14 @@ def key(
     default: Any = ...,
     *,
     otherwise: str = "",
-    one_of: tuple[str, ...] = (),
     **bounds: float,
 ) -> Any:
     """Declare a key of a table: its unit ("–" for none), one line of meaning, its default (none: it must be given).
 
-    ``otherwise`` says in words what holds where the key is left out and ``default`` does not tell; ``one_of`` are the
-    texts that it may be, where its type does not say; ``bounds`` are pydantic's gt, ge, le, lt.
+    ``otherwise`` says in words what holds where the key is left out and ``default`` does not tell; ``bounds`` are
+    pydantic's gt, ge, le, lt.
     """
     extra: dict[str, Any] = {"unit": unit, "otherwise": otherwise}
-    if one_of:
-        extra["enum"] = list(one_of)
     return Field(default, description=meaning, json_schema_extra=extra, **bounds)  # type: ignore[call-overload]
 
 
@@ -149,6 +149,46 @@ class Table(BaseModel):
         fields, given = type(self).model_fields, self.model_fields_set
         followed = {name for name in fields.keys() - given if getattr(self, name) != fields[name].default}
         return {name: value for name, value in handler(self).items() if name not in followed and value not in ((), [])}
+
+
+@dataclass(frozen=True, eq=False)
+class OneOf:
+    """Annotate a field whose table is one of several: the value of its key ``name`` says which.
+
+    A table that is added to ``tables`` counts after ``Scene.model_rebuild(force=True)``.
+    """
+
+    #: What they have in common.
+    common: type[Table]
+    name: str
+    #: One line on ``name``.
+    meaning: str
+    tables: dict[str, Any]
+    #: Its value where it is left out.
+    default: str
+
+    def kind(self, content: Any) -> str:
+        """Return which of ``tables`` the content of a table belongs to, or what else its key says."""
+        kind = content.get(self.name) if isinstance(content, dict) else getattr(content, self.name, None)
+        return self.default if kind is None else str(kind)
+
+    def kept(self, content: dict[str, Any], kind: str) -> dict[str, Any]:
+        """Return what of the content of a table is kept where it becomes another: the keys that this one has too."""
+        table = self.tables.get(kind)
+        return {key: value for key, value in content.items() if table is None or key in table.model_fields}
+
+    @property
+    def named(self) -> list[str]:
+        """The values that its key may have."""
+        return [kind for kind, table in self.tables.items() if self.name in table.model_fields]
+
+    def that_have(self, key: str) -> list[str]:
+        """Return the values of its key with which the table has ``key``."""
+        return [kind for kind in self.named if key in self.tables[kind].model_fields]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        tables = (Annotated[table, Tag(kind)] for kind, table in self.tables.items())
+        return handler.generate_schema(Annotated[reduce(or_, tables), Discriminator(self.kind)])
 
 
 class Time(Table):
@@ -306,52 +346,6 @@ class Stop(Table):
 
     position: float = key("m", "height φ, not above that of the spring's top")
     restitution: float = key("–", "restitution e: speed after an impact over that before", 1.0, ge=0.0, le=1.0)
-
-
-class Contact(Table):
-    """What force C belongs to the penetration p = y − u_tip (``docs/model.md``, "Interface laws")."""
-
-    law: str = key("–", "the interface law (docs/choose.md says which)", "transmission", one_of=tuple(LAWS))
-    stiffness: float = key(
-        "N/m^p", "stiffness λ_nc of normal compliance, or of a link (N/m)", 1.0e4, ge=0.0,
-        otherwise="1e4; needed with compliance and link",
-    )  # fmt: skip
-    exponent: float = key(
-        "–", "exponent p of normal compliance; a link has none", 3.0, ge=1.0, le=100.0,
-        otherwise="3; needed with compliance",
-    )  # fmt: skip
-    damping: float = key("s/m", "χ of compliance (Hunt & Crossley 1975), or damping c of a link (N·s/m)", 0.0, ge=0.0)
-    force_window: float | None = key(
-        "s", "time over which the force is averaged before its peak is taken", None, gt=0.0,
-        otherwise="a fiftieth of the period of a compliant contact, else of the beam's slowest",
-    )  # fmt: skip
-
-    @field_validator("law")
-    @classmethod
-    def _law_exists(cls, law: str) -> str:
-        if law not in LAWS:
-            raise PydanticCustomError("no_such_law", "no such law")
-        return law
-
-    @property
-    def facts(self) -> LawFacts:
-        """What the law is."""
-        return LAWS[self.law]
-
-    @property
-    def rigid(self) -> bool:
-        """Whether ends that have met share one position."""
-        return self.facts.kind == "rigid"
-
-    @property
-    def soft(self) -> bool:
-        """Whether C is a function of the penetration and its rate."""
-        return self.facts.soft
-
-    @property
-    def lasting(self) -> bool:
-        """Whether the law joins the ends from the start and for good, for either sign of C."""
-        return self.facts.lasting
 
 
 #: Keys that set the length of macro steps: the one, or the others.

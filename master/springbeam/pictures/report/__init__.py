@@ -192,9 +192,9 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
     for table, partner in scene.partners.items():
         yield table, f"another body in its place: {kind_of(partner).replace('_', ' ')}"
     if scene.coupled:
-        values = {key: getattr(contact, key) for key in contact.facts.takes}
+        values = contact.own_keys if contact.soft else {}
         numbers = [f"{key} {value:.4g}" for key, value in values.items() if key != "damping" or value > 0.0]
-        yield "contact", f"{contact.law}: {', '.join([contact.facts.words, *numbers])}"
+        yield "contact", f"{contact.law}: {', '.join([contact.words, *numbers])}"
     if stop is not None:
         rebound = "elastic" if scene.elastic_stop else f"restitution {stop.restitution:.4g}"
         yield "foundation", f"at φ = {stop.position:.4g} m, {rebound}"

@@ -93,6 +93,8 @@ AT_REST: dict[str, Any] = {
     "external_force": 0.0,
     "steps": 200,
 }
+#: Axes of the keys of ``[contact]``; a law takes those that it has.
+_CONTACT = {"stiffness": "contact_stiffness", "exponent": "exponent", "damping": "contact_damping"}
 
 
 #: Of the axes that slices have; others are numbers.
@@ -179,12 +181,7 @@ def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
     reach = abs(psi) + speed / np.sqrt(3.0 * k1)
     k2 = {"hardening": k2, "softening": -k1 / (cell["escape"] * reach) ** 2, "linear": 0.0}[cell["k2_kind"]]
     scene: dict[str, Any] = {
-        "contact": {
-            "law": law,
-            "stiffness": cell["contact_stiffness"],
-            "exponent": cell["exponent"],
-            "damping": cell["contact_damping"] if "damping" in LAWS[law].takes else 0.0,
-        },
+        "contact": {"law": law, **{key: cell[axis] for key, axis in _CONTACT.items() if key in LAWS[law].model_fields}},
         "coupling": {"scheme": scheme, "degree": degree, "macro_step": H},
         "time": {"t_end": steps * H + (0.0 if elastic or cell["bodies"] == "spring" else clearance / speed)},
     }

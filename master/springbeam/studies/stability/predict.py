@@ -27,12 +27,12 @@ from scipy.optimize import brentq
 
 from ...bodies import force
 from ...bodies.protocol import Motion
-from ...contact.laws import depth, law_of
 from ...coupling.projection import penetration_series
 from ...coupling.solver import CONDITIONS
 from ...monolithic.oscillators import GAUSS, Oscillators
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
 from ...scene import Beam, Scene, suspicions
+from ...scene.laws import depth
 from ...scene.linearised import contact_energy, spring_frequency, spring_stiffness
 from ...scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
 from ..design import RIGID, SOFT
@@ -169,7 +169,7 @@ def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
         low = LinearBody(
             np.array([spring_stiffness(scene) / m]), np.array([scene.spring.damping / m]), np.array([m**-0.5])
         )
-    law = law_of(scene)
+    law = scene.soft_law
     if law is None:
         return LinearPair(beam, low)
     depth_reached = depth(law, contact_energy(scene)) if law.one_sided else 0.0
