@@ -2,6 +2,7 @@
 
 from springbeam import scene
 from springbeam.scene.laws import LAW
+from springbeam.scene.loads import SIGNALS
 
 CONTACT = {"stiffness": 1.0e4, "exponent": 3.0}
 SOFT = scene.load_scene("soft")
@@ -27,6 +28,11 @@ def completed(tables):
 def scene_from_dict(tables):
     """Return the scene of `completed` tables."""
     return scene.scene_from_dict(completed(tables))
+
+
+def load_of(**keys):
+    """Return a load of these keys."""
+    return SIGNALS[keys.get("signal", "constant")](**keys)
 
 
 def kinds(trajectory):

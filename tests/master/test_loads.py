@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from bodies import simulate
 from references import integrated_anew
-from scenes import scene_from_dict
+from scenes import load_of, scene_from_dict
 
 from springbeam.bodies import force
 from springbeam.run.loads import Signal
-from springbeam.scene import Load, SceneError, load_scene, with_changes
+from springbeam.scene import SceneError, load_scene, with_changes
 
 RECORD = np.column_stack([np.linspace(0.0, 0.05, 26), 3.0 * np.sin(200.0 * np.linspace(0.0, 0.05, 26))])
 #: One of each signal, on all places.
@@ -59,10 +59,10 @@ def soft(*loads, t_end=0.07, **coupling):
 @pytest.mark.parametrize(("start", "size"), [(0.001, 1e-3), (0.013, 1e-3), (0.0, 0.06), (0.0499, 4e-3)])
 def test_the_projection_is_that_of_the_signal(name, start, size):
     """The moments against 1, s, s² are those of the signal, by quadrature between all points where it is not smooth."""
-    load = Load(**SIGNALS[name])
+    load = load_of(**SIGNALS[name])
     f = Signal(load).over(start, size)
     edges = np.unique(
-        np.clip([*RECORD[:, 0] + load.start, *Signal(load).kinks, start, start + size], start, start + size)
+        np.clip([*RECORD[:, 0] + load.since, *Signal(load).kinks, start, start + size], start, start + size)
     )
     for power in range(3):
         exact = 0.0
@@ -77,7 +77,7 @@ def test_the_projection_is_that_of_the_signal(name, start, size):
 @pytest.mark.parametrize("signal", ["harmonic", "half_sine", "step"])
 def test_where_a_load_jumps_its_value_is_that_after_the_jump(signal):
     wave = {"frequency": 5.0, "phase": 1.0} if signal == "harmonic" else {}
-    load = Load(on="tip", signal=signal, start=0.25, duration=0.125, amplitude=3.0, **wave)
+    load = load_of(on="tip", signal=signal, start=0.25, duration=0.125, amplitude=3.0, **wave)
     before, at_start, at_end = load.value([np.nextafter(0.25, 0.0), 0.25, 0.375])
     assert (before, at_end) == (0.0, 0.0)
     assert at_start == pytest.approx({"harmonic": 3.0 * np.sin(1.0), "half_sine": 0.0, "step": 3.0}[signal])
@@ -93,7 +93,7 @@ def test_pulses_have_the_shapes_and_the_velocity_changes_of_their_names():
         ("trapezoid", {"rise": 0.001}, None, 0.9),
         ("trapezoid", {"rise": 0.005}, 0.007, 0.5),
     ):
-        load = Load(signal=signal, **more, **common)
+        load = load_of(signal=signal, **more, **common)
         values = load.value(times)
         assert values.max() == pytest.approx(100.0, rel=1e-4)
         assert peak is None or times[values.argmax()] == pytest.approx(peak, abs=2e-7)
@@ -102,7 +102,7 @@ def test_pulses_have_the_shapes_and_the_velocity_changes_of_their_names():
 
 
 def test_a_chirp_turns_from_one_frequency_to_the_other():
-    load = Load(**SIGNALS["chirp"])
+    load = load_of(**SIGNALS["chirp"])
     turns = np.array([0.25, 0.5, 0.75, 1.0, 1.5])
     # 70 τ − (70 − 20)/(2 · 0.04) τ² turns have been made after τ.
     tau = (70.0 - np.sqrt(70.0**2 - 4.0 * 625.0 * turns)) / 1250.0
@@ -130,14 +130,14 @@ def test_fine_lines_of_a_table_end_no_step_but_its_first_and_its_last_do(tmp_pat
     times = 1e-4 * np.arange(100)
     np.savetxt(tmp_path / "fine.csv", np.column_stack([times, np.cos(900.0 * times)]), delimiter=",")
     given = {"on": "tip", "signal": "table", "amplitude": 1.0, "interpolation": "linear", "start": 0.01}
-    signal = Signal(Load(file=str(tmp_path / "fine.csv"), **given))
+    signal = Signal(load_of(file=str(tmp_path / "fine.csv"), **given))
     last = signal.kinks[-1]
     assert signal.next_kink(0.0095, 1e-3) == signal.kinks[0] == 0.01
     assert signal.next_kink(0.0105, 1e-3) == last
     assert signal.next_kink(0.01052, 3e-4) == signal.kinks[6]  # three of them in a step
     assert signal.next_kink(last - 1.5e-4, 1e-3) == signal.kinks[-2]
     assert signal.next_kink(last, 1e-3) == np.inf
-    spline = Load(file=str(tmp_path / "fine.csv"), **given | {"interpolation": "cubic"})
+    spline = load_of(file=str(tmp_path / "fine.csv"), **given | {"interpolation": "cubic"})
     assert spline.kinks == [0.01, last]  # it bends at no line
 
 
@@ -166,10 +166,10 @@ LEAVE_OUT = "leave the line out, or begin it with #"
 
 def test_a_table_ends_with_its_last_line_and_a_ramp_stays():
     Path("record.csv").write_text("time [ms],acceleration [g]\n0,1\n10,-2\n")
-    table = Load(on="base", signal="table", file="record.csv")
+    table = load_of(on="base", signal="table", file="record.csv")
     assert table.value([-1e-9, 0.0, 0.01, 0.010001]) == pytest.approx([0.0, 9.80665, -2.0 * 9.80665, 0.0])
     assert table.peak == pytest.approx(2.0 * 9.80665)
-    ramp = Load(on="tip", signal="ramp", duration=0.01, amplitude=3.0)
+    ramp = load_of(on="tip", signal="ramp", duration=0.01, amplitude=3.0)
     assert ramp.value([-1e-9, 0.005, 0.01, 7.0]) == pytest.approx([0.0, 1.5, 3.0, 3.0])
 
 

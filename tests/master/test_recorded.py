@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from scenes import load_of
 
-from springbeam.scene.loads import Load
 from springbeam.scene.recorded import Reading, Recorded
 
 
@@ -115,6 +115,6 @@ def test_nothing_is_guessed(file, what):
 
 def test_a_load_takes_the_same_keys(file):
     file.write_text("t [s];F [kN]\n0;1,5\n1;\n2;2,5\n")
-    load = Load(on="tip", signal="table", file=str(file), decimal=",", missing="drop")
+    load = load_of(on="tip", signal="table", file=str(file), decimal=",", missing="drop")
     assert load.value([0.0, 1.0]).tolist() == [1500.0, 2000.0]
     assert load.notes == ["1 lines of 3 dropped, where a value is missing"]

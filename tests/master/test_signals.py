@@ -5,9 +5,9 @@ import sys
 import numpy as np
 import pytest
 from runs import a_trajectory
+from scenes import load_of
 from scipy.integrate import quad
 
-from springbeam.scene import Load
 from springbeam.signals.curves import signal
 from springbeam.signals.driven import repeating, response
 from springbeam.signals.spectra import shock_spectrum
@@ -62,7 +62,7 @@ def test_what_is_left_of_a_transient_decides_whether_it_has_settled(constants):
 
 def test_the_response_to_a_chirp_is_that_of_whole_pairs_of_its_turns():
     """Two of 2.5 turns count, those of (9 + 4 t) t up to 0.2037 s; what comes before and after does not."""
-    chirp = Load(on="tip", signal="chirp", start=1.0, frequency=9.0, frequency_end=11.0, duration=0.25)
+    chirp = load_of(on="tip", signal="chirp", start=1.0, frequency=9.0, frequency_end=11.0, duration=0.25)
     time = 1e-3 * np.arange(2000)
     since = time - 1.0
     values = np.where((since > -5e-4) & (since < 0.2035), 3.0 * np.sin(2.0 * np.pi * (9.0 + 4.0 * since) * since), 9.0)
@@ -74,7 +74,7 @@ def test_the_response_to_a_chirp_is_that_of_whole_pairs_of_its_turns():
 
 @pytest.mark.parametrize("rows", [2, 4, 4001])
 def test_turns_of_a_chirp_between_two_rows_have_no_response(rows):
-    chirp = Load(on="tip", signal="chirp", frequency=100.0, frequency_end=10.0, duration=1.0)
+    chirp = load_of(on="tip", signal="chirp", frequency=100.0, frequency_end=10.0, duration=1.0)
     time = np.append(np.linspace(0.0, 0.3, rows), 1.0)  # from 0.3 s on it turns 33 times
     found = response(0, chirp, time, np.sin(time))
     assert len(found.frequency) == len(found.amplitude) == (13 if rows == 4001 else 0)

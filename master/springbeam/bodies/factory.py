@@ -8,6 +8,7 @@ from math import inf
 from pathlib import Path
 
 from ..scene import Beam, Scene, SceneError, Spring
+from ..scene.loads import TableLoad
 from ..scene.partners import ForeignFmu, Partner, RigidWall
 from ..scene.statics import resting_height, tip_compliance, tip_load_deflection
 from .archive import fmu_directory, own_fmu
@@ -106,7 +107,7 @@ def fingerprints(scene: Scene) -> dict[str, str]:
     """Return SHA-256 by name of the files that ``scene`` needs: FMUs and tables. Raises FmuError if one is missing."""
     files = {path.name: path for path in map(own_fmu, scene.fmus)}
     files |= {spec.fmu: Path(spec.fmu) for spec in scene.foreign.values()}
-    files |= {load.file: Path(load.file) for load in scene.loads if load.file is not None}
+    files |= {load.file: Path(load.file) for load in scene.loads if isinstance(load, TableLoad)}
     found = {}
     for name, path in files.items():
         try:

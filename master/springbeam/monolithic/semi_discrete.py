@@ -318,10 +318,10 @@ class Loads:
                 self.patterns[i] = beam.basis.T @ assemble(scene.beam).nodal(*unit_forces(scene.beam, load))
             if load.on in ("spring", "base"):
                 self.on_spring[i] = 1.0 if load.on == "spring" else -mass
-        breaks = [load.start + load.record.x if load.signal == "table" else load.kinks for load in scene.loads]
+        breaks = [load.edges for load in scene.loads]
         self.kinks = sorted({float(time) for times in breaks for time in times})
-        pulses = [np.pi / (load.duration or np.inf) for load in scene.loads if load.signal == "half_sine"]
-        fastest = max([*pulses, *(load.rate for load in scene.loads)], default=0.0)
+        waves = [load.wave[0] for load in scene.loads if load.wave is not None]
+        fastest = max([*waves, *(load.rate for load in scene.loads)], default=0.0)
         self.longest_step = _TURN / fastest if fastest > 0.0 else np.inf
         self._until = np.inf
 

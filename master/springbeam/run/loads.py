@@ -10,14 +10,14 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from functools import lru_cache
-from math import cos, inf, pi, sin
+from math import cos, inf, sin
 
 import numpy as np
 
 from ..bodies import force
 from ..bodies.protocol import NO_FORCE, Body, Force
 from ..scene import SAME, Load, Scene
-from ..scene.loads import LINES_IN_STEP
+from ..scene.loads import LINES_IN_STEP, ConstantLoad, StepLoad, TableLoad
 
 #: Which loads act on which body.
 ON_BEAM, ON_SPRING = ("beam", "tip", "base"), ("spring", "base")
@@ -37,7 +37,7 @@ class Signal:
         #: When the load jumps or bends and a step ends [s].
         self.kinks = load.kinks
         #: Times [s] between which it is smooth: of a table the polynomial between two lines.
-        self._edges = (load.start + load.record.x).tolist() if load.signal == "table" else self.kinks
+        self._edges = load.edges
 
     def next_kink(self, time: float, size: float) -> float:
         """Return when it next jumps or bends after ``time`` [s] in a way that is worth the end of a step; ∞ if not.
@@ -57,14 +57,14 @@ class Signal:
         if time >= self._end:
             return NO_FORCE
         cuts = self._edges[bisect_right(self._edges, time + same) : bisect_left(self._edges, time + size - same)]
-        if load.signal in ("harmonic", "half_sine") and not cuts:
+        if load.wave is not None and not cuts:
             if not self._begins <= middle < self._end:
                 return NO_FORCE
-            omega = load.rate or pi / (load.duration or inf)
-            return force.derivatives(_wave(load.amplitude, omega, middle - load.start, load.phase, size), size)
-        if load.signal in ("constant", "step") and not cuts:
+            omega, phase = load.wave
+            return force.derivatives(_wave(load.amplitude, omega, middle - load.since, phase, size), size)
+        if isinstance(load, ConstantLoad | StepLoad) and not cuts:
             return (float(load.value(middle)), 0.0, 0.0)
-        nodes, weights = _gauss(_OF_TABLE if load.signal == "table" else _POINTS + int(load.rate * size))
+        nodes, weights = _gauss(_OF_TABLE if isinstance(load, TableLoad) else _POINTS + int(load.rate * size))
         edges = np.array([-1.0, *(2.0 * (cut - time) / size - 1.0 for cut in cuts), 1.0])
         half = 0.5 * np.diff(edges)[:, None]
         s = edges[:-1, None] + half * (nodes + 1.0)

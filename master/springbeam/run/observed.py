@@ -14,6 +14,7 @@ from ..results.trajectory import Event
 from ..scene import Load, Scene
 from ..scene.laws import stiffest
 from ..scene.linearised import contact_energy, spring_frequency
+from ..scene.loads import TableLoad
 from ..scene.modes import tip_modes
 from ..scene.resolution import SHORT, SHORT_IMPULSE, not_resolved, oscillating, slowest_frequency, window_of
 from ..scene.statics import tip_inertia
@@ -157,7 +158,7 @@ def left_out(scene: Scene, steps: np.ndarray) -> float:
     The answer is to first order, of bodies that are free, without their damping: at most.
     """
     made, shares = steps[steps["size"] > 0.0], [0.0]
-    tables = [load for load in scene.loads if load.signal == "table"]
+    tables = [load for load in scene.loads if isinstance(load, TableLoad)]
     if tables and len(made) and scene.beam is not None and not scene.massless:
         omega, tip = (of_modes[:_MODES] for of_modes in tip_modes(scene.beam))
         forces = [_on_beam(scene, load) for load in tables]
@@ -171,7 +172,7 @@ def left_out(scene: Scene, steps: np.ndarray) -> float:
 
 
 def _share(
-    tables: list[Load],
+    tables: list[TableLoad],
     forces: list[float],
     made: np.ndarray,
     omega: np.ndarray,
@@ -201,7 +202,7 @@ def _on_beam(scene: Scene, load: Load) -> float:
     return 0.0 if load.on == "spring" else 1.0
 
 
-def _swing(load: Load, made: np.ndarray, omega: np.ndarray, weights: np.ndarray, negligible: float) -> float:
+def _swing(load: TableLoad, made: np.ndarray, omega: np.ndarray, weights: np.ndarray, negligible: float) -> float:
     """Return Σ w |∫ δF exp(−iωt) dt|/ω at its largest, δF being what the steps ``made`` leave out of ``load``.
 
     What may be ``negligible`` in all is bounded, not computed.

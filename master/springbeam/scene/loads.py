@@ -1,72 +1,34 @@
 """A load of a scene, ``[[loads]]``: where it acts, and its value as a function of time.
 
-``docs/model.md``, "Loads", has the equations. A table is a file of two columns, time and value (``recorded``).
+``docs/model.md``, "Loads", has the equations. Each signal is one table of keys, a `Load` named in `SIGNALS`. A table of
+values is a file of two columns, time and value (``recorded``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
+from typing_extensions import Self
 
 from .recorded import Reading, Recorded
-from .tables import Table, key
+from .tables import OneOf, Table, key
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-
-class Signal(NamedTuple):
-    """A signal: keys that it needs, keys that it may have, and its value over the amplitude at t [s] after `start`."""
-
-    needs: tuple[str, ...]
-    may: tuple[str, ...]
-    value: Callable[[Any, np.ndarray], Any]
-
-    @property
-    def takes(self) -> tuple[str, ...]:
-        """All keys that play a part."""
-        return self.needs + self.may
-
-
-#: By their names in a scene; what a value is before a signal begins and after its end does not count.
-SIGNALS: dict[str, Signal] = {
-    "constant": Signal((), (), lambda load, t: 1.0),
-    "harmonic": Signal(
-        ("frequency",), ("phase", "start", "duration"), lambda load, t: np.sin(load.rate * t + load.phase)
-    ),
-    "chirp": Signal(
-        ("frequency", "frequency_end", "duration"),
-        ("phase", "start"),
-        lambda load, t: np.sin(
-            2.0 * np.pi * (load.frequency + 0.5 * (load.frequency_end - load.frequency) * t / load.duration) * t
-            + load.phase
-        ),
-    ),
-    "half_sine": Signal(("duration",), ("start",), lambda load, t: np.sin(np.pi / load.duration * t)),
-    "sawtooth": Signal(("duration",), ("start",), lambda load, t: t / load.duration),
-    "trapezoid": Signal(
-        ("duration", "rise"),
-        ("start",),
-        lambda load, t: np.clip(np.minimum(t, load.duration - t) / load.rise, 0.0, 1.0),
-    ),
-    "step": Signal((), ("start", "duration"), lambda load, t: 1.0),
-    "ramp": Signal(("duration",), ("start",), lambda load, t: np.clip(t / load.duration, 0.0, 1.0)),
-    "table": Signal(("file",), ("interpolation", "start", *Reading.model_fields), lambda load, t: load.record(t)),
-}
 #: So many lines of a table in a step are data, and no kinks that are worth the end of one.
 LINES_IN_STEP = 4
 #: Most different places of point forces on a beam.
 MOST_POINTS = 4
 
 
-class _Acting(Table):
-    """Where a load acts, and its signal."""
+class Load(Table):
+    """A load that acts on the beam, on its tip, on the spring, or on all by the acceleration of the base."""
 
     on: Literal["beam", "tip", "spring", "base"] = key(
         "–", "what it acts on: a force on the beam (N/m, or N at a point), on tip or spring (N), or the base (m/s²)"
@@ -76,37 +38,20 @@ class _Acting(Table):
     )
     at: float | None = key("–", "on the beam: a point force at this fraction of L", None, gt=0.0, le=1.0)
     amplitude: float = key("N/m, N or m/s²", "amplitude of the signal; upward is positive", 1.0)
-    signal: Literal["constant", "harmonic", "chirp", "half_sine", "sawtooth", "trapezoid", "step", "ramp", "table"] = (
-        key("–", "value over time; sawtooth has its peak at the end", "constant")
-    )
-    frequency: float | None = key(
-        "Hz", "frequency of harmonic, of chirp at its start", None, gt=0.0, otherwise="needed with harmonic and chirp"
-    )
-    frequency_end: float | None = key(
-        "Hz", "frequency of chirp at its end; between, it changes evenly in time", None, gt=0.0,
-        otherwise="needed with chirp",
-    )  # fmt: skip
-    phase: float = key("rad", "phase of harmonic or chirp at its start", 0.0)
-    start: float = key("s", "time before which the load is 0; time 0 of a table", 0.0)
-    duration: float | None = key(
-        "s", "length of the pulse, or of the rise", None, gt=0.0,
-        otherwise="for ever; needed with chirp, half_sine, sawtooth, trapezoid and ramp",
-    )  # fmt: skip
-    rise: float | None = key(
-        "s", "how long a trapezoid rises, and falls", None, gt=0.0, otherwise="needed with trapezoid"
-    )
-    file: str | None = key("–", "file of a table, relative to that of the scene", None, otherwise="needed with table")
-    interpolation: Literal["linear", "cubic"] = key("–", "between the lines of a table", "linear")
-
-
-class Load(Reading, _Acting):
-    """A load that acts on the beam, on its tip, on the spring, or on all by the acceleration of the base."""
+    signal: str
 
     @model_validator(mode="after")
-    def _has_its_table(self) -> Load:
-        if self.file is not None and self.signal == "table":
-            _ = self.record  # refuses what is no table
+    def _acts_somewhere(self) -> Self:
+        place = f"shape = {list(self.shape)}" if self.shape is not None else f"at = {self.at}"
+        if self.on != "beam" and (self.shape is not None or self.at is not None):
+            raise ValueError(f'{place}: is for on = "beam", this load is on = "{self.on}"')
+        if self.shape is not None and self.at is not None:
+            raise ValueError(f"at = {self.at}: a load has a shape or acts at a point; leave one of the two out")
         return self
+
+    def curve(self, t: np.ndarray) -> Any:
+        """Return the value over the amplitude at t [s] after `start`; before it begins and after its end, anything."""
+        raise NotImplementedError
 
     @property
     def unit(self) -> str:
@@ -114,52 +59,229 @@ class Load(Reading, _Acting):
         return {"beam": "N" if self.at is not None else "N/m", "base": "m/s²"}.get(self.on, "N")
 
     @property
+    def since(self) -> float:
+        """Time 0 of `curve` [s]."""
+        return 0.0
+
+    @property
     def _extent(self) -> tuple[float, float]:
-        """From when to when it is not 0 [s], counted from `start`."""
-        if self.signal == "table":
-            return float(self.record.x[0]), float(self.record.x[-1])
-        ends = {"constant": (-inf, inf), "ramp": (0.0, inf)}
-        return ends.get(self.signal, (0.0, self.duration or inf))
+        """From when to when it is not 0 [s], counted from `since`."""
+        return -inf, inf
+
+    @property
+    def _bends(self) -> tuple[float, ...]:
+        """When it jumps or bends [s], counted from `since`."""
+        return ()
 
     @property
     def begins(self) -> float:
         """Time [s] before which the load is 0; −∞ of a constant."""
-        return self.start + self._extent[0]
+        return self.since + self._extent[0]
 
     @property
     def end(self) -> float:
         """Time [s] from which on the load is 0; ∞ if there is none."""
-        return self.start + self._extent[1]
+        return self.since + self._extent[1]
 
     @property
     def peak(self) -> float:
         """Largest absolute value, in `unit`."""
-        return abs(self.amplitude) * (
-            float(np.abs(self.record(self.record.x)).max()) if self.signal == "table" else 1.0
-        )
+        return abs(self.amplitude)
 
     @property
     def rate(self) -> float:
         """Rate of an oscillation that goes on and on [rad/s], 0 for any other signal."""
-        return 2.0 * np.pi * max(self.frequency or 0.0, self.frequency_end or 0.0)
+        return 0.0
 
-    def is_finer_than(self, macro_step: float | None) -> bool:
-        """Return whether the lines of a straight table are too close for steps of ``macro_step`` [s] to end on them."""
-        if self.signal != "table" or self.interpolation == "cubic" or macro_step is None:
-            return False
-        times = self.record.x
-        return bool(LINES_IN_STEP * (times[-1] - times[0]) < macro_step * (len(times) - 1))
+    @property
+    def wave(self) -> tuple[float, float] | None:
+        """Rate [rad/s] and phase [rad] of a sine, ``None`` for any other signal."""
+        return None
 
     @property
     def kinks(self) -> list[float]:
-        """Times at which it jumps or bends [s], ascending; all lines of a straight table."""
-        if self.signal == "constant":
-            return []
-        if self.signal == "table":
-            lines = self.start + self.record.x
-            return list((lines[[0, -1]] if self.interpolation == "cubic" else lines).tolist())
-        rise, duration = self.rise or 0.0, self.duration or 0.0
-        return [self.start + since for since in sorted({0.0, rise, duration - rise, duration})]
+        """Times at which it jumps or bends [s], ascending, each worth the end of a step."""
+        return [self.since + bend for bend in sorted(set(self._bends))]
+
+    @property
+    def edges(self) -> list[float]:
+        """Times between which it is smooth [s], ascending."""
+        return self.kinks
+
+    @property
+    def notes(self) -> list[str]:
+        """What reading its file did to the lines, for people."""
+        return []
+
+    def is_finer_than(self, macro_step: float | None) -> bool:
+        """Return whether the lines of a straight table are too close for steps of ``macro_step`` [s] to end on them."""
+        return False
+
+    def value(self, times: Any) -> np.ndarray:
+        """Return the signal at ``times`` [s], any shape, in `unit`; where it jumps, the value after the jump."""
+        t = np.asarray(times, dtype=float) - self.since
+        first, last = self._extent
+        return np.where((t >= first) & (t < last), self.amplitude * self.curve(t), 0.0)
+
+
+class ConstantLoad(Load):
+    """The amplitude at all times."""
+
+    signal: Literal["constant"] = key("–", "the amplitude at all times", "constant")
+
+    def curve(self, t: np.ndarray) -> Any:
+        return 1.0
+
+
+class _Started(Load):
+    """A load that is 0 before its start."""
+
+    start: float = key("s", "time before which the load is 0; time 0 of a table", 0.0)
+
+    @property
+    def since(self) -> float:
+        return self.start
+
+
+class _Lasting(_Started):
+    """A load that may end."""
+
+    duration: float | None = key("s", "how long it acts", None, gt=0.0, otherwise="for ever")
+
+    @property
+    def _extent(self) -> tuple[float, float]:
+        return 0.0, self.duration or inf
+
+    @property
+    def _bends(self) -> tuple[float, ...]:
+        return 0.0, self.duration or 0.0
+
+
+class _Pulse(_Started):
+    """A load that ends."""
+
+    duration: float = key("s", "length of the pulse, or of the rise", gt=0.0)
+
+    @property
+    def _extent(self) -> tuple[float, float]:
+        return 0.0, self.duration
+
+    @property
+    def _bends(self) -> tuple[float, ...]:
+        return 0.0, self.duration
+
+
+class HarmonicLoad(_Lasting):
+    """A sine, sin(2π f t + φ)."""
+
+    signal: Literal["harmonic"] = key("–", "a sine", "harmonic")
+    frequency: float = key("Hz", "frequency f", gt=0.0)
+    phase: float = key("rad", "phase φ at its start", 0.0)
+
+    @property
+    def rate(self) -> float:
+        return 2.0 * np.pi * self.frequency
+
+    @property
+    def wave(self) -> tuple[float, float]:
+        return self.rate, self.phase
+
+    def curve(self, t: np.ndarray) -> Any:
+        return np.sin(self.rate * t + self.phase)
+
+
+class ChirpLoad(_Pulse):
+    """A sine whose frequency changes evenly in time."""
+
+    signal: Literal["chirp"] = key("–", "a sine whose frequency changes", "chirp")
+    frequency: float = key("Hz", "frequency at its start", gt=0.0)
+    frequency_end: float = key("Hz", "frequency at its end", gt=0.0)
+    phase: float = key("rad", "phase φ at its start", 0.0)
+
+    @property
+    def rate(self) -> float:
+        return 2.0 * np.pi * max(self.frequency, self.frequency_end)
+
+    def curve(self, t: np.ndarray) -> Any:
+        mean = self.frequency + 0.5 * (self.frequency_end - self.frequency) * t / self.duration
+        return np.sin(2.0 * np.pi * mean * t + self.phase)
+
+
+class HalfSineLoad(_Pulse):
+    """A pulse, the half of a sine."""
+
+    signal: Literal["half_sine"] = key("–", "a pulse, the half of a sine", "half_sine")
+
+    @property
+    def wave(self) -> tuple[float, float]:
+        return np.pi / self.duration, 0.0
+
+    def curve(self, t: np.ndarray) -> Any:
+        return np.sin(np.pi / self.duration * t)
+
+
+class SawtoothLoad(_Pulse):
+    """A pulse that grows evenly and has its peak at the end."""
+
+    signal: Literal["sawtooth"] = key("–", "a pulse with its peak at the end", "sawtooth")
+
+    def curve(self, t: np.ndarray) -> Any:
+        return t / self.duration
+
+
+class TrapezoidLoad(_Pulse):
+    """A pulse that rises and falls evenly, and is constant between."""
+
+    signal: Literal["trapezoid"] = key("–", "a pulse that rises, stays and falls", "trapezoid")
+    rise: float = key("s", "how long it rises, and falls", gt=0.0)
+
+    @model_validator(mode="after")
+    def _has_time_to_fall(self) -> Self:
+        if self.rise > 0.5 * self.duration:
+            raise ValueError(f"rise = {self.rise}: must be at most half of duration = {self.duration}")
+        return self
+
+    @property
+    def _bends(self) -> tuple[float, ...]:
+        return 0.0, self.rise, self.duration - self.rise, self.duration
+
+    def curve(self, t: np.ndarray) -> Any:
+        return np.clip(np.minimum(t, self.duration - t) / self.rise, 0.0, 1.0)
+
+
+class StepLoad(_Lasting):
+    """The amplitude from the start on."""
+
+    signal: Literal["step"] = key("–", "the amplitude from the start on", "step")
+
+    def curve(self, t: np.ndarray) -> Any:
+        return 1.0
+
+
+class RampLoad(_Pulse):
+    """A load that rises evenly, and stays."""
+
+    signal: Literal["ramp"] = key("–", "a load that rises, and stays", "ramp")
+
+    @property
+    def _extent(self) -> tuple[float, float]:
+        return 0.0, inf
+
+    def curve(self, t: np.ndarray) -> Any:
+        return np.clip(t / self.duration, 0.0, 1.0)
+
+
+class TableLoad(Reading, _Started):
+    """A table of values over time, in a file."""
+
+    signal: Literal["table"] = key("–", "a table of values over time", "table")
+    file: str = key("–", "file of a table, relative to that of the scene")
+    interpolation: Literal["linear", "cubic"] = key("–", "between the lines of a table", "linear")
+
+    @model_validator(mode="after")
+    def _has_its_table(self) -> Self:
+        _ = self._read  # refuses what is no table
+        return self
 
     @property
     def record(self) -> PPoly:
@@ -168,12 +290,10 @@ class Load(Reading, _Acting):
 
     @property
     def notes(self) -> list[str]:
-        """What reading the table did to its lines, for people."""
-        return self._read[1] if self.signal == "table" else []
+        return self._read[1]
 
     @property
     def _read(self) -> tuple[PPoly, list[str]]:
-        assert self.file is not None
         path = Path(self.file)
         reading = Reading(**{name: getattr(self, name) for name in Reading.model_fields})
         try:
@@ -182,12 +302,52 @@ class Load(Reading, _Acting):
             why = error.strerror if isinstance(error, OSError) else error
             raise ValueError(f'file = "{path}": {why}') from error
 
-    def value(self, times: Any) -> np.ndarray:
-        """Return the signal at ``times`` [s], any shape, in `unit`; where it jumps, the value after the jump."""
-        t, (first, last) = np.asarray(times, dtype=float) - self.start, self._extent
-        to_the_end = np.less_equal if self.signal == "table" else np.less  # the last line of a table belongs to it
-        value = self.amplitude * SIGNALS[self.signal].value(self, t)
-        return np.where((t >= first) & to_the_end(t, last), value, 0.0)
+    @property
+    def _extent(self) -> tuple[float, float]:
+        x = self.record.x
+        return float(x[0]), float(np.nextafter(x[-1], inf))  # the last line belongs to it
+
+    @property
+    def end(self) -> float:
+        return self.start + float(self.record.x[-1])
+
+    @property
+    def peak(self) -> float:
+        return abs(self.amplitude) * float(np.abs(self.record(self.record.x)).max())
+
+    @property
+    def kinks(self) -> list[float]:
+        lines = self.edges
+        return [lines[0], lines[-1]] if self.interpolation == "cubic" else lines
+
+    @property
+    def edges(self) -> list[float]:
+        lines: list[float] = (self.start + self.record.x).tolist()
+        return lines
+
+    def is_finer_than(self, macro_step: float | None) -> bool:
+        if self.interpolation == "cubic" or macro_step is None:
+            return False
+        times = self.record.x
+        return bool(LINES_IN_STEP * (times[-1] - times[0]) < macro_step * (len(times) - 1))
+
+    def curve(self, t: np.ndarray) -> Any:
+        return self.record(t)
+
+
+#: By their names in a scene.
+SIGNALS: dict[str, type[Load]] = {
+    "constant": ConstantLoad,
+    "harmonic": HarmonicLoad,
+    "chirp": ChirpLoad,
+    "half_sine": HalfSineLoad,
+    "sawtooth": SawtoothLoad,
+    "trapezoid": TrapezoidLoad,
+    "step": StepLoad,
+    "ramp": RampLoad,
+    "table": TableLoad,
+}
+SIGNAL = OneOf(Load, "signal", "value over time", SIGNALS, "constant")
 
 
 @lru_cache(maxsize=16)
@@ -196,7 +356,8 @@ def _record(path: Path, modified: int, interpolation: str, unit: str, reading: R
     if len(recorded.units) != 2:
         raise ValueError(f"{len(recorded.units)} columns; a table has two, time and value")
     times, columns = recorded.read({1: unit})
-    values, notes = columns[1], [note for note in recorded.notes if not note.endswith("is assumed")]
+    values = columns[1]
+    notes = [note for note in recorded.notes if not note.endswith("is assumed")]
     from scipy.interpolate import CubicSpline, PPoly  # takes half a second to load: only for who has a table
 
     if interpolation == "cubic":

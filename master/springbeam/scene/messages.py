@@ -17,13 +17,13 @@ from typing import Any, NamedTuple
 import tomli_w
 
 from .laws import LAW
-from .loads import Load
+from .loads import SIGNAL
 from .partners import LOWER, PARTNERS, UPPER, ForeignFmu
 from .scene import TABLES, Scene
 from .tables import OneOf, SceneError, Table
 
 #: What a table is one of, by its name.
-VARIANTS: dict[str, OneOf] = {"beam": UPPER, "spring": LOWER, "contact": LAW}
+VARIANTS: dict[str, OneOf] = {"beam": UPPER, "spring": LOWER, "contact": LAW, "loads": SIGNAL}
 _ELEMENTS = replace(UPPER, tables={name: PARTNERS[name] for name in UPPER.named}, default="")
 #: Tables by their names, "" is what stands outside of them, and by theirs the bodies that are not our own; or what a
 #: table is one of.
@@ -31,7 +31,7 @@ MODELS: dict[str, type[Table] | OneOf] = {
     "": Scene,
     **TABLES,
     "contact": LAW,
-    "loads": Load,
+    "loads": SIGNAL,
     "fmu": ForeignFmu,
     "element": _ELEMENTS,
 }
@@ -115,7 +115,7 @@ def allowed(key: Mapping[str, Any]) -> str:
     if choices := key.get("enum") or [key[name] for name in ("const",) if name in key]:
         return " or ".join(json.dumps(choice, ensure_ascii=False) for choice in choices)
     bounds = " and ".join(f"{words} {key[name]:.15g}" for name, words in _BOUNDS.items() if name in key)
-    kind = "tables" if "$ref" in key.get("items", ()) else key.get("type", "table")
+    kind = "tables" if "oneOf" in key.get("items", ()) else key.get("type", "table")
     return f"{_NOUNS[kind]} {bounds}".strip()
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from .laws import LAWS
 from .linearised import hilltop, largest_load, spring_energy, well_depth
-from .loads import MOST_POINTS, SIGNALS, Load
+from .loads import MOST_POINTS
 from .messages import Rule, at, either, told, told_of_loads
 from .partners import RigidWall
 from .scene import Scene
@@ -36,8 +36,7 @@ MOST_MACRO_STEPS = 1e12
 def impossible(scene: Scene) -> list[str]:
     """Return why ``scene`` cannot be run, as lines ``[table] key = value: reason and remedy``; empty if it can."""
     try:
-        found = [*told_of_loads(scene, UNFIT_LOADS)]
-        found = found or [*told(scene, FORBIDDEN), *told_of_loads(scene, FORBIDDEN_LOADS)]
+        found = [*told(scene, FORBIDDEN), *told_of_loads(scene, FORBIDDEN_LOADS)]
         if not found and (scene.beam is None or _is_finite(scene.beam)):
             suspicions(scene)  # what is certain to overflow once the scene runs overflows here
             return []
@@ -108,17 +107,6 @@ def _given_step(scene: Scene) -> bool:
 def _points(scene: Scene) -> list[float]:
     """Return where point forces act, as fractions of the beam's length."""
     return sorted({load.at for load in scene.loads if load.at is not None})
-
-
-def _given(load: Load, key: str) -> bool:
-    """Return whether a load has another value than the default."""
-    return bool(getattr(load, key) != Load.model_fields[key].default)
-
-
-def _of_signal(scene: Scene, load: Load) -> Mapping[str, Any]:
-    """Return what the signal of a load takes, for the texts of rules."""
-    takes = ", ".join(SIGNALS[load.signal].takes) or "none of these keys"
-    return {"signal": f'signal = "{load.signal}"', "takes": takes}
 
 
 def _tolerance(scene: Scene) -> Mapping[str, str]:
@@ -370,43 +358,6 @@ FORBIDDEN: tuple[Rule, ...] = (
         "[[loads]]: point forces at {number} places, {places}; the beam takes them at "
         f"{MOST_POINTS} at most. Put some at one place, or give them a shape",
         lambda s: {"number": len(_points(s)), "places": ", ".join(f"{x:g}" for x in _points(s))},
-    ),
-)
-
-#: Keys of a load that do not fit each other; other rules then cannot ask for its values.
-UNFIT_LOADS: tuple[Rule, ...] = (
-    *(
-        Rule(
-            lambda s, load, key=key: _given(load, key) and key not in SIGNALS[load.signal].takes,
-            f"{{load.{key}}}: plays no part in {{signal}}; it takes {{takes}}",
-            _of_signal,
-        )
-        for key in dict.fromkeys(key for signal in SIGNALS.values() for key in signal.takes)
-    ),
-    *(
-        Rule(
-            lambda s, load, key=key: key in SIGNALS[load.signal].needs and not _given(load, key),
-            f"[load] {key}: missing; {{signal}} needs it",
-            _of_signal,
-        )
-        for key in dict.fromkeys(key for signal in SIGNALS.values() for key in signal.needs)
-    ),
-    *(
-        Rule(
-            lambda s, load, key=key: _given(load, key) and load.on != "beam",
-            f'{{load.{key}}}: is for on = "beam", this load is on = "{{on}}"',
-            lambda s, load: {"on": load.on},
-        )
-        for key in ("shape", "at")
-    ),
-    Rule(
-        lambda s, load: load.shape is not None and load.at is not None,
-        "{load.at}: a load has a shape or acts at a point; leave one of the two out",
-    ),
-    Rule(
-        lambda s, load: load.rise is not None and load.rise > 0.5 * (load.duration or math.inf),
-        "{load.rise}: must be at most half of duration = {duration}",
-        lambda s, load: {"duration": load.duration},
     ),
 )
 

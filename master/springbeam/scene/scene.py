@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import Field
 
 from .laws import LAW, Contact, SoftLaw, TransmissionContact
-from .loads import Load
+from .loads import SIGNAL, Load
 from .partners import LOWER, UPPER, ForeignFmu, Partner
 from .statics import tip_load_deflection
 from .tables import ORDINARY_SCHEMES, Beam, Coupling, Spring, Stop, Table, Time, key
@@ -44,7 +44,7 @@ class Scene(Table):
     stop: Stop | None = None
     contact: Annotated[Contact, LAW] = TransmissionContact()
     coupling: Coupling = Coupling()
-    loads: Annotated[tuple[Load, ...], Field(strict=False)] = ()
+    loads: Annotated[tuple[Annotated[Load, SIGNAL], ...], Field(strict=False)] = ()
 
     @property
     def beam(self) -> Beam | None:

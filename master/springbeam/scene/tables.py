@@ -125,7 +125,8 @@ class Table(BaseModel):
     def _completed(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         if not isinstance(data, dict):
             return handler(data)
-        data = _plain(data)
+        # A key that is not given, as a caller says by None, may be another table's.
+        data = {name: value for name, value in _plain(data).items() if value is not None or name in cls.model_fields}
         given = {name for name, value in data.items() if value is not None}
         for name in data:
             if name in given and (others := given & cls.other_ways(name)):

@@ -6,14 +6,13 @@ responses to both differ, motions coexist.
 
 from __future__ import annotations
 
-from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
 from ..results.dense import at_multiples
 from ..results.trajectory import Trajectory
-from ..scene import Load
+from ..scene.loads import ChirpLoad, HarmonicLoad
 from .curves import signal
 
 #: A motion has settled where its points repeat themselves within this share of the range of the motion …
@@ -41,9 +40,9 @@ class Settled(NamedTuple):
         return 0.5 * float(np.ptp(run[column][run.time >= run.time[-1] - _PERIODS * self.period]))
 
 
-def drive_of(run: Trajectory) -> Load | None:
+def drive_of(run: Trajectory) -> HarmonicLoad | None:
     """Return the first harmonic load, ``None`` if there is none."""
-    return next((load for load in run.scene.loads if load.signal == "harmonic"), None)
+    return next((load for load in run.scene.loads if isinstance(load, HarmonicLoad)), None)
 
 
 def poincare(run: Trajectory, period: float, start: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -125,16 +124,16 @@ class Response(NamedTuple):
 
 def responses(run: Trajectory, what: str) -> list[Response]:
     """Return the response of a column, or of a function of the run, to each chirp of the run."""
-    chirps = [number for number, load in enumerate(run.scene.loads) if load.signal == "chirp"]
     values = signal(run, what)
-    return [response(number, run.scene.loads[number], run.time, values) for number in chirps]
+    chirps = [(number, load) for number, load in enumerate(run.scene.loads) if isinstance(load, ChirpLoad)]
+    return [response(number, load, run.time, values) for number, load in chirps]
 
 
-def response(number: int, chirp: Load, time: np.ndarray, values: np.ndarray) -> Response:
+def response(number: int, chirp: ChirpLoad, time: np.ndarray, values: np.ndarray) -> Response:
     """Return the range over each `_OF_CHIRP` turns of a chirp, and its frequency amidst them."""
-    first, last, duration = chirp.frequency or 0.0, chirp.frequency_end or 0.0, chirp.duration or inf
-    rate = (last - first) / duration
-    driven = (time >= chirp.start) & (time <= chirp.start + duration)
+    first = chirp.frequency
+    rate = (chirp.frequency_end - first) / chirp.duration
+    driven = (time >= chirp.start) & (time <= chirp.start + chirp.duration)
     since = time[driven] - chirp.start
     turns = ((first + 0.5 * rate * since) * since + 1e-9) // _OF_CHIRP
     number_of, begins, rows = np.unique(turns, return_index=True, return_counts=True)

@@ -87,7 +87,7 @@ def _settled(column: str) -> Callable[[Trajectory], float | None]:
 
 def _stroboscopic(run: Trajectory) -> list[float] | None:
     load, begin, end = drive_of(run), float(run.time[0]), float(run.time[-1])
-    if load is None or load.frequency is None or run.steps is None:
+    if load is None or run.steps is None:
         return None
     tail = settled(run)
     late = max(begin + _TRANSIENT * (end - begin), begin if tail is None else tail.since)

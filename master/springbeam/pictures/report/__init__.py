@@ -200,9 +200,9 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
         yield "foundation", f"at φ = {stop.position:.4g} m, {rebound}"
     for i, load in enumerate(scene.loads):
         what = f"{load.signal.replace('_', '-')} on the {load.on}, {load.peak:.4g} {load.unit}"
-        what += f", {load.frequency:.4g} Hz" if load.frequency else ""
-        what += f" to {load.frequency_end:.4g} Hz" if load.frequency_end else ""
-        yield f"load_{i}", what + (f", in {load.duration:.4g} s" if load.duration else "")
+        given = load.model_dump(exclude_none=True)
+        units = (("frequency", ", {:.4g} Hz"), ("frequency_end", " to {:.4g} Hz"), ("duration", ", in {:.4g} s"))
+        yield f"load_{i}", what + "".join(words.format(given[key]) for key, words in units if key in given)
     H = scene.coupling.macro_step
     length = "macro steps that follow from tolerances" if H is None else f"macro step {H:.4g} s"
     yield "steps", f"{scene.coupling.scheme} of degree {scene.degree}, {length}, to {scene.time.t_end:.4g} s"
