@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Any
 __version__: str
 
 if TYPE_CHECKING:
-    from .api import load, simulate
+    from .api import RunStopped, Simulation, Trajectory, load, simulate
     from .bodies.elements import PointMass, RigidWall, SpringDamper
     from .bodies.protocol import Body, Energies, Motion
-    from .results.trajectory import Event, Trajectory
-    from .run.outcome import RunStopped
-    from .run.runner import Simulation
+    from .results.trajectory import Event
     from .scene import Scene, SceneError, load_scene, with_changes
 
 __all__ = [
@@ -39,12 +37,10 @@ __all__ = [
 _HOME = {
     name: home
     for home, names in {
-        "api": ("load", "simulate"),
+        "api": ("RunStopped", "Simulation", "Trajectory", "load", "simulate"),
         "bodies.elements": ("PointMass", "RigidWall", "SpringDamper"),
         "bodies.protocol": ("Body", "Energies", "Motion"),
-        "results.trajectory": ("Event", "Trajectory"),
-        "run.outcome": ("RunStopped",),
-        "run.runner": ("Simulation",),
+        "results.trajectory": ("Event",),
         "scene": ("Scene", "SceneError", "load_scene", "with_changes"),
     }.items()
     for name in names

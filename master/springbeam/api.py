@@ -1,8 +1,69 @@
-"""What Python programs call; ``springbeam.simulate`` and the others are these."""
+"""What Python programs call; ``springbeam.simulate`` and the others are these.
+
+A `Trajectory` is data. What it can do with rooms above its own is attached here.
+"""
 
 from __future__ import annotations
 
-from .results.files import load_trajectory as load
-from .run.accuracy import simulate
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["load", "simulate"]
+from .results import dense, recording, totals
+from .results.files import load_trajectory as load
+from .results.trajectory import Trajectory
+from .run.accuracy import simulate
+from .run.outcome import RunStopped
+from .run.runner import Simulation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["RunStopped", "Simulation", "Trajectory", "load", "simulate"]
+
+
+def _at(run: Trajectory, times: Any) -> Trajectory:
+    """Return the run at any ``times`` [s], shape (n,), with the same columns (`springbeam.results.dense`).
+
+    Between rows y and u_tip follow the polynomial of order 6 that has the step's ends and moments, the contact
+    force is the polynomial applied, energies are linear; shapes, moments and shear forces along the beam are linear
+    between those of the run, some 400, and less accurate. Raises ValueError for times outside of the run, and for a
+    run that left no steps.
+    """
+    return dense.at(run, times)
+
+
+def _plot(run: Trajectory, picture: str = "positions") -> Figure:
+    """Return a matplotlib Figure: ``shapes_after_contact``, ``shapes_later``, ``positions``,
+    ``velocities_and_forces``, ``gap_and_energy``, ``loads_and_clamp`` or ``moments``.
+
+    Raises ValueError for another name, and where the run has nothing of it to show.
+    """
+    from .pictures.plots import figure_of  # takes a second to load: only for who has a picture
+
+    return figure_of(run, picture)
+
+
+def _save(run: Trajectory, directory: str | Path, *, replace: bool = False) -> Path:
+    """Write the files of a run directory, as `springbeam run` does, and return its path.
+
+    Raises ResultsExist if there are results and ``replace`` is false, OSError if it cannot be written to.
+    """
+    return recording.save(run, directory, replace=replace)
+
+
+def _html(run: Trajectory) -> str:
+    """Show in a notebook what the run amounts to: its totals, as an HTML table."""
+    summary = run.summary
+    rows = [
+        ("rows, events", f"{len(run)}, {len(run.events)}"),
+        ("status", str(summary.get("status", "no summary"))),
+        *totals.in_words(summary),
+        *(("warning", str(warning)) for warning in summary.get("warnings", ())),
+    ]
+    body = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)
+    return f"<table><caption>{escape(run.scene.title or 'a run')}</caption>{body}</table>"
+
+
+for _name, _method in {"at": _at, "plot": _plot, "save": _save, "_repr_html_": _html}.items():
+    setattr(Trajectory, _name, _method)

@@ -21,6 +21,7 @@ from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.run.ledger import APPROXIMATE, EXACT
 from springbeam.run.master import Master
 from springbeam.scene import scene_from_dict
+from springbeam.scene.laws import LAW
 from springbeam.scene.linearised import hilltop, spring_frequency
 from springbeam.scene.statics import bending_stiffness, shear_stiffness
 from springbeam.studies.stability import grid
@@ -298,7 +299,7 @@ def linear_scene(law, stiffness, scheme, degree, H=4e-3):
         stop=None,
         beam={**beam, "n_elements": 2, "approach": "elastic"},
         spring=spring,
-        contact={"law": law, "stiffness": stiffness, "exponent": 1.0},
+        contact=LAW.kept({"law": law, "stiffness": stiffness, "exponent": 1.0}, law),
         coupling={"scheme": scheme, "degree": degree, "macro_step": H},
     )
 

@@ -56,9 +56,9 @@ def main() -> None:
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from .. import __version__
+        from importlib.metadata import version
 
-        typer.echo(f"springbeam {__version__}")
+        typer.echo(f"springbeam {version('springbeam')}")
         raise typer.Exit
 
 

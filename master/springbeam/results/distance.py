@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .contact_times import contact_time_difference, impulse_difference
+from .dense import at
 from .trajectory import Trajectory
 
 #: A tip that moves less than this share of the beam's largest deflection does not move: it is held, or loads balance.
@@ -48,13 +49,13 @@ def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
         not known.
     """
     times = exact.time if exact.steps is None else _all_times(run, exact)
-    columns = exact.columns if exact.steps is None else exact.at(times).columns
+    columns = exact.columns if exact.steps is None else at(exact, times).columns
     shapes = exact.shapes or run.shapes
     held = 0.0 if shapes is None else HELD * float(np.abs(shapes[1]).max(initial=0.0))
     span = float(exact.time[-1] - exact.time[0])
     impulses = [impulse_difference(run, exact), impulse_difference(exact, run)]
     return Distance(
-        motion(run.at(times).columns, columns, held),
+        motion(at(run, times).columns, columns, held),
         contact_time_difference(run, exact, window) / span,
         max(np.nan_to_num(impulses).tolist()),
         None if exact.scene.contact.rigid else _peaks_apart(run, exact),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from html import escape
 from importlib import import_module
 from itertools import groupby
 from pathlib import Path
@@ -159,7 +158,8 @@ def rounded(value: float, scale: float) -> str:
 class Trajectory:
     """Columns as numpy arrays under the names of `COLUMNS`: ``trajectory["y"]`` or ``trajectory.y``.
 
-    ``shape_table`` has the numbers of `SHAPE_COLUMNS`, shape (n, 64); it is ``None`` without a beam.
+    ``shape_table`` has the numbers of `SHAPE_COLUMNS`, shape (n, 64); it is ``None`` without a beam. `springbeam.api`
+    attaches the methods that need more than the data: ``at``, ``plot`` and ``save``.
     """
 
     scene: Scene
@@ -169,6 +169,12 @@ class Trajectory:
     summary: dict[str, Any] = field(default_factory=dict)
     #: What lies between the rows, a step per row (`springbeam.results.steps.STEP`); ``None`` without such data.
     steps: np.ndarray | None = None
+
+    if TYPE_CHECKING:
+
+        def at(self, times: Any) -> Trajectory: ...
+        def plot(self, picture: str = "positions") -> Figure: ...
+        def save(self, directory: str | Path, *, replace: bool = False) -> Path: ...
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self.columns:
@@ -195,18 +201,6 @@ class Trajectory:
         status = self.summary.get("status", "no summary")
         span = f"t = {self.time[0]:g} … {self.time[-1]:g} s, " if len(self) else ""
         return f"<Trajectory {self.scene.title!r}: {len(self)} rows, {span}{len(self.events)} events, {status}>"
-
-    def _repr_html_(self) -> str:
-        """Show in a notebook what the run amounts to: its totals, as an HTML table."""
-        summary = self.summary
-        rows = [
-            ("rows, events", f"{len(self)}, {len(self.events)}"),
-            ("status", str(summary.get("status", "no summary"))),
-            *_at_call("results.totals").in_words(summary),
-            *(("warning", str(warning)) for warning in summary.get("warnings", ())),
-        ]
-        body = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)
-        return f"<table><caption>{escape(self.scene.title or 'a run')}</caption>{body}</table>"
 
     def _units(self) -> dict[str, str]:
         """Return the units of the columns that have one."""
@@ -242,18 +236,6 @@ class Trajectory:
         columns, table = {name: values[later] for name, values in self.columns.items()}, self.shape_table
         return replace(self, columns=columns, shape_table=None if table is None else table[table[:, 0] > self.time[0]])
 
-    def at(self, times: Any) -> Trajectory:
-        """Return the run at any ``times`` [s], shape (n,), with the same columns (`springbeam.results.dense`).
-
-        Between rows y and u_tip follow the polynomial of order 6 that has the step's ends and moments, the contact
-        force is the polynomial applied, energies are linear; shapes, moments and shear forces along the beam are linear
-        between those of the run, some 400, and less accurate. Raises ValueError for times outside of the run, and for a
-        run that left no steps.
-        """
-        from .dense import at
-
-        return at(self, times)
-
     def to_pandas(self) -> DataFrame:
         """Return the columns as a pandas DataFrame, with units; needs the extra ``data``.
 
@@ -283,28 +265,6 @@ class Trajectory:
             coordinates["x"] = ("x", SHAPE_POINTS * self.scene.beam.length, {"units": "m"})
         dataset: Dataset = _of_extra("xarray").Dataset(variables, coordinates, {"title": self.scene.title})
         return dataset
-
-    def plot(self, picture: str = "positions") -> Figure:
-        """Return a matplotlib Figure: ``shapes_after_contact``, ``shapes_later``, ``positions``,
-        ``velocities_and_forces``, ``gap_and_energy``, ``loads_and_clamp`` or ``moments``.
-
-        Raises ValueError for another name, and where the run has nothing of it to show.
-        """
-        figure: Figure = _at_call("pictures.plots").figure_of(self, picture)
-        return figure
-
-    def save(self, directory: str | Path, *, replace: bool = False) -> Path:
-        """Write the files of a run directory, as `springbeam run` does, and return its path.
-
-        Raises ResultsExist if there are results and ``replace`` is false, OSError if it cannot be written to.
-        """
-        path: Path = _at_call("results.recording").save(self, directory, replace=replace)
-        return path
-
-
-def _at_call(module: str) -> Any:
-    """Return a module that what a trajectory is does not depend on: references return trajectories as well."""
-    return import_module(f"springbeam.{module}")
 
 
 def _of_extra(package: str) -> Any:

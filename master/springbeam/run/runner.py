@@ -5,11 +5,11 @@ from __future__ import annotations
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
+from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from .. import __version__
 from ..bodies.factory import load_bodies
 from ..bodies.fmu_bodies import FmuBody
 from ..bodies.protocol import Body
@@ -175,7 +175,7 @@ class Simulation(AbstractContextManager["Simulation"]):
         counting = {name: body for name, body in told if isinstance(body, FmuBody)}
         return {
             **status,
-            "version": __version__,
+            "version": version("springbeam"),
             **summary,
             **{f"{name}_steps": body.steps for name, body in counting.items()},
             **{f"{name}_rollbacks": body.rewinds for name, body in counting.items()},

@@ -26,6 +26,7 @@ import numpy as np
 from ..monolithic import event_driven
 from ..pictures.drawing import present
 from ..results.contact_times import ContactChange, contact_changes
+from ..results.dense import at
 from ..results.distance import apart
 from ..results.trajectory import TOLD, Trajectory, columns_of
 from ..run.runner import simulate
@@ -149,7 +150,7 @@ def _same_story_until(coarse: Trajectory, fine: Trajectory) -> float:
     horizon = _agree_until(changes, others, float(times[0]), float(coarse.time[-1]))
     away = away_from(times, (event.time for run in (coarse, fine) for event in run.events), size)
     for name in present(coarse, _RESOLVED):
-        values, finer = (run.at(times)[name] for run in (coarse, fine))
+        values, finer = (at(run, times)[name] for run in (coarse, fine))
         differ = away & (apart(finer, values) > _RESOLVED[name])
         if differ[1:].any():
             horizon = min(horizon, float(times[1:][differ[1:]][0]) - size)

@@ -17,6 +17,7 @@ from rich.text import Text
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from ..results.dense import at
 from ..run.accuracy import simulate
 from ..run.outcome import RunStopped
 from ..scene import ArgumentError, Scene, SceneError, key_kind
@@ -201,7 +202,7 @@ class _Search:
         except (RunStopped, SceneError) as refused:
             self.runs.append({**values, "error": str(refused)})
             return np.full(len(self._data.values) * int(self._part.sum()), _REFUSED)
-        curves = run.at(np.clip(self._data.time[self._part] + shift, run.time[0], run.time[-1]))
+        curves = at(run, np.clip(self._data.time[self._part] + shift, run.time[0], run.time[-1]))
         off = {name: signal(curves, name) - measured[self._part] for name, measured in self._data.values.items()}
         rms = {f"left_{name}": float(np.sqrt(np.mean(part**2))) for name, part in off.items()}
         self.runs.append({**values, **rms, "error": ""})

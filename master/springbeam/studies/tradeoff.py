@@ -18,6 +18,7 @@ import numpy as np
 
 from ..monolithic import event_driven
 from ..pictures.diagrams import Diagram, draw_diagrams
+from ..results.dense import at
 from ..results.distance import distance
 from ..results.trajectory import Trajectory
 from ..run.outcome import RunStopped
@@ -125,7 +126,7 @@ class Tradeoff(Study):
 
         run = simulate(with_keys(self.scene, case), limited)
         done = perf_counter()
-        run.at(self.times)
+        at(run, self.times)
         return {
             "cost_wall_time": float(run.summary["wall_time"]) + perf_counter() - done,
             "cost_setup": float(run.summary["setup_time"]),

@@ -30,6 +30,7 @@ from ...bodies.protocol import FmuError
 from ...monolithic import event_driven
 from ...pictures.diagrams import figure_with
 from ...pictures.drawing import BLACK, BLUE, GREEN, ORANGE, SKY, STONE
+from ...results.dense import at
 from ...results.distance import motion
 from ...results.trajectory import Trajectory
 from ...run.ledger import EXACT, bounds
@@ -207,7 +208,7 @@ def _error(run: Trajectory) -> float | None:
     options: dict[str, Any] = {"sample_times": times, "t_end": end, "time_limit": _PATIENCE}
     try:
         exact = event_driven.simulate(scene, **options)
-        error = motion(run.at(exact.time).columns, exact.columns)
+        error = motion(at(run, exact.time).columns, exact.columns)
         if error <= _RESOLVED:
             return error
         few = _WELL_CONDITIONED * PERTURBATION
