@@ -16,6 +16,7 @@ from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
 from springbeam.paper import co_simulation, monolithic
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
+from springbeam.run.setup import set_up
 
 #: The calls of a macro step beside its advances; those before the first one are set-up.
 STEPPING = ("GetReal", "GetFMUstate", "SetFMUstate")
@@ -119,14 +120,14 @@ def master(effort):
 def profile(effort):
     """Parts of a macro step, each repeated by itself in the middle of the first tied phase of `soft`."""
     scene = load_scene("soft")
-    beam, spring = load_bodies(scene, 0.0)
+    beam, spring = load_bodies(scene, 0.0, scene.degree)
     assert isinstance(beam, FmuBeam)
     assert spring is not None
 
-    master = Master(scene, 0.0, beam, spring, MemoryRecorder(scene))
+    master = Master(set_up(scene), beam, spring, MemoryRecorder(scene))
     for _ in range(20):
         master.step()
-    state, pair, detector = master.state, master._pair, master._detector
+    state, pair, detector = master.state, master.pair, master._detector
     start, H = pair.ends(), scene.coupling.H
     pair.mark()
     step = pair.attempt(state, H, start)

@@ -91,7 +91,7 @@ BROKEN = {
 def refusal(folder):
     here = Path.cwd()
     with pytest.raises(FmuError) as caught:
-        load_bodies(springbeam.load_scene("soft"), 0.0)
+        load_bodies(springbeam.load_scene("soft"), 0.0, 2)
     message = str(caught.value)
     assert str(folder / "beam.fmu") in message
     assert Path.cwd() == here  # FMPy goes to the folder of a library

@@ -17,12 +17,16 @@ from springbeam.bodies.elements import EndLoaded
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.force import shifted, work_on
 from springbeam.bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion
+from springbeam.contact.interface import Interface
 from springbeam.coupling.protocol import Step
 from springbeam.monolithic.semi_discrete import Loads, modal_beam
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
 from springbeam.run.outcome import RunStopped
-from springbeam.scene import Beam
+from springbeam.run.setup import set_up
+from springbeam.run.summary import summary
+from springbeam.scene import Beam, with_changes
+from springbeam.scene.statics import tip_reach
 from springbeam.studies.stability.predict import impulse_integrals
 
 
@@ -145,7 +149,9 @@ def beam_body(beam, slope=None):
     """The scene's beam. ``slope`` replaces initial_deflection_slope."""
     m = modal_beam(beam)
     a = (beam.initial_deflection_slope if slope is None else slope) * m.slope_shape
-    return ModalBody(m.omega, m.tip, a, beam.initial_velocity_slope * m.slope_shape, m.load, beam.alpha_b, m.sampler)
+    body = ModalBody(m.omega, m.tip, a, beam.initial_velocity_slope * m.slope_shape, m.load, beam.alpha_b, m.sampler)
+    body.reach = tip_reach(beam)
+    return body
 
 
 def unit_beam(n, stiffness=100.0, slope=-1.0):
@@ -255,11 +261,20 @@ def _value(coefficients, h):
     return reduce(lambda total, c: total * h + c, reversed(coefficients))
 
 
+def interface_of(scene, tip_mass=0.01, mass=1.0, equilibrium=0.0):
+    """What may meet in ``scene``, of ends with these masses."""
+    setup = set_up(scene)
+    upper, lower = Upper(), DuffingBody()
+    upper.mass, lower.mass = tip_mass, mass
+    alone = not setup.lower
+    return Interface(upper, lower, setup.law, equilibrium, setup.floor, setup.restitution, alone)
+
+
 def bodies(scene):
     """The scene's bodies at `first_contact`; a beam without inertia is that of the package, which is exact."""
     beam = spring = None
     if scene.massless:
-        beam, _ = load_bodies(scene.model_copy(update={"lower": None}), scene.contact_time or 0.0)
+        beam, _ = load_bodies(scene.model_copy(update={"lower": None}), scene.contact_time or 0.0, scene.degree)
     elif scene.beam is not None:
         target = scene.tip_target
         kinematic = scene.beam.approach == "undeformed" and target is not None
@@ -290,14 +305,16 @@ def stopping(scene, wrap=lambda beam, spring: (beam, spring)):
     """The run of `simulate`, and what stopped it."""
     beam, spring = wrap(*bodies(scene))
     recorder = MemoryRecorder(scene)
-    master = Master(scene, (scene.contact_time or 0.0), beam, spring, recorder)
+    setup = set_up(scene)
+    master = Master(setup, beam, spring, recorder)
     stopped = None
     try:
         while not master.done:
             master.step()
     except RunStopped as error:
         stopped = error
-    recorder.finish(master.summary())
+    resolved = with_changes(scene, coupling={"degree": setup.degree})
+    recorder.finish(summary(resolved, master, recorder))
     trajectory = recorder.trajectory()
     trajectory.summary["work"] = {
         name: body.steps for name, body in (("beam", beam), ("spring", spring)) if hasattr(body, "steps")

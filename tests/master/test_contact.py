@@ -3,6 +3,7 @@
 from math import inf
 
 import pytest
+from bodies import interface_of
 
 from springbeam import Motion, load_scene, with_changes
 from springbeam.contact.phases import (
@@ -19,7 +20,7 @@ from springbeam.scene.laws import Compliance, Link, depth
 def transitions_of(scene="soft", tip_mass=0.01, mass=1.0, equilibrium=0.0, **tables):
     """The transitions of a scene whose largest speed so far is 1 m/s."""
     scene = with_changes(load_scene(scene), **tables)
-    return Transitions(scene, None, tip_mass, mass, fastest=lambda: 1.0, equilibrium=equilibrium)
+    return Transitions(interface_of(scene, tip_mass, mass, equilibrium), lambda: 1.0)
 
 
 @pytest.mark.parametrize("kind", [EventKind.RELEASE, EventKind.SEPARATION])

@@ -5,15 +5,16 @@ from contextlib import nullcontext
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, Upper
+from bodies import DuffingBody, Upper, interface_of
 
 from springbeam.bodies.protocol import NO_FORCE, Motion, StepRefused
 from springbeam.contact.events import EventFunctions, locate, no_dip, position_tolerance
-from springbeam.contact.phases import Joint, Phase, common_velocity
+from springbeam.contact.phases import Joint, Phase
 from springbeam.coupling.protocol import Step
 from springbeam.results.paths import Path
 from springbeam.run.detection import Detector
 from springbeam.run.macro_steps import MacroGrid
+from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair, Present
 from springbeam.scene import load_scene, with_changes
 
@@ -98,7 +99,7 @@ def test_what_may_happen_in_a_phase_is_as_far_away_as_it_is_and_comes_as_fast_as
 ):
     """Ψ is at 0.1 m, the stop at −15 mm; joined ends move with the velocity of their momentum."""
     scene = with_changes(load_scene(scene), **tables)
-    functions = EventFunctions(scene, scene.soft_law, common_velocity(1.0, 0.0, 0.01, 1.0), 0.1)
+    functions = EventFunctions(interface_of(scene, equilibrium=0.1))
     samples = functions.samples(phase, RISING)
     found = dict(zip((kind for kind, _ in functions.of(phase)), samples, strict=True))
     assert found == {kind: pytest.approx(sample, rel=1e-14) for kind, sample in expected.items()}
@@ -120,7 +121,7 @@ def test_positions_are_told_apart_to_8_roundings_or_to_one_of_the_way_in_a_step(
 @pytest.mark.parametrize(("jump", "refused"), [(5e-10, True), (5e-11, False)])
 def test_a_motion_that_jumps_with_the_size_of_the_step_has_no_event(jump, refused, monkeypatch):
     """The gap of ends 1 m high falls past 0 at once. Positions are known to 8 roundings, 1e5 of these are 1.8e-10."""
-    pair = Pair(load_scene("soft"), Upper(2.0), DuffingBody(1.0))
+    pair = Pair(set_up(load_scene("soft")), Upper(2.0), DuffingBody(1.0))
     start = tuple(Motion(place, 0.0, 0.0, 0.0) for place in (1.0 + jump, 1.0))
 
     def attempt(state, size, start):
@@ -129,7 +130,7 @@ def test_a_motion_that_jumps_with_the_size_of_the_step_has_no_event(jump, refuse
         return Step(0.0, size, NO_FORCE, NO_FORCE, start, ends)
 
     monkeypatch.setattr(pair, "attempt", attempt)
-    detector = Detector(load_scene("soft"), pair, MacroGrid(0.0, 1.0, 1e-3))
+    detector = Detector(pair, MacroGrid(0.0, 1.0, 1e-3))
     state = pair.initial_state(0.0)
     state.fastest = 1.0
     step = attempt(None, 1e-3, start)
@@ -144,7 +145,7 @@ def pushing(monkeypatch, push, seated=False):
     After ``size`` [s] the force is ``push(size)`` [N]; its mean is that of the parabola through ends and middle.
     """
     scene = load_scene("soft")
-    pair = Pair(scene, Upper(2.0), DuffingBody(1.0))
+    pair = Pair(set_up(scene), Upper(2.0), DuffingBody(1.0))
     state = pair.initial_state(0.0)
     state.enter(Phase(Joint.TIED if seated else Joint.TOUCH, seated))
     state.present = Present(push(0.0), push(0.0))
@@ -158,7 +159,7 @@ def pushing(monkeypatch, push, seated=False):
     monkeypatch.setattr(pair, "rewind", lambda: None)
     mean = lambda kind, phase, step: (push(0.0) + 4.0 * push(0.5 * step.size) + push(step.size)) / 6.0  # noqa: E731
     monkeypatch.setattr(pair, "mean_of", mean)
-    return Detector(scene, pair, MacroGrid(0.0, 1.0, 1e-3)), state, attempt(state, 1e-3, pair.ends())
+    return Detector(pair, MacroGrid(0.0, 1.0, 1e-3)), state, attempt(state, 1e-3, pair.ends())
 
 
 @pytest.mark.parametrize("seated", [False, True])

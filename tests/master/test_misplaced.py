@@ -8,6 +8,7 @@ from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.results.steps import STEP
 from springbeam.run.misplaced import misplaced
+from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair
 from springbeam.scene import scene_from_dict
 from springbeam.scene.modes import tip_modes
@@ -53,8 +54,8 @@ def both_ends(run, exact):
     rows, middles = run.time, 0.5 * (run.time[1:] + run.time[:-1])
     times = np.union1d(rows, middles) if run.scene.contact.rigid else rows
     scene, there, fine = run.scene, run.at(times), exact.at(times)
-    pair = Pair(scene, *bodies(scene))
-    said = misplaced(scene, pair, run.steps, run.events)
+    pair = Pair(set_up(scene), *bodies(scene))
+    said = misplaced(pair, run.steps, run.events)
     names = [name for name in ("u_tip", "y") if name in run.columns]
     return said, max(np.abs(there[name] - fine[name]).max() / np.abs(run[name] - run[name][0]).max() for name in names)
 
@@ -164,4 +165,4 @@ def test_a_run_that_has_made_no_step_misplaces_nothing(law):
     scene = with_changes(SOFT, contact={"law": law})
     steps = np.zeros(2, STEP)
     steps["y_after"] = 0.0, 1.0
-    assert misplaced(scene, Pair(scene, *bodies(scene)), steps, []) == 0.0
+    assert misplaced(Pair(set_up(scene), *bodies(scene)), steps, []) == 0.0

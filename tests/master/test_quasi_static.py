@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bodies import simulate
+from bodies import bodies, simulate
 from scenes import scene_from_dict
 from scipy.sparse.linalg import spsolve
 
@@ -95,7 +95,7 @@ def test_it_arrives_where_the_spring_is_as_it_was_thrown():
     """From 0.2 m to 5 cm above where it is straight, without loads, by 1 m/s."""
     thrown = {"initial_deflection_slope": 0.2, "distributed_load": 0.0, "alpha_b": 0.2}
     above = scene(beam=thrown, spring={"equilibrium": 0.05, "initial_velocity": 0.0})
-    beam, _ = load_bodies(above.model_copy(update={"lower": None}), above.contact_time)
+    beam, _ = load_bodies(above.model_copy(update={"lower": None}), above.contact_time, above.degree)
     assert beam.motion()[:2] == pytest.approx((0.05, -1.0), rel=1e-12)
 
 
@@ -136,5 +136,5 @@ def test_what_holds_the_ends_is_the_force_of_the_reference_over_the_stiffness():
     compliance, alpha = statics.tip_compliance(given.beam), given.beam.alpha_b
     joined = np.isin(exact.phase, ("tied", "touch"))
     y, z, force, acceleration = (exact[name][joined] for name in ("y", "z", "contact_force", "a_y"))
-    found = Holding(given.beam, given.spring)((None, Motion(y, z, 0.0, 0.0)))
+    found = Holding(*bodies(given))((None, Motion(y, z, 0.0, 0.0)))
     np.testing.assert_allclose(found, [compliance * force, z + alpha * acceleration], rtol=1e-9, atol=1e-12)

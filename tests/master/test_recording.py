@@ -434,7 +434,7 @@ def test_a_run_is_handed_over_up_to_where_it_goes_wrong():
         judged.append((len(steps), first["time"].tolist()))
         return np.zeros(len(steps), bool), str
 
-    log = Log(PAIR, recorder, judge)
+    log = Log(recorder, judge)
     for begin in (0, 30):
         steps, events, shapes = block(30, begin=begin)
         steps["z"][17] = math.nan if begin else 0.0

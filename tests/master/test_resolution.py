@@ -13,6 +13,7 @@ from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.results.steps import STEP
 from springbeam.run.observed import least_momentum
+from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair
 from springbeam.scene import load_scene, shipped_scenes, with_changes
 from springbeam.scene.resolution import (
@@ -356,7 +357,7 @@ SCENE = with_changes(load_scene("soft"), coupling={"macro_step": H})
 
 def pair(degree=1, **contact):
     scene = with_changes(SCENE, contact=contact, coupling={"degree": degree})
-    return scene, Pair(scene, Upper(TIP), DuffingBody(TOP))
+    return scene, Pair(set_up(scene), Upper(TIP), DuffingBody(TOP))
 
 
 def records(phase, **columns):

@@ -10,7 +10,8 @@ from springbeam.bodies.gate import admit
 from springbeam.bodies.protocol import Abilities, StepRefused
 from springbeam.contact.phases import Joint, Phase
 from springbeam.results.steps import STEP
-from springbeam.run.ledger import bounds, errors
+from springbeam.run.ledger import Balance, bounds, errors
+from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair
 from springbeam.scene import SceneError, load_scene, with_changes
 
@@ -139,12 +140,11 @@ def test_a_residual_is_relative_to_the_largest_energy_so_far_that_of_the_contact
         [0.0, -99.0, 0],
     )
     steps["energy_at_start"] = 1.0
-    scene = soft()
-    share, largest = errors(scene, steps, steps[:1], 0.0, of_interface=False)
+    share, largest = errors(steps, steps[:1], 0.0)
     assert share == pytest.approx([0.0, -1e-3 / 99.999, 0.0], rel=1e-9)
     assert largest.tolist() == [1.0, 99.999, 99.999]
     # Looked at one by one they are judged alike.
-    assert errors(scene, steps[2:], steps[:1], 99.999, of_interface=False) == (share[2:], largest[2:])
+    assert errors(steps[2:], steps[:1], 99.999) == (share[2:], largest[2:])
 
 
 @pytest.mark.parametrize("where", ["beam", "spring", "contact"])
@@ -159,8 +159,18 @@ def test_what_damping_takes_is_told_where_it_is_lost(where):
 
 @pytest.mark.parametrize(("tolerance", "warns"), [(1e-13, 1e-8), (1e-12, 1e-8), (1e-9, 1e-5), (1e-3, 1e-3)])
 def test_a_looser_tolerance_may_change_more_of_the_energy(tolerance, warns):
-    for tables in ({"coupling": {"tolerance": tolerance}}, {"spring": {"relative_tolerance": tolerance}}):
-        assert bounds(with_changes(load_scene("soft"), **tables)) == pytest.approx((warns, 1e-3), rel=1e-12)
+    """That of the coupling or of a body: an energy 1 % above the bound warns, one below does not."""
+    assert bounds(tolerance) == pytest.approx((warns, 1e-3), rel=1e-12)
+    steps = np.zeros(2, STEP)
+    steps["spring_kinetic"] = 1.0, 1.0 + 0.99 * warns
+    steps["energy_at_start"] = 1.0
+    for of_coupling, of_body in ((tolerance, 0.0), (1e-15, tolerance)):
+        lower = DuffingBody()
+        lower.tolerance = of_body
+        balance = Balance(Pair(set_up(soft(coupling={"tolerance": of_coupling})), Upper(), lower))
+        assert balance.report(steps)[1] == []
+    steps["spring_kinetic"][1] = 1.0 + 1.01 * warns
+    assert len(balance.report(steps)[1]) == 1
 
 
 @pytest.mark.parametrize(
@@ -218,7 +228,7 @@ def test_an_undeformed_tip_may_miss_what_it_meets_by_the_rounding_of_its_way(mis
 @pytest.mark.parametrize(("times", "continued"), [(3.9, True), (4.1, False)])
 def test_a_force_is_continued_over_four_times_its_step_and_held_beyond(times, continued, monkeypatch):
     """After steps that dying impacts have cut to 1e-9 H its slope would throw the ends as far as rounding lets them."""
-    pair = Pair(with_changes(load_scene("soft"), coupling={"degree": 2}), Upper(1.0), DuffingBody(1.0))
+    pair = Pair(set_up(with_changes(load_scene("soft"), coupling={"degree": 2})), Upper(1.0), DuffingBody(1.0))
     state = pair.initial_state(0.0)
     state.phase, state.contact, state.last_size = Phase(Joint.TIED), (2.0, 3.0, 5.0), 1e-3
     guesses = []

@@ -1,6 +1,7 @@
 """The error that a step tells of itself, which chooses adaptive steps, and events that crowd."""
 
 from contextlib import nullcontext
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from springbeam.bodies.protocol import NO_FORCE, Motion
 from springbeam.contact.phases import Joint, Phase
 from springbeam.coupling.protocol import Step
 from springbeam.run.macro_steps import AdaptiveSteps
+from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair, Present, State
 
 
@@ -31,8 +33,8 @@ REST = Motion(0.0, 0.0, 0.0, 0.0)
 def adaptive(upper, lower, absolute=1e-30, t_end=9.0):
     """Steps of two masses from a relative tolerance of 1e-3 and an absolute one, and the state at their start."""
     scene = with_changes(load_scene("soft"), coupling={"relative_tolerance": 1e-3, "absolute_tolerance": absolute})
-    pair = Pair(scene, upper, lower)
-    return AdaptiveSteps(scene, pair, 0.0, t_end), pair.initial_state(0.0)
+    pair = Pair(set_up(scene), upper, lower)
+    return AdaptiveSteps(replace(pair.setup, end=t_end), pair), pair.initial_state(0.0)
 
 
 @pytest.mark.parametrize(("share", "holds"), [(0.99, True), (1.01, False)])

@@ -9,6 +9,7 @@ from springbeam.results.steps import STEP
 from springbeam.results.totals import TOTALS, in_words, shortest_contact, totals
 from springbeam.results.trajectory import Event, EventKind
 from springbeam.run.observed import force_window
+from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.statics import tip_inertia
@@ -171,7 +172,7 @@ def test_the_window_is_a_fiftieth_of_the_slowest_period():
     nothing = np.zeros(0, STEP)
 
     def window_of(scene):
-        return force_window(scene, Pair(scene, *bodies(scene)), nothing)
+        return force_window(scene, Pair(set_up(scene), *bodies(scene)), nothing)
 
     slowest = modal_beam(SCENE.beam).omega[0]
     assert window_of(SCENE) == pytest.approx(2.0 * np.pi / slowest / 50.0, rel=1e-12)
@@ -185,7 +186,7 @@ def test_the_window_is_a_fiftieth_of_the_slowest_period():
     massless = with_changes(SCENE, beam={"fidelity": "quasi_static"})
     stiffness = 3.0 + 1.0 / (1.0 / 300.0 + 1.0 / 100.0)
     at_rest = np.zeros(1, STEP)
-    window = force_window(massless, Pair(massless, *bodies(massless)), at_rest)
+    window = force_window(massless, Pair(set_up(massless), *bodies(massless)), at_rest)
     assert window == pytest.approx(2.0 * np.pi / np.sqrt(stiffness) / 50.0, rel=1e-12)
 
 

@@ -61,7 +61,7 @@ def test_a_kept_body_steps_to_the_bits_of_a_new_one(name, made):
 
 @pytest.mark.parametrize("force", [(nan, 0.0, 0.0), (0.0, 0.0, nan)])
 def test_a_force_that_is_no_number_makes_no_step(force):
-    for body in load_bodies(load_scene("soft"), 0.0):
+    for body in load_bodies(load_scene("soft"), 0.0, 2):
         body.mark()
         with pytest.raises(StepRefused, match="the force it should step under is not finite"):
             body.advance(0.0, 1e-3, force)
@@ -71,7 +71,7 @@ def test_a_force_that_is_no_number_makes_no_step(force):
 def test_the_last_derivative_alone_acts():
     H = 1e-7  # too short for what is behind an end: its mass takes F̈ H³/6
     bent = (0.0, 0.0, 6.0 / H**3)
-    beam, spring = load_bodies(load_scene("soft"), 0.0)
+    beam, spring = load_bodies(load_scene("soft"), 0.0, 2)
     for body, forces in ((beam, (bent,)), (spring, (NO_FORCE, bent))):
         before = body.motion().velocity
         assert body.advance(0.0, H, *forces).velocity - before == pytest.approx(1.0 / body.mass, rel=1e-4)

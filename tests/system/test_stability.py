@@ -23,7 +23,7 @@ from springbeam.run.master import Master
 from springbeam.scene import scene_from_dict
 from springbeam.scene.laws import LAW
 from springbeam.scene.linearised import hilltop, spring_frequency
-from springbeam.scene.statics import bending_stiffness, shear_stiffness
+from springbeam.scene.statics import bending_stiffness, shear_stiffness, tip_reach
 from springbeam.studies.stability import grid
 from springbeam.studies.stability.cells import (
     AT_REST,
@@ -306,7 +306,7 @@ def linear_scene(law, stiffness, scheme, degree, H=4e-3):
 
 def growth(scene, steps=2000):
     """The factor by which amplitudes grow per macro step, of the second half of the steps."""
-    beam, top = load_bodies(scene, 0.0)
+    beam, top = load_bodies(scene, 0.0, scene.degree)
     # Tied ends start with one velocity; in contact it is their relative motion that grows.
     if scene.contact.rigid:
         impulses = beam.mass, top.mass
@@ -315,7 +315,10 @@ def growth(scene, steps=2000):
         impulses = -reduced, reduced
     for body, impulse in zip((beam, top), impulses, strict=True):
         body.apply_impulse(impulse)
-    rows = couple(coupling_of(scene, scene.soft_law), scene.coupling.H, steps, beam, top)
+    asked = scene.coupling
+    tied = tip_reach(scene.beam)
+    coupling = coupling_of(asked.scheme, scene.degree, asked.tolerance, scene.soft_law, tied)
+    rows = couple(coupling, asked.H, steps, beam, top)
     beam.close()
     top.close()
     return (rows[-1].energy / rows[steps // 2].energy) ** (1.0 / steps)

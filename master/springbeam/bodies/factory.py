@@ -20,10 +20,11 @@ from .protocol import Body, FmuError
 from .quasi_static import QuasiStaticBeam
 
 
-def load_bodies(scene: Scene, start_time: float, contact: float = 0.0) -> tuple[Body | None, Body | None]:
+def load_bodies(scene: Scene, start_time: float, degree: int, contact: float = 0.0) -> tuple[Body | None, Body | None]:
     """Return the upper and the lower body of ``scene`` at ``start_time`` [s], our beam as the approach leaves it.
 
-    Where the scene starts at rest, it does so under the force ``contact`` between the ends [N].
+    The force between them is a polynomial of ``degree`` over a step. Where the scene starts at rest, it does so under
+    the force ``contact`` between the ends [N].
 
     Raises
     ------
@@ -37,7 +38,7 @@ def load_bodies(scene: Scene, start_time: float, contact: float = 0.0) -> tuple[
     bodies: list[Body | None] = []
     with ExitStack() as made:
         for table, spec in (("beam", scene.upper), ("spring", scene.lower)):
-            body = None if spec is None else _body(scene, spec, start_time, found.get(table), contact)
+            body = None if spec is None else _body(scene, spec, start_time, found.get(table), degree, contact)
             if body is not None:
                 made.callback(body.close)
             bodies.append(body)
@@ -47,14 +48,16 @@ def load_bodies(scene: Scene, start_time: float, contact: float = 0.0) -> tuple[
 
 
 def _body(
-    scene: Scene, spec: Beam | Spring | Partner, start_time: float, found: Findings | None, contact: float
+    scene: Scene, spec: Beam | Spring | Partner, start_time: float, found: Findings | None, degree: int, contact: float
 ) -> Body:
     if isinstance(spec, ForeignFmu):
         return ForeignBody(spec, spec is scene.upper, (start_time, scene.time.t_end), found)
     if isinstance(spec, Spring):
         return FmuSpring(spec, start_time, top_at_rest(scene, contact) if scene.static else None)
     if isinstance(spec, Beam):
-        return (_massless_beam if scene.massless else _beam)(scene, spec, start_time, contact)
+        if scene.massless:
+            return _massless_beam(scene, spec, start_time, degree, contact)
+        return _beam(scene, spec, start_time, contact)
     return ELEMENTS[spec.element](**spec.model_dump(exclude={"element"}))
 
 
@@ -64,13 +67,14 @@ def _beam(scene: Scene, spec: Beam, start_time: float, contact: float) -> Body:
     return FmuBeam(spec, start_time, *held)
 
 
-def _massless_beam(scene: Scene, spec: Beam, start_time: float, contact: float) -> Body:
+def _massless_beam(scene: Scene, spec: Beam, start_time: float, degree: int, contact: float) -> Body:
     if (start := scene.at_start("beam")) is None:  # at rest under the loads and the contact force
         tip = tip_load_deflection(spec) + contact * tip_compliance(spec)
-        return QuasiStaticBeam(spec, scene.degree, tip, 0.0)
+        return QuasiStaticBeam(spec, degree, tip, 0.0)
     rate = spec.initial_velocity_slope
-    tip, velocity = start.value + start_time * rate * spec.length, rate * spec.length
-    beam = QuasiStaticBeam(spec, scene.degree, tip, velocity)
+    velocity = rate * spec.length
+    tip = start.value + start_time * velocity
+    beam = QuasiStaticBeam(spec, degree, tip, velocity)
     if spec.approach == "elastic":
         beam.release()
     return beam

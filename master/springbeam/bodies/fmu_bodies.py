@@ -15,7 +15,7 @@ import numpy as np
 
 from ..scene import Beam, Load, Spring
 from ..scene.modes import tip_modes
-from ..scene.statics import SHAPE_POINTS, locking, lowest_frequency, tip_compliance, tip_inertia
+from ..scene.statics import SHAPE_POINTS, locking, lowest_frequency, tip_compliance, tip_inertia, tip_reach
 from .elements import EndLoaded
 from .fmu import Fmu, Value
 from .force import combined
@@ -350,6 +350,7 @@ class FmuBeam(OwnBody, BeamBody):
         """
         self._beam = beam
         self.damping = beam.alpha_b / tip_compliance(beam)
+        self.reach = tip_reach(beam)
         self._points = sorted({load.at for load in loads if load.at is not None})
         self._constants = {"distributed_load": beam.distributed_load}
         parameters: dict[str, Any] = {name: value for name, value in beam if name not in beam.GIVEN_ONLY}
@@ -418,6 +419,7 @@ class FmuSpring(OwnBody, EndLoaded):
         """Start at ``start_time`` [s] with y = ``displacement`` [m], which is Ψ if left out."""
         self._spring = spring
         self.damping = spring.damping
+        self.tolerance = spring.relative_tolerance
         self._constants = {"external_force": spring.external_force}
         parameters: dict[str, Any] = spring.model_dump(exclude={"initial_velocity"})
         parameters["displacement"] = spring.equilibrium if displacement is None else displacement

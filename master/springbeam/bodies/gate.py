@@ -195,15 +195,6 @@ def admit(scene: Scene, start_time: float, upper: Body | None, lower: Body | Non
         raise SceneError("\n".join(lines))
 
 
-def with_degree(scene: Scene, *bodies: Body | None) -> Scene:
-    """Return ``scene`` with the highest degree that its bodies allow, where it asks for none."""
-    if scene.coupling.degree is not None:
-        return scene
-    allowed = [min(body.abilities.integrals, body.abilities.slopes) for body in bodies if body is not None]
-    coupling = scene.coupling.model_copy(update={"degree": min(scene.degree, *allowed)})
-    return scene.model_copy(update={"coupling": coupling})
-
-
 def _abilities(body: Body) -> Abilities:
     """Return what ``body`` can do; one that leaves `Body.apply_impulse` out takes no impulses."""
     takes = getattr(body.apply_impulse, "__func__", None) is not Body.apply_impulse

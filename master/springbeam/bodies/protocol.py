@@ -102,6 +102,10 @@ class Body:
 
     #: What resists the velocity of the end [N·s/m]; ``None`` where that is not known.
     damping: float | None = None
+    #: A displacement of the end that is to be expected [m], 0 where that is not known.
+    reach = 0.0
+    #: Relative tolerance of the solver of its motion.
+    tolerance = 0.0
 
     @property
     def inertia(self) -> float:
@@ -145,8 +149,8 @@ class Body:
 
     #: Where its state cannot be saved, a step is made once, by the schemes that never repeat one.
     abilities = Abilities()
-    #: Work that the end of a foreign body has received so far [J]: the coupling is judged by it.
-    received: float = 0.0
+    #: Work that the end has received so far [J], of a body by which the coupling is judged, not by its energies.
+    received: float | None = None
 
     def take_place(self, *, upper: bool) -> None:
         """Learn, before the run, whether it is the upper body; one that fits in either place needs to know."""

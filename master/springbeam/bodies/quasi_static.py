@@ -61,7 +61,11 @@ class QuasiStaticBeam(BeamBody):
     mass = 0.0
 
     def __init__(self, beam: Beam, degree: int, tip: float, velocity: float) -> None:
-        self._stiffness, self._alpha, self._degree = 1.0 / statics.tip_compliance(beam), beam.alpha_b, degree
+        self._stiffness = 1.0 / statics.tip_compliance(beam)
+        self._alpha = beam.alpha_b
+        self._degree = degree
+        self.damping = self._alpha * self._stiffness
+        self.reach = statics.tip_reach(beam)
         self._tip_shape = statics.tip_force_shape(beam, SHAPE_POINTS)
         self._load_shape = statics.load_shape(beam, SHAPE_POINTS)
         self._arm = beam.length * (1.0 - SHAPE_POINTS)

@@ -1,4 +1,4 @@
 """When the bodies touch and what that does: phases and impacts (``phases``), event functions (``events``).
 
-Imports `scene` and `bodies`. Start at ``phases``.
+``interface`` says what may meet. Imports `bodies`. Start at ``phases``.
 """

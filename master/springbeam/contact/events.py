@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..bodies.protocol import Ends
+from ..bodies.protocol import Body, Ends
 from ..results.paths import EPS, Means, Sample
 from ..results.trajectory import EventKind
-from ..scene import Beam, Scene, Spring
-from ..scene.laws import SoftLaw
-from ..scene.statics import tip_compliance, tip_load_deflection
+from .interface import Interface
 from .phases import Joint, Phase
 
 _MAX_EVALUATIONS = 60
@@ -56,21 +54,23 @@ class Height:
 
 
 class Holding:
-    """C/k of a massless tip on the spring top, y − u_F + α_b z [m]: known from where they are, not from a step's force.
+    """C/k of a massless tip on the lower end [m]: known from where they are, not from a step's force.
 
-    ż of its rate is that of the spring with the tip on it, off the foundation.
+    ż of its rate is that of the lower end with the tip on it, off the foundation.
     """
 
-    def __init__(self, beam: Beam, spring: Spring) -> None:
-        self._spring, self._alpha = spring, beam.alpha_b
-        self._rest, self._stiffness = tip_load_deflection(beam), 1.0 / tip_compliance(beam)
+    def __init__(self, tip: Body, low: Body) -> None:
+        assert tip.damping is not None
+        self._tip = tip
+        self._low = low
+        self._stiffness: float = tip.stiffness(0.0)
+        self._relaxation = tip.damping / self._stiffness
 
     def __call__(self, ends: Ends) -> Sample:
         _, low = ends
-        y, z, spring = low.displacement, low.velocity, self._spring
-        value = y - self._rest + self._alpha * z
-        acceleration = -(self._stiffness * value + spring.damping * z + spring.force(y)) / spring.mass
-        return value, z + self._alpha * acceleration
+        C = self._tip.holding_force(low.displacement, low.velocity)
+        acceleration = -(C + self._low.holding_force(low.displacement, low.velocity)) / self._low.mass
+        return C / self._stiffness, low.velocity + self._relaxation * acceleration
 
     def means(self, ends: Ends, size: float) -> None:
         return None
@@ -82,17 +82,15 @@ EventFunction = Gap | Height | Holding
 
 
 class EventFunctions:
-    """Which event functions each phase of a scene has, by the kind of their event.
+    """Which event functions each phase has, by the kind of their event.
 
-    ``tip_share`` is the tip's part in the velocity with which joined ends go on, `contact.common_velocity`: they differ
-    from each other by what the energy schemes leave open, and one of them may even go the other way. ``equilibrium`` is
-    Ψ, the height below which the ends are tied [m].
+    Joined ends have the rate of their common velocity: they differ from each other by what the energy schemes leave
+    open, and one of them may even go the other way.
     """
 
-    def __init__(self, scene: Scene, law: SoftLaw | None, tip_share: float, equilibrium: float) -> None:
-        self._scene, self._tip_share, self._equilibrium = scene, tip_share, equilibrium
-        self._ties = scene.joins and law is None
-        self._meets = self._ties and not scene.contact.lasting
+    def __init__(self, interface: Interface) -> None:
+        self._interface = interface
+        self._meets = interface.rigid and not interface.lasting
         self._phase: Phase | None = None
         self._functions: list[tuple[EventKind, EventFunction]] = []
         #: The ends last asked for, and the samples there: a step starts where the one before has ended.
@@ -115,23 +113,21 @@ class EventFunctions:
 
     def _built(self, phase: Phase) -> list[tuple[EventKind, EventFunction]]:
         tip, low = 0, 1
-        stop = self._scene.stop
+        meets = self._interface
         functions: list[tuple[EventKind, EventFunction]] = []
-        share = self._tip_share if self._ties and phase.joint is not Joint.FREE else 0.0
+        share = meets.tip_share if meets.rigid and phase.joint is not Joint.FREE else 0.0
         if self._meets:
             if phase.joint is Joint.FREE:
                 functions.append((EventKind.IMPACT, gap))
             if phase.joint is Joint.TIED and not phase.seated:
-                functions.append((EventKind.RELEASE, Height(low, self._equilibrium, share, -1.0)))
+                functions.append((EventKind.RELEASE, Height(low, meets.equilibrium, share, -1.0)))
             if phase.joint is Joint.TOUCH:
-                functions.append((EventKind.RETIE, Height(low, self._equilibrium, share)))
-                beam, spring = self._scene.beam, self._scene.spring
-                if beam is not None and beam.fidelity == "quasi_static" and not phase.seated:
-                    assert spring is not None
-                    functions.append((EventKind.SEPARATION, Holding(beam, spring)))
-        if stop is not None and not phase.seated and not self._scene.elastic_stop:
-            end, share = (tip, 1.0) if self._scene.lower is None else (low, share)
-            functions.append((EventKind.STOP_IMPACT, Height(end, stop.position, share)))
+                functions.append((EventKind.RETIE, Height(low, meets.equilibrium, share)))
+                if meets.upper.massless and not phase.seated:
+                    functions.append((EventKind.SEPARATION, Holding(meets.upper, meets.lower)))
+        if meets.floor is not None and not phase.seated:
+            striking = Height(tip, meets.floor, 1.0) if meets.alone else Height(low, meets.floor, share)
+            functions.append((EventKind.STOP_IMPACT, striking))
         return functions
 
 

@@ -9,13 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
-from math import inf
 
 from ..bodies.protocol import Ends, Motion
 from ..results.trajectory import EventKind
-from ..scene import Scene
-from ..scene.laws import SoftLaw
-from ..scene.statics import tip_compliance, tip_load_deflection
+from .interface import Interface, common_velocity
 
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only); slower than the
 #: second, if it would also rise no higher than positions can be told apart.
@@ -87,42 +84,25 @@ def foundation_impact(v: float, z: float, tip_mass: float, mass: float, restitut
     return Impact(on_beam, on_spring, on_spring + on_beam, loss_spring + loss_beam)
 
 
-def common_velocity(v: float, z: float, tip_mass: float, mass: float) -> float:
-    """With which joined ends of velocities v and z [m/s] go on: that of their momentum, whatever force joins them."""
-    if max(tip_mass, mass) == inf:
-        return v if tip_mass == inf else z
-    return (tip_mass * v + mass * z) / (tip_mass + mass)
-
-
 class Transitions:
     """What each kind of event does to the phase and to the velocities.
 
     Parameters
     ----------
-    scene
-        What is simulated.
-    law
-        Between the ends.
-    tip_mass, mass
-        What an impulse meets at the tip and at the spring top [kg]; a body that is absent has an infinite one.
-    equilibrium
-        Ψ: the height below which the ends are tied [m].
+    interface
+        What may meet.
+    fastest
+        Returns the largest speed of an end so far [m/s].
     """
 
     _hardest = 0.0  #: speed of the fastest impact on the foundation so far [m/s]
 
-    def __init__(
-        self,
-        scene: Scene,
-        law: SoftLaw | None,
-        tip_mass: float,
-        mass: float,
-        fastest: Callable[[], float],
-        equilibrium: float,
-    ) -> None:
-        self._law, self._equilibrium = law, equilibrium
-        self._scene, self._tip_mass, self._mass, self._fastest = scene, tip_mass, mass, fastest
-        self._alone = scene.lower is None  #: the tip itself strikes the foundation, and rests on it
+    def __init__(self, interface: Interface, fastest: Callable[[], float]) -> None:
+        self._interface = interface
+        self._fastest = fastest
+        self._tip_mass = interface.upper.mass
+        self._mass = interface.lower.mass
+        self._alone = interface.alone
 
     def after(
         self,
@@ -161,31 +141,30 @@ class Transitions:
     def _meet(self, phase: Phase, tip: Motion, low: Motion, tolerance: float) -> tuple[Phase, Impact]:
         impact = meeting(tip.velocity, low.velocity, self._tip_mass, self._mass)
         common = low.velocity + impact.on_spring / self._mass
-        if self._scene.contact.lasting:
+        if self._interface.lasting:
             tied = True
         elif self._at_equilibrium(low, tolerance):
             tied = common < 0.0 or (common == 0.0 and not self._rises_from_rest())
         else:
-            tied = low.displacement < self._equilibrium
+            tied = low.displacement < self._interface.equilibrium
         # A top that stands on the foundation is driven into it, and strikes it at once; a massless tip cannot do that.
         return Phase(Joint.TIED if tied else Joint.TOUCH, phase.seated and self._tip_mass == 0.0), impact
 
     def _ties(self, phase: Phase) -> bool:
         """Whether a rigid law holds the ends together in ``phase``."""
-        return phase.joint is not Joint.FREE and self._law is None
+        return phase.joint is not Joint.FREE and self._interface.soft is None
 
     def _at_equilibrium(self, low: Motion, tolerance: float) -> bool:
         """Whether the lower end is at Ψ, to rounding."""
-        psi = self._equilibrium
+        psi = self._interface.equilibrium
         return abs(low.displacement - psi) <= 4.0 * tolerance + 1e-12 * abs(psi)
 
     def _rises_from_rest(self) -> bool:
-        """Whether a massless tip and the spring, at rest together at Ψ, are pushed up."""
-        beam, spring = self._scene.beam, self._scene.spring
-        if self._tip_mass != 0.0 or beam is None or spring is None:
-            return False
-        psi = spring.equilibrium
-        return spring.force(psi) + (psi - tip_load_deflection(beam)) / tip_compliance(beam) < 0.0
+        """Whether a massless tip and the lower end, at rest together at Ψ, are pushed up."""
+        tip = self._interface.upper
+        low = self._interface.lower
+        psi = self._interface.equilibrium
+        return tip.massless and tip.holding_force(psi, 0.0) + low.holding_force(psi, 0.0) < 0.0
 
     def _strike(
         self,
@@ -196,8 +175,7 @@ class Transitions:
         tolerance: float,
     ) -> tuple[EventKind, Phase, Impact]:
         """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
-        assert self._scene.stop is not None
-        e = self._scene.stop.restitution
+        e = self._interface.restitution
         with_tip = self._alone or self._ties(phase)
         masses = self._tip_mass if with_tip else 0.0, 0.0 if self._alone else self._mass
         v, z = (end.velocity for end in ends)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     inside = contact
     if scene.coupled and scene.contact.strikes:
         inside = np.minimum(normal_compliance(scene, u, first), MOST_SHOWN)
-    energies = ledger(scene, steps)
+    energies = ledger(steps)
     found = {
         "time": steps["time"],
         "u_tip": u,
@@ -122,16 +122,16 @@ def normal_compliance(scene: Scene, u: np.ndarray, first: np.ndarray) -> np.ndar
     return scene.contact.compliance(psi - u)
 
 
-def ledger(scene: Scene, steps: np.ndarray, *, of_interface: bool = False) -> dict[str, np.ndarray]:
+def ledger(steps: np.ndarray, received: Collection[str] = ()) -> dict[str, np.ndarray]:
     """Return the columns from ``e_beam`` to ``e_total`` [J]: energies, what was lost, minus the work of the loads.
 
-    In the ledger ``of_interface`` the energy of a foreign FMU is the work that it has received: its own account may be
+    The energy of a body in ``received``, "beam" or "spring", is the work that it has received: its own account may be
     off.
     """
 
     def account(body: str) -> tuple[Any, Any, Any]:
         """Return what a body stores, dissipates and has from its loads [J]."""
-        if of_interface and body in scene.foreign:
+        if body in received:
             return steps[f"{body}_received"], 0.0, 0.0
         stored = steps[f"{body}_kinetic"] + steps[f"{body}_potential"]
         return stored, steps[f"{body}_dissipated"], steps[f"{body}_load"]

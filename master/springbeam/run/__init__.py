@@ -1,7 +1,7 @@
 """A run: macro steps from event to event, its ledger and its rows.
 
-Imports everything below: `coupling`, `contact`, `bodies`, `results`, `scene`. ``runner`` makes the parts of a scene and
-runs them, ``master`` is the loop (start there), ``stepping`` one step and the state of the run, ``detection`` and
-``separation`` the event that ends it, ``macro_steps`` its size, ``log`` what is handed over, ``ledger`` what judges the
-energy.
+Imports everything below: `coupling`, `contact`, `bodies`, `results`, `scene`. ``setup`` resolves what is run, and
+behind it no module asks the scene. ``runner`` makes the bodies and runs them, ``master`` is the loop (start there),
+``stepping`` one step and the state of the run, ``detection`` the event that ends it, ``macro_steps`` its size, ``log``
+what is handed over, ``ledger`` what judges the energy, ``summary`` what a run amounts to.
 """

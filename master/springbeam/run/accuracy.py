@@ -158,7 +158,7 @@ def _contact_frequency(scene: Scene) -> float:
     law = scene.soft_law
     assert law is not None
     stiffness = stiffest(law, contact_energy(scene))
-    bodies = [body for body in load_bodies(scene, scene.contact_time or 0.0) if body is not None]
+    bodies = [body for body in load_bodies(scene, scene.contact_time or 0.0, scene.degree) if body is not None]
     try:
         return math.sqrt(stiffness * sum(1.0 / body.mass for body in bodies))
     finally:

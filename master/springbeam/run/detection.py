@@ -21,8 +21,8 @@ from ..contact.phases import VELOCITY_ROUNDING, Joint
 from ..coupling.protocol import Step
 from ..results.paths import Path, Place, Sample, sign_changes
 from ..results.trajectory import Event, EventKind
-from ..scene import SAME, Scene
 from .macro_steps import AdaptiveSteps, MacroGrid
+from .setup import SAME
 from .stepping import Pair, Present, State
 
 #: Trial steps to the bottom of a dip.
@@ -36,9 +36,10 @@ _SHARP = 1e-9
 class Detector:
     """Finds the event that ends a step; the bodies are left where the returned step ends."""
 
-    def __init__(self, scene: Scene, pair: Pair, steps: MacroGrid | AdaptiveSteps) -> None:
-        self._pair, self._steps = pair, steps
-        self._functions = EventFunctions(scene, pair.law, pair.tip_share, pair.equilibrium)
+    def __init__(self, pair: Pair, steps: MacroGrid | AdaptiveSteps) -> None:
+        self._pair = pair
+        self._steps = steps
+        self._functions = EventFunctions(pair.interface)
 
     def tolerance(self, ends: Ends) -> float:
         """Resolution of positions [m]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from math import inf
 from typing import Any
 
@@ -10,8 +10,6 @@ import numpy as np
 
 from ..bodies.protocol import Body
 from ..results.columns import ledger
-from ..scene import Scene
-from ..scene.tables import ORDINARY_SCHEMES
 from .stepping import Pair
 
 #: Relative energy residual up to which a coupling that creates no energy is exact: rounding and solvers' tolerances.
@@ -24,27 +22,34 @@ APPROXIMATE = 1e-3
 _TOLERANCES = EXACT / 1e-12
 
 
-def bounds(scene: Scene) -> tuple[float, float]:
-    """Relative energy residuals above which a run warns, and above which it stops."""
-    coupling = scene.coupling
-    if coupling.scheme in ORDINARY_SCHEMES:
+def bounds(tolerance: float, *, exchanges: bool = False) -> tuple[float, float]:
+    """Return the relative energy residuals above which a run warns, and above which it stops.
+
+    Parameters
+    ----------
+    tolerance
+        The largest relative tolerance of the coupling and of the bodies.
+    exchanges
+        Whether the scheme exchanges once per macro step.
+    """
+    if exchanges:
         return APPROXIMATE, 0.1
-    tolerance = max(coupling.tolerance, 0.0 if scene.spring is None else scene.spring.relative_tolerance)
     return min(max(EXACT, _TOLERANCES * tolerance), APPROXIMATE), APPROXIMATE
 
 
 def errors(
-    scene: Scene, steps: np.ndarray, first: np.ndarray, scale: float, *, of_interface: bool
+    steps: np.ndarray, first: np.ndarray, scale: float, received: Collection[str] = ()
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return by how much the energy is off at each of ``steps``, over the largest until then, and that [J].
 
     ``first`` is the first record of the run, shape (1,): it has the energy that should be kept. ``scale`` is the
-    largest energy before ``steps`` [J]; others are as of `ledger`.
+    largest energy before ``steps`` [J], ``received`` as of `ledger`.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused by the record
-        found, initial = ledger(scene, steps, of_interface=of_interface), float(first["energy_at_start"][0])
-        if of_interface and scene.foreign:
-            initial = float(ledger(scene, first, of_interface=True)["e_total"][0])
+        found = ledger(steps, received)
+        initial = float(first["energy_at_start"][0])
+        if received:
+            initial = float(ledger(first, received)["e_total"][0])
         # Beyond its hilltop a softening spring has a negative potential, which may cancel its kinetic energy.
         of_spring = np.maximum(np.abs(found["e_spring"]), steps["spring_kinetic"])
         size = np.abs(found["e_beam"]) + of_spring + found["e_contact"]
@@ -56,9 +61,14 @@ def errors(
 class Balance:
     """How much of a run's energy may change, and has."""
 
-    def __init__(self, scene: Scene, pair: Pair) -> None:
-        self._scene, self._pair = scene, pair
-        self._warns, self._stops = bounds(scene)
+    def __init__(self, pair: Pair) -> None:
+        self._pair = pair
+        tolerance = max(pair.setup.tolerance, *(body.tolerance for body in pair.bodies))
+        self._warns, self._stops = bounds(tolerance, exchanges=pair.setup.exchanges)
+        #: The bodies whose energy is the work that they have received, by table.
+        self._received = [
+            table for table, body in zip(("beam", "spring"), pair.bodies, strict=True) if body.received is not None
+        ]
         #: Bodies of the caller's may tell no energies; there is then no balance to judge by.
         self._untold = any(type(body).energies is Body.energies and body.mass < inf for body in pair.bodies)
         if self._untold:
@@ -67,7 +77,7 @@ class Balance:
 
     def check(self, steps: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, Callable[[int], str]]:
         """Tell at which of the next records too much of the energy has changed, and why; see `Log`."""
-        share, largest = errors(self._scene, steps, first, self._scale, of_interface=True)
+        share, largest = errors(steps, first, self._scale, self._received)
         self._scale = float(largest[-1])
         return np.abs(share) > self._stops, lambda row: self._cause(float(abs(share[row])), steps)
 
@@ -79,14 +89,16 @@ class Balance:
         """
         if not len(steps):
             return {"max_energy_residual": 0.0}, [], False
-        own, judged = (errors(self._scene, steps, steps[:1], 0.0, of_interface=judged)[0] for judged in (False, True))
-        of_own, of_judged = float(np.abs(own).max()), float(np.abs(judged).max())
+        of_own, of_judged = (
+            float(np.abs(errors(steps, steps[:1], 0.0, received)[0]).max()) for received in ((), self._received)
+        )
+        setup = self._pair.setup
         last = steps[-1]
         summary = {
             "max_energy_residual": of_own,
-            **({"max_interface_residual": of_judged} if self._scene.foreign else {}),
-            **({"loss_beam": float(last["beam_dissipated"])} if self._scene.upper is not None else {}),
-            **({"loss_spring": float(last["spring_dissipated"])} if self._scene.lower is not None else {}),
+            **({"max_interface_residual": of_judged} if self._received else {}),
+            **({"loss_beam": float(last["beam_dissipated"])} if setup.upper else {}),
+            **({"loss_spring": float(last["spring_dissipated"])} if setup.lower else {}),
             **({"loss_contact": float(last["law_dissipated"])} if self._pair.law is not None else {}),
         }
         warnings = []
@@ -99,19 +111,16 @@ class Balance:
                 f"the energies that the FMUs tell are off by {100.0 * of_own:.2g} %, by their own "
                 f"solvers: the coupling has kept those of the interface to {of_judged:.1e}"
             )
-        return summary, warnings, bool(np.abs(judged).max() > self._warns)
+        return summary, warnings, of_judged > self._warns
 
     def _cause(self, share: float, steps: np.ndarray) -> str:
         """Return in words why a ``share`` of the energy has changed, and what would help."""
-        coupling = self._scene.coupling
-        causes, remedies = [], []
+        setup = self._pair.setup
+        cause = "rounding, or a solver's tolerance,"
+        remedy = "the results are not to be trusted; try another coupling.macro_step"
         if not self._pair.joined.energy_exact:
-            causes.append(f"{coupling.scheme} of degree {self._scene.degree}")
+            cause = f"{setup.scheme} of degree {setup.degree}"
             or_else = ", or coupling.scheme = 'energy'" if self._pair.repeatable else ""
-            H = coupling.macro_step or steps["size"].max()
-            remedies.append(f"the macro step {H:g} s is too large for it; take a smaller one{or_else}")
-        if not causes:
-            causes.append("rounding, or a solver's tolerance,")
-            remedies.append("the results are not to be trusted; try another coupling.macro_step")
-        percent = 100.0 * share
-        return f"{' with '.join(causes)} {CHANGED} by {percent:.2g} %: {'; '.join(remedies)}"
+            H = setup.macro_step or steps["size"].max()
+            remedy = f"the macro step {H:g} s is too large for it; take a smaller one{or_else}"
+        return f"{cause} {CHANGED} by {100.0 * share:.2g} %: {remedy}"

@@ -16,8 +16,8 @@ import numpy as np
 
 from ..bodies import force
 from ..bodies.protocol import NO_FORCE, Body, Force
-from ..scene import SAME, Load, Scene
-from ..scene.loads import LINES_IN_STEP, ConstantLoad, StepLoad, TableLoad
+from ..scene.loads import LINES_IN_STEP, ConstantLoad, Load, StepLoad, TableLoad
+from .setup import SAME
 
 #: Which loads act on which body.
 ON_BEAM, ON_SPRING = ("beam", "tip", "base"), ("spring", "base")
@@ -33,7 +33,9 @@ class Signal:
     """One load over the steps of a run."""
 
     def __init__(self, load: Load) -> None:
-        self._load, self._begins, self._end = load, load.begins, load.end
+        self._load = load
+        self._begins = load.begins
+        self._end = load.end
         #: When the load jumps or bends and a step ends [s].
         self.kinks = load.kinks
         #: Times [s] between which it is smooth: of a table the polynomial between two lines.
@@ -92,22 +94,24 @@ class Loads:
 
     Parameters
     ----------
-    scene
-        Whose loads act.
+    loads
+        Those of the scene.
+    end
+        When the run ends [s].
     upper, lower
         The bodies.
     """
 
-    def __init__(self, scene: Scene, upper: Body, lower: Body) -> None:
-        self._signals = [Signal(load) for load in scene.loads]
-        self._end = scene.time.t_end
+    def __init__(self, loads: Sequence[Load], end: float, upper: Body, lower: Body) -> None:
+        self._signals = [Signal(load) for load in loads]
+        self._end = end
         self._kinked = [signal for signal in self._signals if signal.kinks]
         self._bodies: list[tuple[Body, list[int]]] = []
         self._last = (-1.0, 0.0)
         for body, places in ((upper, ON_BEAM), (lower, ON_SPRING)):
-            taken = [i for i, load in enumerate(scene.loads) if load.on in places]
+            taken = [i for i, load in enumerate(loads) if load.on in places]
             if taken:
-                body.expect_loads([scene.loads[i] for i in taken])
+                body.expect_loads([loads[i] for i in taken])
                 self._bodies.append((body, taken))
         self.any = bool(self._bodies)
 

@@ -11,7 +11,6 @@ from ..results.columns import first_not_finite
 from ..results.recording import Recorder
 from ..results.steps import STEP
 from ..results.trajectory import SHAPE_COLUMNS, Event
-from ..scene import Scene
 from .outcome import RunStopped
 
 #: Most records that are checked and handed on together, and the longest that one waits for it [s].
@@ -24,11 +23,14 @@ Check = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, Callable[[int], str
 class Log:
     """What a run says of its steps, on its way to ``recorder``; ``checks`` judge records whose numbers are finite."""
 
-    def __init__(self, scene: Scene, recorder: Recorder, *checks: Check) -> None:
-        self._scene, self._recorder, self._checks = scene, recorder, checks
+    def __init__(self, recorder: Recorder, *checks: Check) -> None:
+        self._recorder = recorder
+        self._checks = checks
         #: What the recorder does not have yet: records as of `springbeam.results.steps.packed`, events of these and the
         #: next one, and the beam's shapes at some records, the numbers of `SHAPE_COLUMNS`.
-        self.records, self.events, self.shapes = list[bytes](), list[Event](), list[np.ndarray]()
+        self.records = list[bytes]()
+        self.events = list[Event]()
+        self.shapes = list[np.ndarray]()
         self._events = 0  #: number of those that the recorder has
         self._first = np.empty(0, STEP)  #: record of the run
         self.due = monotonic() + _WAITS  #: when the next records are handed on, however few [s]
@@ -51,7 +53,9 @@ class Log:
         last, known = (steps["time"][-1], int(steps["events"][-1])) if len(steps) else (-np.inf, 0)
         events = self.events[: max(known - self._events, 0)]
         self._events += len(events)
-        self.records, self.events, self.shapes = [], [], []
+        self.records = []
+        self.events = []
+        self.shapes = []
         self._recorder.keep(steps, events, shapes[finite & (shapes[:, 0] <= last)])
         if stopped is not None:
             raise stopped
@@ -60,14 +64,18 @@ class Log:
         """Return the next records up to where the run has gone wrong, and how; those not finite are left out."""
         if not self._first.size:
             self._first = steps[:1].copy()
-        stopped, time, infinite = None, steps["time"], first_not_finite(self._scene, steps, self._first)
+        stopped = None
+        time = steps["time"]
+        infinite = first_not_finite(self._recorder.scene, steps, self._first)
         if infinite is not None:
             row, what = infinite
             cause = f"{what} at t = {float(time[row])!r} s: not a finite number"
-            stopped, steps = RunStopped(cause, float(time[row])), steps[:row]
+            stopped = RunStopped(cause, float(time[row]))
+            steps = steps[:row]
         for check in self._checks if len(steps) else ():
             wrong, cause_at = check(steps, self._first)
             if wrong.any():
                 row = int(np.argmax(wrong))
-                stopped, steps = RunStopped(cause_at(row), float(time[row])), steps[: row + 1]
+                stopped = RunStopped(cause_at(row), float(time[row]))
+                steps = steps[: row + 1]
         return steps, stopped

@@ -14,10 +14,8 @@ from ..bodies import force
 from ..contact.phases import Joint
 from ..coupling.protocol import Step
 from ..results.paths import Path
-from ..scene import SAME, Scene
-from ..scene.scene import SHORTEST_STEP
-from ..scene.statics import tip_compliance
 from .outcome import RunStopped
+from .setup import SAME, SHORTEST_STEP, Setup
 from .stepping import Pair, State
 
 #: A remainder of the macro grid shorter than this fraction of H joins the next step.
@@ -42,7 +40,8 @@ class MacroGrid:
     """The grid t₀ + k H up to t_end [s]."""
 
     def __init__(self, start: float, end: float, macro_step: float) -> None:
-        self._start, self._end = start, end
+        self._start = start
+        self._end = end
         self.size = macro_step  #: H [s]
 
     def next(self, time: float, kink: float = inf, *, struck: bool = False) -> tuple[float, float]:
@@ -61,9 +60,11 @@ class MacroGrid:
             k += 1
         size = target - time
         if target >= self._end - SHORTEST_STEP * H:
-            target, size = self._end, self._end - time
+            target = self._end
+            size = self._end - time
         if kink < target + _SHORT_REMAINDER * H:
-            target, size = kink, kink - time
+            target = kink
+            size = kink - time
         return target, H if abs(size - H) <= SAME * H else size
 
 
@@ -78,7 +79,7 @@ class Adapted:
 
 
 class AdaptiveSteps:
-    """Sizes that keep the error of each step at the tolerances of a scene.
+    """Sizes that keep the error of each step at the tolerances of the run.
 
     The error of a step of size H goes as H^order, so the next one is 0.9 (tolerance/error)^(1/order) times as long,
     rounded down to the sizes there are. A step above the tolerance is rejected and repeated; the one after it does not
@@ -86,20 +87,21 @@ class AdaptiveSteps:
 
     Parameters
     ----------
-    scene, pair
-        What is simulated.
-    start, end
-        The run [s].
+    setup, pair
+        What is run.
     """
 
     state: Adapted
 
-    def __init__(self, scene: Scene, pair: Pair, start: float, end: float) -> None:
-        self._pair, self._end, self._length = pair, end, end - start
-        self._relative = scene.coupling.relative_tolerance or 0.0
-        self._absolute = scene.coupling.absolute_tolerance or 0.0
-        #: By how much 1 N at the tip bends the beam [m/N].
-        self._compliance = 0.0 if scene.beam is None else tip_compliance(scene.beam)
+    def __init__(self, setup: Setup, pair: Pair) -> None:
+        self._pair = pair
+        self._end = setup.end
+        self._length = setup.end - setup.start
+        self._relative = setup.relative_tolerance
+        self._absolute = setup.absolute_tolerance
+        stiffness = pair.upper.stiffness(0.0)
+        #: By how much 1 N at the tip bends the upper body [m/N]; 0 where that is not known.
+        self._compliance = 1.0 / stiffness if stiffness is not None and stiffness > 0.0 else 0.0
         self.state = Adapted([(at.displacement, at.displacement) for at in pair.ends()])
 
     @property
@@ -112,7 +114,8 @@ class AdaptiveSteps:
 
         Error estimates tell how long steps may be, also where ends have ``struck`` each other.
         """
-        size, left = self.size, self._end - time
+        size = self.size
+        left = self._end - time
         if kink < time + (1.0 + _SHORT_REMAINDER) * size:
             return kink, kink - time
         return (self._end, left) if left <= (1.0 + _SHORT_REMAINDER) * size else (time + size, size)
@@ -132,7 +135,9 @@ class AdaptiveSteps:
         Raises RunStopped if there is no shorter one.
         """
         error, order = self._estimate(state, step)
-        own, size, factor = self.state, step.size, _SAFETY * error ** (-1.0 / order) if error > 0.0 else _GROW
+        own = self.state
+        size = step.size
+        factor = _SAFETY * error ** (-1.0 / order) if error > 0.0 else _GROW
         if error <= 1.0:
             # A step that ended on a kink tells of whole ones by the order, unless it was much shorter.
             wanted = min(size * factor, self.size * (1.0 if own.just_rejected else _GROW))
@@ -157,7 +162,8 @@ class AdaptiveSteps:
         sum of modes, which may be larger than it: of what bends the beam with the energy so far. That is also the
         length of the motion of ends that have been held so far.
         """
-        curve, spans = 0.0, []
+        curve = 0.0
+        spans = []
         bent = sqrt(2.0 * self._compliance * self.state.energy)
         least = [max(abs(low), abs(high), bent) for low, high in self.state.ways]
         ends = zip(step.start, step.end, self._ways(step), least, strict=True)
@@ -184,7 +190,9 @@ class AdaptiveSteps:
         opposite; the rest of D is a P_(d+1), d the degree of C, which moves free masses by a H²/4μ ∬ P_(d+1) ds ds, but
         a beam by no more than what bends it.
         """
-        pair, degree, size = self._pair, self._pair.joined.degree, step.size
+        pair = self._pair
+        degree = pair.joined.degree
+        size = step.size
         if state.phase.joint is Joint.FREE and not any(step.contact):
             return 0.0, degree + 3
         at_end = force.value(step.contact, size) - pair.present(state.phase, step, size).contact

@@ -17,14 +17,13 @@ from typing import Any
 import numpy as np
 
 from ..bodies.protocol import Modes
+from ..contact.interface import Interface
 from ..results.distance import HELD
 from ..results.paths import Path
 from ..results.steps import force as applied
 from ..results.steps import joined
 from ..results.trajectory import Event, EventKind
-from ..scene import Scene
 from ..scene.laws import SoftLaw
-from ..scene.statics import tip_reach
 from .stepping import Pair
 
 #: Places where a soft law is asked, and their shares: Gauss points.
@@ -34,7 +33,7 @@ _INSIDE = 0.5 * (_POINTS + 1.0), 0.5 * _SHARES
 _LOST = 1e3
 
 
-def misplaced(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float | None:
+def misplaced(pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float | None:
     """Return how far an end is from where the law of ``pair`` would have it, over its largest distance from its start.
 
     It is that of the worse end at its worst, of a tie between the rows, too; 0 where a tie holds an end that nothing
@@ -42,19 +41,21 @@ def misplaced(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Even
     """
     if not steps["size"].any() or (pair.law is None and not 0.0 < pair.upper.mass < inf):
         return 0.0
-    held = 0.0 if scene.beam is None else HELD * tip_reach(scene.beam)
+    held = HELD * pair.upper.reach
     moved = (float(np.abs(steps[name] - steps[name][0]).max()) for name in ("u_tip_after", "y_after"))
     ways = [way if way > held else inf for way in moved]
     modes = pair.upper.modes()
     y = 0.5 * (steps["y"] + np.append(0.0, steps["y_after"][:-1]))
-    stiff, damping = pair.lower.stiffness(y), pair.lower.damping
+    stiff = pair.lower.stiffness(y)
+    damping = pair.lower.damping
     if modes is None or stiff is None or damping is None:
         return None
     ends = _Errors(modes, pair.lower.mass, damping)
     stiffness = ends.per_mass * np.broadcast_to(stiff, len(steps)) if ends.per_mass > 0.0 else np.zeros(len(steps))
     follow = _along_tie if pair.law is None else partial(_along_soft_law, pair.law)
     found = 0.0
-    for u, y in follow(scene.degree, ends, steps, stiffness, _after_events(scene, steps, events)):
+    after = _after_events(pair.interface, steps, events)
+    for u, y in follow(pair.joined.degree, ends, steps, stiffness, after):
         found = max(found, abs(u) / ways[0], abs(y) / ways[1])
         if found > _LOST:
             break
@@ -199,7 +200,7 @@ def _penetration(before: np.ndarray, step: np.ndarray, size: np.ndarray) -> Any:
     return Path.through(start, end, size, (mean, twice))  # type: ignore[arg-type]
 
 
-def _after_events(scene: Scene, steps: np.ndarray, events: Sequence[Event]) -> np.ndarray:
+def _after_events(interface: Interface, steps: np.ndarray, events: Sequence[Event]) -> np.ndarray:
     """Return what the events at each of ``steps`` leave of the lower end's error, (3, len(steps)).
 
     It is the share of displacement and velocity, none while the end is seated, and by how much each unit of
@@ -209,8 +210,9 @@ def _after_events(scene: Scene, steps: np.ndarray, events: Sequence[Event]) -> n
     shares, (turns, most) = np.where(steps["phase"] >= 3.0, 0.0, 1.0), np.zeros((2, len(steps)))
     struck = [n for n, event in enumerate(events, 1) if event.kind is EventKind.STOP_IMPACT]
     made = np.flatnonzero(steps["size"] > 0.0)
-    if struck and scene.stop is not None:
-        rows, e = np.searchsorted(steps["events"], struck), scene.stop.restitution
+    if struck:
+        rows = np.searchsorted(steps["events"], struck)
+        e = interface.restitution
         np.multiply.at(shares, rows, -e)
         at = np.searchsorted(made, rows, side="right") - 1
         gained = (steps["z"][made] - steps["z_after"][made - 1]) / steps["size"][made]

@@ -10,16 +10,20 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from ..bodies.factory import load_bodies
+from ..bodies.equilibrium import contact_at_rest
+from ..bodies.factory import findings, load_bodies
 from ..bodies.fmu_bodies import FmuBody
+from ..bodies.gate import admit
 from ..bodies.protocol import Body
+from ..contact.interface import Rigid
 from ..results.recording import MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, as_scene, suspicions
-from .equilibrium import contact_at_rest
 from .master import Master
 from .outcome import Progress, RunStopped
+from .setup import set_up
 from .stepping import State
+from .summary import summary
 
 
 class Simulation(AbstractContextManager["Simulation"]):
@@ -54,15 +58,24 @@ class Simulation(AbstractContextManager["Simulation"]):
         began = perf_counter()
         scene = as_scene(scene)
         _refuse_accuracy(scene)
-        self.scene, self.recorder = scene, recorder or MemoryRecorder(scene)
         of_scene = _without_own(scene, upper=upper, lower=lower)
         if upper is not None and scene.beam is not None:  # it moves from the start on, as an elastic approach does
             scene = scene.model_copy(update={"upper": scene.beam.model_copy(update={"approach": "elastic"})})
-        start_time = scene.contact_time or 0.0
-        contact = contact_at_rest(of_scene)
-        self._bodies = beam, spring = load_bodies(of_scene, start_time, contact)
+        self.scene = scene
+        self.recorder = recorder or MemoryRecorder(scene)
+        given = [body.abilities for body in (upper, lower) if body is not None]
+        found = [finding.abilities for finding in findings(of_scene).values()]
+        setup = set_up(scene, *given, *found)
+        soft = None if setup.law is None or isinstance(setup.law, Rigid) else setup.law.force
+        contact = contact_at_rest(of_scene, setup.degree, soft)
+        self._bodies = beam, spring = load_bodies(of_scene, setup.start, setup.degree, contact)
+        #: The scene with what was left to the run.
+        self._resolved = scene.model_copy(
+            update={"coupling": scene.coupling.model_copy(update={"degree": setup.degree})}
+        )
         try:
-            self._master = Master(scene, start_time, upper or beam, lower or spring, self.recorder, contact)
+            admit(self._resolved, setup.start, upper or beam, lower or spring)
+            self._master = Master(setup, upper or beam, lower or spring, self.recorder, contact)
         except BaseException:
             self.close()
             raise
@@ -170,18 +183,18 @@ class Simulation(AbstractContextManager["Simulation"]):
 
     def _summed_up(self, status: dict[str, Any]) -> dict[str, Any]:
         wall_time = perf_counter() - self._loaded
-        summary = self._master.summary()
+        amounts = summary(self._resolved, self._master, self.recorder)
         told = zip(("beam", "spring"), self._bodies, strict=True)
         counting = {name: body for name, body in told if isinstance(body, FmuBody)}
         return {
             **status,
             "version": version("springbeam"),
-            **summary,
+            **amounts,
             **{f"{name}_steps": body.steps for name, body in counting.items()},
             **{f"{name}_rollbacks": body.rewinds for name, body in counting.items()},
             "setup_time": self._setup_time,
             "wall_time": wall_time,
-            "warnings": [*suspicions(self.scene), *summary["warnings"]],
+            "warnings": [*suspicions(self.scene), *amounts["warnings"]],
         }
 
 

@@ -9,13 +9,14 @@ from typing import NamedTuple
 from ..bodies import force
 from ..bodies.elements import RigidWall
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force
-from ..contact.phases import Joint, Phase, common_velocity
+from ..contact.interface import Interface
+from ..contact.phases import Joint, Phase
 from ..coupling import coupling_of
 from ..coupling.protocol import Step, Uncoupled
 from ..results.trajectory import EventKind
-from ..scene import Scene
 from .loads import Loads
 from .outcome import RunStopped
+from .setup import Setup
 
 #: Events in a row, each within H of the one before; more of them and the contact is said to chatter. Impacts that die
 #: out are up to 18,000 (e = 0.999); those of a lossy body on a lossless stop are without end.
@@ -96,48 +97,53 @@ class State:
 
 
 class Pair:
-    """Both bodies of a scene, one of them possibly missing, and what couples them in each phase.
+    """Both bodies of a run, one of them possibly missing, and what couples them in each phase.
 
     Parameters
     ----------
-    scene
-        Whose contact law and coupling scheme hold.
-    beam, spring
-        The bodies; ``None`` where the scene has none: a wall stands there, at 0 or where the foundation is.
+    setup
+        What is run.
+    upper, lower
+        The bodies; ``None`` where there is none: a wall stands there, the lower one where the foundation is.
     """
 
-    def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
-        self.stop = None if scene.stop is None else scene.stop.position
+    def __init__(self, setup: Setup, upper: Body | None, lower: Body | None) -> None:
+        self.setup = setup
         #: What holds a lower end that is seated.
-        self._held = None if self.stop is None else RigidWall(self.stop)
-        self.upper: Body = beam or RigidWall(0.0)
-        self.lower: Body = spring or self._held or RigidWall(0.0)
-        self.alone = spring is None  #: whether nothing but the foundation is below the tip
-        self.loads = Loads(scene, self.upper, self.lower)
+        self._held = None if setup.floor is None else RigidWall(setup.floor)
+        self.upper: Body = upper or RigidWall(0.0)
+        self.lower: Body = lower or self._held or RigidWall(setup.level)
+        self.alone = lower is None  #: whether nothing but the foundation is below the tip
+        self.loads = Loads(setup.loads, setup.end, self.upper, self.lower)
         self.bodies = (self.upper, self.lower)
         for body in self.bodies:
             body.take_place(upper=body is self.upper)
         self.repeatable = all(body.abilities.state for body in self.bodies)
-        #: Ψ: where the ends of a rigid law are tied below [m].
-        self.equilibrium = scene.spring.equilibrium if scene.spring is not None else self.lower.motion().displacement
+        equilibrium = setup.equilibrium
+        if equilibrium is None:
+            equilibrium = self.lower.motion().displacement
+        self.interface = Interface(
+            self.upper, self.lower, setup.law, equilibrium, setup.floor, setup.restitution, self.alone
+        )
         #: The tip's part in the velocity with which joined ends go on.
-        self.tip_share = common_velocity(1.0, 0.0, self.upper.mass, self.lower.mass)
+        self.tip_share = self.interface.tip_share
         #: Where the ends are; looked up once, since every step asks a few times.
-        self._tip, self._low = self.upper.motion, self.lower.motion
+        self._tip = self.upper.motion
+        self._low = self.lower.motion
         self._last: Step | None = None  #: at whose end the bodies are
         self._holding = 0.0  #: what holds a seated lower end, without loads and contact [N]
         #: The soft law between the ends; a rigid one has no force of its own, and ties them while they are joined.
-        self.law = scene.soft_law
+        self.law = self.interface.soft
         #: μ of ends that a rigid law joins, whose mismatch of velocities a step turns round [kg]; else 0.
-        self.turned_mass = self.reduced_mass(Phase()) if self.law is None else 0.0
+        self.turned_mass = self.interface.reduced_mass() if self.law is None else 0.0
         #: The bodies that could not say an acceleration when it was asked for.
         self.without_acceleration: list[Body] = []
         #: Whether they are joined for good.
-        self.lasting = scene.coupled and scene.contact.lasting
+        self.lasting = self.interface.lasting
         #: Whether contact opens and closes inside steps, without an event that ends them.
         self.opens_softly = self.law is not None and not self.lasting
         #: What couples the bodies where the law acts, and where the ends are apart.
-        self.joined = coupling_of(scene, self.law)
+        self.joined = coupling_of(setup.scheme, setup.degree, setup.tolerance, self.law, self.upper.reach)
         self._uncoupled = self.joined if self.law else Uncoupled()
         #: Whether a step can be repeated with another size.
         self.divides = self.repeatable and all(body.abilities.any_size for body in self.bodies)
@@ -174,9 +180,11 @@ class Pair:
         held = self._held if phase.seated else None
         if self.loads.any:
             self.loads.act(state.time, size)
-        coupling, guess = self.joined, state.contact  # as far as the last step tells
+        coupling = self.joined
+        guess = state.contact  # as far as the last step tells
         if phase.joint is Joint.FREE:
-            coupling, guess = self._uncoupled, NO_FORCE
+            coupling = self._uncoupled
+            guess = NO_FORCE
         elif size > _REACH_OF_FORCE * state.last_size:
             guess = (guess[0], 0.0, 0.0)
         step = coupling.solve(self.upper, held or self.lower, state.time, size, start, guess)
@@ -188,8 +196,9 @@ class Pair:
         time, size, contact, _, _, (tip, _) = step
         if self.alone:
             return step._replace(foundation=contact)
-        assert self.stop is not None
-        self._holding, (load, slope, bend) = self.lower.holding_force(self.stop, 0.0), self.lower.load_on_end()
+        assert self.interface.floor is not None
+        self._holding = self.lower.holding_force(self.interface.floor, 0.0)
+        load, slope, bend = self.lower.load_on_end()
         bearing = (self._holding - load, -slope, -bend)
         self.lower.rewind()
         # C and the part of N that bears it cancel: together, rounding of a large C would move a light top.
@@ -257,9 +266,9 @@ class Pair:
         if self.alone:
             return Present(C, C)
         if changed:
-            assert self.stop is not None
+            assert self.interface.floor is not None
             self.mark()  # from where a body may try which force holds it
-            self._holding = self.lower.holding_force(self.stop, 0.0)
+            self._holding = self.lower.holding_force(self.interface.floor, 0.0)
         return Present(C, self._holding - force.value(self.lower.load_on_end(), 0.0 if changed else size) + C)
 
     def let_go_by(self, phase: Phase) -> EventKind | None:
@@ -282,7 +291,8 @@ class Pair:
 
         1/μ = 1/m_tip + 1/m; an end that does not move has an infinite mass.
         """
-        apart, mobility = 0.0, 0.0
+        apart = 0.0
+        mobility = 0.0
         for body, sign in ((self.upper, 1.0), (self.lower, -1.0)):
             if body.mass == inf or (phase.seated and body is self.lower):
                 continue
@@ -298,5 +308,4 @@ class Pair:
 
     def reduced_mass(self, phase: Phase) -> float:
         """Reduced mass of both ends [kg]; the tip's mass while the lower end is seated."""
-        masses = [self.upper.mass] if phase.seated else [self.upper.mass, self.lower.mass]
-        return 0.0 if min(masses) == 0.0 else 1.0 / inverse if (inverse := sum(1.0 / m for m in masses)) else 0.0
+        return self.interface.reduced_mass(seated=phase.seated)

@@ -251,7 +251,8 @@ def _class(run: Trajectory, cause: str, relative: np.ndarray, scale: np.ndarray,
         lost = run.e_dissipated[-1] + run.e_impact_loss[-1]
         return "dissipative" if lost > EXACT * scale[-1] else "conserved", ""
     said = [text for text in run.summary["warnings"] if "energy" in text]
-    if said or residual <= bounds(scene)[0]:
+    tolerance = max(scene.coupling.tolerance, 0.0 if scene.spring is None else scene.spring.relative_tolerance)
+    if said or residual <= bounds(tolerance, exchanges=not keeps)[0]:
         return "approximate", "; ".join(said)
     return "garbage", f"energy residual {residual:.1e}, and nothing says so"
 

@@ -2,36 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import closing
 
-from ..bodies.factory import load_bodies, top_at_rest
 from ..scene import Scene
 from ..scene.statics import tip_compliance
+from .factory import load_bodies, top_at_rest
 
 
-def contact_at_rest(scene: Scene) -> float:
+def contact_at_rest(scene: Scene, degree: int, law: Callable[[float], float] | None) -> float:
     """Return the contact force C [N] under which the bodies of ``scene`` start at rest; 0 where they do not touch.
 
     The upper end is linear, u = u₀ + c C with the c of its mesh; C satisfies the law, or closes the gap of a rigid one.
+
+    Parameters
+    ----------
+    scene, degree
+        As of `load_bodies`.
+    law
+        C [N] of a soft law at a penetration [m].
+
     Raises SceneError where the spring rests nowhere, FmuError.
     """
     if not scene.static or scene.upper is None or (scene.lower is None and scene.stop is None):
         return 0.0
     from scipy.optimize import brentq  # takes a tenth of a second to load: only for who starts at rest
 
-    law = scene.soft_law
-    free = _tip(scene, 0.0)
-    top = top_at_rest(scene, 0.0)
-    deep = top - free
+    free = _tip(scene, degree, 0.0)
+    deep = top_at_rest(scene, 0.0) - free
     if deep == 0.0 or (deep < 0.0 and not scene.contact.lasting):
         return 0.0
     # What would close the gap, were the lower end rigid; a wall above does not move, and any force will do.
     scale = deep / tip_compliance(scene.beam) if scene.beam is not None else deep
-    compliance = (_tip(scene, scale) - free) / scale
+    compliance = (_tip(scene, degree, scale) - free) / scale
 
     def too_small(contact: float) -> float:
         p = top_at_rest(scene, contact) - free - compliance * contact
-        return p if law is None else law.force(p) - contact
+        return p if law is None else law(p) - contact
 
     while too_small(scale) * deep > 0.0:
         scale *= 2.0
@@ -39,8 +46,8 @@ def contact_at_rest(scene: Scene) -> float:
     return found
 
 
-def _tip(scene: Scene, contact: float) -> float:
-    upper, _ = load_bodies(scene.model_copy(update={"lower": None}), 0.0, contact)
+def _tip(scene: Scene, degree: int, contact: float) -> float:
+    upper, _ = load_bodies(scene.model_copy(update={"lower": None}), 0.0, degree, contact)
     assert upper is not None
     with closing(upper):
         return upper.motion().displacement

@@ -1,0 +1,49 @@
+"""What a run amounts to: counts, residuals, warnings and results, as they go into ``summary.json``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..results.contradictions import contradictions
+from ..results.recording import Recorder
+from ..results.totals import totals
+from ..scene import Scene
+from ..scene.resolution import peak_force_doubt
+from .master import Master
+from .misplaced import misplaced
+from .observed import coarse_force, force_window, not_shown, unknown, why_not_resolved
+
+_SHORTER = "take a shorter macro step that is not a whole period of a body"
+
+
+def summary(scene: Scene, master: Master, recorder: Recorder) -> dict[str, Any]:
+    """Return the summary of what ``recorder`` has of the run of ``scene``, whose degree is resolved."""
+    steps = recorder.steps()
+    pair = master.pair
+    known = int(steps["events"][-1]) if len(steps) else 0  # a full disk may have events without their records
+    events = recorder.events()[:known]
+    made = int(np.count_nonzero(np.diff(steps["time"])))
+    energies, warnings, changed = master.balance.report(steps)
+    off = misplaced(pair, steps, events)
+    unresolved = why_not_resolved(scene, pair, master.steps.size, steps, events, off)
+    warnings += filter(None, [unresolved or peak_force_doubt(scene), not_shown(scene, pair, steps)])
+    warnings += filter(None, [unknown(scene, pair), coarse_force(pair)])
+    window = force_window(scene, pair, steps)
+    amounts = totals(scene, steps, events, window) if len(steps) else {}
+    ruled_out = contradictions(scene, steps, events, amounts.get("contact_duration_total", 0.0))
+    warnings += [f"not resolved: {what}: an event was missed; {_SHORTER}" for what in ruled_out]
+    return {
+        "degree": pair.setup.degree,
+        "time": float(steps["time"][-1]) if len(steps) else master.state.time,
+        "macro_steps": made,
+        "events": len(events),
+        "halved_steps": master.state.halvings,
+        "iterations": pair.joined.state.iterations,
+        **energies,
+        "resolved": unresolved is None and not changed and not ruled_out,
+        **({} if off is None else {"misplaced_ends": off}),
+        "warnings": warnings,
+        **amounts,
+    }

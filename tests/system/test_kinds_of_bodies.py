@@ -1,0 +1,104 @@
+"""One body, made in each of the ways there are: what holds for one kind holds for all of them."""
+
+import functools
+
+import numpy as np
+import oscillator
+import pytest
+from bodies import DuffingBody
+
+from springbeam import PointMass, SpringDamper, simulate, with_changes
+from springbeam.bodies.protocol import Abilities
+from springbeam.scene import load_scene, scene_from_dict
+
+M, K, C = 3.0, 40.0, 0.2
+#: A mass on a linear spring and damper as a table ``[spring]``.
+OWN = {"mass": M, "linear_stiffness": K, "damping": C}
+ELEMENT = {"element": "spring_damper", "mass": M, "stiffness": K, "damping": C}
+FOREIGN = {**oscillator.ALL, "force_sign": -1, "parameters": {"m": M, "k": K, "c": C}}
+KINDS = ("own", "element", "element of the caller's", "function", "foreign")
+
+
+@pytest.fixture(scope="module")
+def below(tmp_path_factory):
+    """Return the table ``[spring]`` of a kind of body, and how the caller gives it."""
+    folder = tmp_path_factory.mktemp("kinds")
+
+    @functools.cache
+    def made(**said):
+        return str(oscillator.made(folder / f"{len(list(folder.iterdir()))}.fmu", **said))
+
+    def of_kind(kind, **said):
+        tables = {"element": ELEMENT, "foreign": {**FOREIGN, "fmu": made(**said) if kind == "foreign" else ""}}
+        given = {"element of the caller's": lambda: SpringDamper(M, K, C), "function": lambda: DuffingBody(M, K, 0.0)}
+        bodies = {}
+        if kind in given:
+            bodies["lower"] = given[kind]()
+            bodies["lower"].damping = C
+        return tables.get(kind, OWN), bodies
+
+    return of_kind
+
+
+def above(spring, **tables):
+    """A mass of 2 kg that moves down by 0.3 m/s, tied to the body below."""
+    scene = {
+        "time": {"t_end": 0.5},
+        "beam": {"element": "point_mass", "mass": 2.0, "velocity": -0.3},
+        "spring": spring,
+        "contact": {"law": "tie"},
+        "coupling": {"macro_step": 0.02},
+    }
+    return scene_from_dict({**scene, **tables})
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_they_move_alike(below, kind):
+    """m ẍ + c ẋ + k x = 0 of both masses together, with the momentum of the upper one."""
+    spring, bodies = below(kind)
+    run = simulate(above(spring), **bodies)
+    decay, mass = 0.5 * C / (2.0 + M), 2.0 + M
+    omega = np.sqrt(K / mass - decay**2)
+    exact = -0.3 * 2.0 / mass / omega * np.exp(-decay * run.time) * np.sin(omega * run.time)
+    assert np.abs(run.y - exact).max() < 1e-11
+    assert run.summary["degree"] == 2
+
+
+@pytest.mark.parametrize(("kind", "said", "degree"), [
+    ("own", {}, 2), ("element", {}, 2), ("foreign", {}, 2), ("foreign", {"slopes": False}, 0),
+])  # fmt: skip
+def test_a_degree_that_is_left_out_is_the_one_that_both_bodies_are_made_for(below, kind, said, degree):
+    """A beam without inertia has a deflection of one degree more than the force that its run has."""
+    spring, _ = below(kind, **said)
+    beam = {**load_scene("soft").beam.model_dump(exclude_none=True), "fidelity": "quasi_static", "alpha_b": 0.01}
+    left, given = (
+        simulate(above(spring, beam=beam, coupling={"macro_step": 0.01, **asked})) for asked in ({}, {"degree": degree})
+    )
+    assert left.summary["degree"] == degree
+    assert left.steps.tobytes() == given.steps.tobytes()
+
+
+@pytest.mark.parametrize(("kind", "upper"), [
+    ("function", "own"), ("function", "element of the caller's"), ("foreign", "element of the caller's"),
+])  # fmt: skip
+def test_steps_of_one_size_are_counted_from_where_the_run_starts(below, kind, upper):
+    """Our beam arrives at 0.1501 s, another body at 0: each time 30 steps of 10 ms remain, and no other is made."""
+    spring, bodies = below(kind, variable=False)
+    start = 0.1501 if upper == "own" else 0.0
+    scene = with_changes(
+        load_scene("soft"),
+        time={"t_end": start + 0.3},
+        beam={"initial_deflection_slope": 0.1501, "n_elements": 4},
+        contact={"law": "compliance", "stiffness": 10.0, "exponent": 1.0},
+        coupling={"macro_step": 0.01},
+        stop=None,
+        spring=None,
+    )
+    scene = with_changes(scene, spring=spring)
+    if "lower" in bodies:
+        bodies["lower"].abilities = Abilities(any_size=False)
+    if upper != "own":
+        bodies["upper"] = PointMass(1.0, displacement=0.1501, velocity=-1.0)
+    run = simulate(scene, **bodies)
+    assert run.time[0] == pytest.approx(start, rel=1e-12)
+    assert run.steps["size"][1:] == pytest.approx(np.full(30, 0.01), rel=1e-9)
