@@ -195,6 +195,26 @@ class Body:
         end = self._trial(time, h)
         return None if end is None else 6.0 * (end.displacement - w - h * v) / (h * h) - 2.0 * (end.velocity - v) / h
 
+    def decay(self, time: float, size: float, speed: float) -> float | None:
+        """Return by how much ẅ of the end falls for each unit of velocity that an impulse gives it [1/s].
+
+        It follows from the modes. Of a body that has none, two trial steps at ``time`` [s] as of `trial_acceleration`
+        tell it, one of them after an impulse that changes its velocity by ``speed`` [m/s]. ``None`` if it makes none.
+        """
+        modes = self.modes()
+        if modes is not None:
+            _, damping, tip = modes
+            return float(tip**2 @ damping) / (float(tip @ tip) or 1.0)
+        before, free = self.state, self.trial_acceleration(time, size)
+        if free is None or not self.abilities.impulse:
+            return None
+        try:
+            self.apply_impulse(self.mass * speed)
+            struck = self.trial_acceleration(time, size)
+        finally:
+            self.state = before
+        return None if struck is None else (free - struck) / speed
+
     def _trial(self, time: float, size: float) -> Motion | None:
         """Return the motion after a step with nothing at the end, which is then undone; ``None`` if it cannot be."""
         if self.state is None:

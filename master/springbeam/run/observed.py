@@ -90,15 +90,15 @@ def unknown(scene: Scene, pair: Pair) -> str | None:
 
 
 def coarse_force(pair: Pair) -> str | None:
-    """Return a warning that names the body whose acceleration is not known, so that C is that of the steps."""
+    """Return a warning that names a body of unknown acceleration or damping, so that C is that of the steps."""
     places = (("beam", pair.upper), ("spring", pair.lower))
     silent = [f"[{table}]" for table, body in places if body in pair.without_acceleration]
     if not silent:
         return None
     return (
-        f"the body in {' and '.join(silent)} does not say its acceleration; the force between joined ends, and when "
-        "they part, is only as exact as the force of a step: name its variable in acceleration, or take a smaller "
-        "coupling.macro_step"
+        f"the body in {' and '.join(silent)} does not say its acceleration, or how damping changes it; the force "
+        "between joined ends, and when they part, is only as exact as the force of a step: name its variable in "
+        "acceleration, or take a smaller coupling.macro_step"
     )
 
 

@@ -136,8 +136,9 @@ class Pair:
         self.law = self.interface.soft
         #: μ of ends that a rigid law joins, whose mismatch of velocities a step turns round [kg]; else 0.
         self.turned_mass = self.interface.reduced_mass() if self.law is None else 0.0
-        #: The bodies that could not say an acceleration when it was asked for.
+        #: The bodies that could not say an acceleration, or how damping changes it, when it was asked for.
         self.without_acceleration: list[Body] = []
+        self._decays: dict[int, float] = {}  #: `Body.decay` of those that have been asked, by `id`
         #: Whether they are joined for good.
         self.lasting = self.interface.lasting
         #: Whether contact opens and closes inside steps, without an event that ends them.
@@ -232,15 +233,20 @@ class Pair:
         tip, low = ends = self.ends()
         if phase.joint is Joint.FREE or self.law is not None:
             return ends
-        share = 0.0 if phase.seated else self.tip_share
-        common = low.velocity + share * (tip.velocity - low.velocity)
+        common = self._common_velocity(phase, ends)
         return tip._replace(velocity=common), low._replace(velocity=common)
+
+    def _common_velocity(self, phase: Phase, ends: Ends) -> float:
+        """Return the velocity of ``ends`` that a rigid law joins [m/s]."""
+        tip, low = ends
+        share = 0.0 if phase.seated else self.tip_share
+        return low.velocity + share * (tip.velocity - low.velocity)
 
     def present(self, phase: Phase, step: Step, macro_step: float, *, changed: bool = False) -> Present:
         """Return C and N at the end of ``step``, where the bodies are, in ``phase``.
 
-        C of a soft law is the law's. Of ends that a rigid law joins it is what gives them one acceleration: no mismatch
-        of their velocities is in it, which the forces of steps turn round.
+        C of a soft law is the law's. Of ends that a rigid law joins it is what gives them one acceleration at their
+        common velocity: no mismatch of their velocities is in it, which the forces of steps turn round.
 
         Parameters
         ----------
@@ -253,6 +259,7 @@ class Pair:
         tip, low = self.ends()
         if changed and self.loads.any:
             self.loads.act(time + size, macro_step)
+        load = force.value(self.lower.load_on_end(), 0.0 if changed else size) if phase.seated else 0.0
         if self.law is not None:
             C = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
         elif phase.joint is Joint.FREE:
@@ -269,7 +276,7 @@ class Pair:
             assert self.interface.floor is not None
             self.mark()  # from where a body may try which force holds it
             self._holding = self.lower.holding_force(self.interface.floor, 0.0)
-        return Present(C, self._holding - force.value(self.lower.load_on_end(), 0.0 if changed else size) + C)
+        return Present(C, self._holding - load + C)
 
     def let_go_by(self, phase: Phase) -> EventKind | None:
         """Return the event that ends ``phase`` where a force that can only push would pull; ``None`` if all may."""
@@ -289,22 +296,42 @@ class Pair:
     def _multiplier(self, phase: Phase, time: float, macro_step: float, acting: float, *, changed: bool) -> float:
         """Return C = −μ (ü − ÿ) of joined ends [N], ü and ÿ without it; ``acting`` [N] where a body cannot tell.
 
-        1/μ = 1/m_tip + 1/m; an end that does not move has an infinite mass.
+        1/μ = 1/m_tip + 1/m; an end that does not move has an infinite mass. Both accelerations are those at the common
+        velocity: damping turns the rest of a velocity into a force.
         """
         apart = 0.0
         mobility = 0.0
+        common = self._common_velocity(phase, self.ends())
         for body, sign in ((self.upper, 1.0), (self.lower, -1.0)):
             if body.mass == inf or (phase.seated and body is self.lower):
                 continue
             told = None if changed else body.acceleration()
-            free = body.trial_acceleration(time, macro_step) if told is None else told - sign * acting / body.mass
+            if told is None:
+                if self.loads.any:
+                    self.loads.act(time, macro_step)
+                free = body.trial_acceleration(time, macro_step)
+            else:
+                free = told - sign * acting / body.mass
             if free is None:
                 if body not in self.without_acceleration:
                     self.without_acceleration.append(body)
                 return acting
+            excess = body.motion().velocity - common
+            if excess != 0.0:
+                free += self._decay(body, time, macro_step) * excess
             apart += sign * free
             mobility += 1.0 / body.mass
         return -apart / mobility if mobility > 0.0 else acting
+
+    def _decay(self, body: Body, time: float, macro_step: float) -> float:
+        """Return `Body.decay` of ``body``, asked once; 0 where that is not known."""
+        if id(body) not in self._decays:
+            speed = max(abs(end.velocity) for end in self.ends())
+            found = body.decay(time, macro_step, speed)
+            if found is None:
+                self.without_acceleration.append(body)
+            self._decays[id(body)] = found or 0.0
+        return self._decays[id(body)]
 
     def reduced_mass(self, phase: Phase) -> float:
         """Reduced mass of both ends [kg]; the tip's mass while the lower end is seated."""
