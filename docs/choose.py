@@ -9,7 +9,7 @@ from pages import table, write_section  # beside this script
 
 from springbeam import Scene, load_scene, simulate, with_changes
 from springbeam.results.totals import totals
-from springbeam.scene.messages import beginning
+from springbeam.scene.files import beginning
 
 #: Laws, and numbers of linear elements.
 LAWS = ("transmission", "compliance")

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-__version__: str
+from .lazily import attached
 
 if TYPE_CHECKING:
+    __version__: str
     from .api import RunStopped, Simulation, Trajectory, load, simulate
     from .bodies.elements import PointMass, RigidWall, SpringDamper
     from .bodies.protocol import Body, Energies, Motion
     from .results.trajectory import Event
     from .scene import Scene, SceneError, load_scene, with_changes
+else:
+    __getattr__ = attached(
+        __name__,
+        {
+            "api": ("RunStopped", "Simulation", "Trajectory", "load", "simulate"),
+            "bodies.elements": ("PointMass", "RigidWall", "SpringDamper"),
+            "bodies.protocol": ("Body", "Energies", "Motion"),
+            "results.trajectory": ("Event",),
+            "scene": ("Scene", "SceneError", "load_scene", "with_changes"),
+            "version": ("__version__",),
+        },
+    )
 
 __all__ = [
     "Body",
@@ -33,30 +45,6 @@ __all__ = [
     "simulate",
     "with_changes",
 ]
-
-_HOME = {
-    name: home
-    for home, names in {
-        "api": ("RunStopped", "Simulation", "Trajectory", "load", "simulate"),
-        "bodies.elements": ("PointMass", "RigidWall", "SpringDamper"),
-        "bodies.protocol": ("Body", "Energies", "Motion"),
-        "results.trajectory": ("Event",),
-        "scene": ("Scene", "SceneError", "load_scene", "with_changes"),
-    }.items()
-    for name in names
-}
-
-
-def __getattr__(name: str) -> Any:
-    # FMPy and scipy take a second to load: only for what needs them.
-    if name in _HOME:
-        return getattr(import_module(f".{_HOME[name]}", __name__), name)
-    if name == "__version__":
-        from importlib.metadata import version
-
-        globals()[name] = found = version("springbeam")
-        return found
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -15,10 +15,10 @@ from runs import block
 
 import springbeam.run.runner
 from springbeam import Event, RunStopped, load_scene, with_changes
-from springbeam.cli.look import results_of
 from springbeam.results.directory import PICTURES
 from springbeam.results.files import load_trajectory
 from springbeam.results.totals import totals
+from springbeam.studies.beside import results_of
 
 SUMMARY = {"status": "done", "macro_steps": 31, "wall_time": 0.25, "max_energy_residual": 3e-14, "warnings": []}
 

@@ -12,8 +12,9 @@ from springbeam.bodies.quasi_static import QuasiStaticBeam
 from springbeam.contact.events import Holding
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import assemble, constant_forces
-from springbeam.scene import Beam, Coupling, statics, suspicions
+from springbeam.scene import Beam, Coupling, statics
 from springbeam.scene.statics import SHAPE_POINTS
+from springbeam.scene.suspicions import suspicions
 
 BEAM = Beam.with_ones(
     density=2.0, area=0.5, second_moment_of_area=0.3, young_modulus=30.0, shear_modulus=50.0, shear_coefficient=0.8,

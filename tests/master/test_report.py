@@ -19,7 +19,7 @@ from springbeam.pictures.report import page
 from springbeam.results.directory import REPORT
 from springbeam.results.trajectory import TOLD
 from springbeam.scene import scene_from_dict, with_changes
-from springbeam.scene.reading import tomllib
+from springbeam.scene.files import tomllib
 
 VOID = {"meta", "input", "br", "link", "img", "hr"}
 

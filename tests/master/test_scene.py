@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from scenes import SOFT, scene_from_dict
 
 import springbeam
-from springbeam.scene import Beam, Scene, SceneError, load_scene, messages, suspicions, with_changes
-from springbeam.scene.reading import tomllib
-from springbeam.scene.suspicions import implausible
+from springbeam.scene import Beam, Scene, SceneError, load_scene, messages, with_changes
+from springbeam.scene.files import tomllib
+from springbeam.scene.suspicions import implausible, suspicions
 
 TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("scenes.toml").read_text(encoding="utf-8"))
 

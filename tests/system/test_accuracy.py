@@ -16,7 +16,7 @@ from springbeam.results.recording import MemoryRecorder
 from springbeam.run import accuracy as search
 from springbeam.run.accuracy import simulate
 from springbeam.run.runner import run
-from springbeam.scene.reading import tomllib
+from springbeam.scene.files import tomllib
 from springbeam.studies.crosscheck import orders
 
 sys.path.append(str(Path(__file__).parents[1] / "campaign"))

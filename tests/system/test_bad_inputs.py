@@ -13,7 +13,7 @@ import tomli_w
 from commands import printed, refused
 
 from springbeam.scene import load_scene, messages, scene_from_dict, shipped_scenes
-from springbeam.scene.reading import tomllib
+from springbeam.scene.files import tomllib
 
 TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("bad_inputs.toml").read_text(encoding="utf-8"))
 COMMANDS = TABLE["commands"]

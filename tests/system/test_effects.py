@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from springbeam import SceneError, load_scene, simulate, with_changes
-from springbeam.scene import suspicions
-from springbeam.scene.suspicions import EFFECTS
+from springbeam.scene.suspicions import EFFECTS, suspicions
 
 #: The tip meets the spring at once, and the spring strikes the stop after some ms.
 SOFT = with_changes(

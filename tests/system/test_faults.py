@@ -15,7 +15,7 @@ from commands import HANGS, command, written
 from faulty import NAMES, Fault, installed
 
 from springbeam.results.files import load_trajectory
-from springbeam.scene.reading import tomllib
+from springbeam.scene.files import tomllib
 
 PATH = Path(__file__).with_name("faults.toml")
 SCENE = tomllib.loads(PATH.read_text(encoding="utf-8"))

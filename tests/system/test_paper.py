@@ -14,7 +14,7 @@ from springbeam.bodies import fmu_bodies
 from springbeam.bodies.protocol import StepRefused
 from springbeam.paper import co_simulation, monolithic
 from springbeam.paper.problem import AlgorithmFailure
-from springbeam.scene.reading import tomllib
+from springbeam.scene.files import tomllib
 
 PROGRAMS = {"monolithic": monolithic, "co_simulation": co_simulation}
 RECORDED = tomllib.loads(Path(__file__).with_name("paper.toml").read_text(encoding="utf-8"))

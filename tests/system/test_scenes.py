@@ -11,7 +11,7 @@ from references import integrated_anew
 from springbeam import RunStopped, load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
 from springbeam.results.contact_times import contact_changes
-from springbeam.scene.reading import tomllib
+from springbeam.scene.files import tomllib
 
 TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("scenes.toml").read_text(encoding="utf-8"))
 CASES = TABLE["cases"]

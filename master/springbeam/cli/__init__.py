@@ -1,6 +1,7 @@
 """The ``springbeam`` command: one module per group of commands.
 
-A command is a thin function: it reads its input, calls the library, prints.
+A command is a thin function: it reads its input, calls the library, prints. Its module is loaded when it is asked for,
+and what it calls when it is called: so that a command answers at once. ``--help`` loads the modules of all commands.
 Exit codes: 0 done, 1 a check failed, 2 bad input, 3 the run stopped early (what was computed is on disk), 4 a run
 cannot be compared (`crosscheck`).
 """
@@ -11,13 +12,15 @@ import errno
 import os
 import sys
 import textwrap
-from collections.abc import Callable
-from typing import Annotated
+from functools import partial
+from importlib import import_module
+from typing import Annotated, Any
+
+# Typer checks arguments by pydantic, which else looks through all installed packages for plugins.
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 import typer
 
-from ..studies.tables import Findings
-from . import checks, look, paper, run, scenes, studies
 from .common import STOPPED, Command, Commands
 
 _WHAT = "A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs."
@@ -74,13 +77,27 @@ def _common(
         typer.echo("springbeam --help lists all commands, springbeam COMMAND --help their options.")
 
 
-_COMMANDS: dict[str, tuple[Callable[..., Findings], ...]] = {
-    "Scenes": (scenes.scenes, scenes.keys, scenes.new),
-    "Run": (run.run, studies.sweep, paper.paper),
-    "Look": (look.report, look.plot, look.animate, look.export, look.compare, look.spectrum, studies.fit),
-    "Choose scheme and accuracy": (scenes.predict, studies.tradeoff, studies.converge),
-    "Check": (studies.crosscheck, studies.stability, checks.doctor),
+#: Names of commands under the titles of ``--help``, by the module that has their function.
+_TITLES: dict[str, dict[str, tuple[str, ...]]] = {
+    "Scenes": {"scenes": ("scenes", "keys", "new")},
+    "Run": {"run": ("run",), "studies": ("sweep",), "paper": ("paper",)},
+    "Look": {"look": ("report", "plot", "animate", "export", "compare", "spectrum"), "studies": ("fit",)},
+    "Choose scheme and accuracy": {"scenes": ("predict",), "studies": ("tradeoff", "converge")},
+    "Check": {"studies": ("crosscheck", "stability"), "checks": ("doctor",)},
 }
-for title, commands in _COMMANDS.items():
-    for command in commands:
-        app.command(cls=Command, rich_help_panel=title)(command)
+
+
+def _made(name: str, module: str, title: str) -> Any:
+    """Return a command; only now its module is loaded."""
+    alone = typer.Typer(add_completion=False)
+    function = getattr(import_module(f".{module}", __name__), name)
+    alone.command(cls=Command, rich_help_panel=title)(function)
+    return typer.main.get_command(alone)
+
+
+Commands.makers = {
+    name: partial(_made, name, module, title)
+    for title, modules in _TITLES.items()
+    for module, names in modules.items()
+    for name in names
+}

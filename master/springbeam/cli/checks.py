@@ -9,17 +9,16 @@ import textwrap
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.text import Text
 
-from ..bodies.archive import ENDINGS, fmi_version, fmu_directory, own_fmu
-from ..bodies.protocol import FmuError, StepRefused
-from ..scene import Scene, load_scene
-from ..scene.partners import kind_of
 from ..studies.tables import Findings, table
 from .common import BAD_INPUT, DISAGREES, JsonOption, SettingsOption
+
+if TYPE_CHECKING:
+    from ..scene import Scene
 
 _PACKAGES = (
     *("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "plotly", "pebble", "pyarrow"),
@@ -42,7 +41,11 @@ def doctor(
     Example: springbeam doctor my-scene.toml
     """
     if scene is not None:
+        from ..scene import load_scene
+
         return _examine(load_scene(scene, settings or ()))
+    from ..bodies.archive import ENDINGS, fmi_version, fmu_directory
+
     installed = {package.name.lower(): package.version for package in metadata.distributions()}
     versions = {name: installed.get(name) for name in _PACKAGES}
     fmus = [_asked(name, version) for version in ENDINGS for name in ("beam", "spring")]
@@ -72,7 +75,9 @@ def doctor(
 
 def _asked(name: str, version: str) -> dict[str, Any]:
     """Return how far our FMU is off an exact answer, or why it gives none."""
+    from ..bodies.archive import own_fmu
     from ..bodies.known_answers import QUESTIONS
+    from ..bodies.protocol import FmuError, StepRefused
 
     question, path = QUESTIONS[name], own_fmu(name, version)
     found = {"path": path, "fmi": version, "answer": question.words, "exact": question.exact, "bound": question.bound}
@@ -89,6 +94,7 @@ def _examine(scene: Scene) -> Findings:
     from ..bodies.factory import findings
     from ..bodies.gate import OFFERED, refusals
     from ..bodies.units import described
+    from ..scene.partners import kind_of
 
     found, shown = findings(scene), list[Any]()
     for name, body in {"beam": scene.upper, "spring": scene.lower}.items():

@@ -13,22 +13,22 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn
 
 import typer
 from rich.console import Console
-from rich.progress import Progress, ProgressColumn
 from rich.text import Text
 from typer.core import TyperCommand, TyperGroup
 
-from ..bodies.protocol import FmuError
+from .. import scene
 from ..results.directory import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory
-from ..results.files import as_json as json_of
-from ..scene import ArgumentError, SceneError, scene_keys, shipped_scenes
 from ..studies.tables import Findings
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, ProgressColumn
 
 DISAGREES = 1
 BAD_INPUT = 2
@@ -46,12 +46,12 @@ PATIENCE = 5.0
 
 def complete_scene(incomplete: str) -> list[str]:
     """Return the shipped scenes that begin with the text typed; without any, the shell offers files."""
-    return [name for name in shipped_scenes() if name.startswith(incomplete)]
+    return [name for name in scene.shipped_scenes() if name.startswith(incomplete)]
 
 
 def complete_key(incomplete: str) -> list[str]:
     """Return the keys of a scene that begin with the text typed, each as ``table.key=``."""
-    return [f"{name}=" for name in scene_keys() if name.startswith(incomplete)]
+    return [f"{name}=" for name in scene.scene_keys() if name.startswith(incomplete)]
 
 
 SceneArgument = Annotated[
@@ -93,7 +93,20 @@ NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help="Draw no picture
 
 
 class Commands(TyperGroup):
-    """All commands. One that is gone says what to do instead."""
+    """All commands, each made when it is asked for. One that is gone says what to do instead."""
+
+    #: What makes a command, by its name.
+    makers: ClassVar[dict[str, Callable[[], Any]]] = {}
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given)
+        unmade: dict[str, Any] = dict.fromkeys(self.makers)
+        self.commands.update(unmade)
+
+    def get_command(self, ctx: Any, name: str) -> Any:
+        if name in self.makers and self.commands[name] is None:
+            self.commands[name] = self.makers[name]()
+        return super().get_command(ctx, name)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         _refuse_gone(args[:1])
@@ -147,6 +160,8 @@ def console_for(*, silent: bool) -> Console:
 
 def progress_bar(*columns: ProgressColumn, quiet: bool) -> Progress:
     """Return a progress bar on stderr, which shows if that is a terminal."""
+    from rich.progress import Progress
+
     console = Console(stderr=True)
     return Progress(
         *columns, console=console, transient=True, redirect_stdout=False, disable=quiet or not console.is_terminal
@@ -160,6 +175,8 @@ def say(found: Findings, *, quiet: bool, as_json: bool) -> None:
     and infinity become strings.
     """
     if as_json:
+        from ..results.document import as_json as json_of
+
         typer.echo(json_of(found.document).decode())
     elif quiet and found.where is not None:
         typer.echo(found.where)
@@ -208,16 +225,22 @@ def bad_input_reported() -> Iterator[None]:
         yield
     except ResultsExist as error:
         fail(BAD_INPUT, f"{error}; --force replaces them, --out DIR puts the new ones elsewhere")
-    except ArgumentError as error:
-        fail(BAD_INPUT, error.typed)
-    except (SceneError, FmuError, ResultsInUse, ResultsUnreadable) as error:
-        fail(BAD_INPUT, str(error))
-    except BrokenPipeError:
+    except (BrokenPipeError, typer.Exit):
         raise
     except FileExistsError as error:
         fail(BAD_INPUT, f"{error.filename}: is a file; --out DIR names a directory, new or without results")
     except OSError as error:
         fail(BAD_INPUT, cause_of(error, "results"))
+    except scene.ArgumentError as error:
+        fail(BAD_INPUT, error.typed)
+    except (scene.SceneError, ResultsInUse, ResultsUnreadable, _fmu_error()) as error:
+        fail(BAD_INPUT, str(error))
+
+
+def _fmu_error() -> type[Exception]:
+    from ..bodies.protocol import FmuError
+
+    return FmuError
 
 
 def cause_of(error: BaseException, place: Path | str) -> str:

@@ -9,8 +9,6 @@ from typing import Annotated, Literal
 import typer
 
 from ..results.directory import RunDirectory
-from ..results.recording import FileRecorder
-from ..scene import load_scene
 from ..studies.tables import Findings
 from .common import STOPPED, ForceOption, JsonOption, NoPlotsOption, QuietOption, SettingsOption, fail
 from .run import carry_out
@@ -43,6 +41,8 @@ def paper(
     from ..paper import co_simulation, figures
     from ..paper import monolithic as as_one_system
     from ..paper.problem import AlgorithmFailure
+    from ..results.recording import FileRecorder
+    from ..scene import load_scene
 
     scene = load_scene(f"paper-fig{figure}", settings or ())
     failed = ""

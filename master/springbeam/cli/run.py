@@ -9,22 +9,13 @@ from functools import partial
 from math import inf
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
-from ..bodies.protocol import FmuError
 from ..results.directory import OVERVIEW, RunDirectory
-from ..results.files import load_events, load_summary, load_trajectory
-from ..results.recording import FileRecorder
-from ..results.totals import in_words
-from ..results.trajectory import Event, Trajectory, cascades, rounded
-from ..run.outcome import Progress
-from ..scene import Scene, load_scene
-from ..scene.suspicions import implausible
 from ..studies.tables import Findings, table
 from .common import (
     BAD_INPUT,
@@ -39,6 +30,12 @@ from .common import (
     fail,
     progress_bar,
 )
+
+if TYPE_CHECKING:
+    from ..results.recording import FileRecorder
+    from ..results.trajectory import Event, Trajectory
+    from ..run.outcome import Progress
+    from ..scene import Scene
 
 #: Most rows that --output-interval may ask for.
 _MOST_ROWS = 10_000_000
@@ -81,6 +78,10 @@ def run(
 
     Example: springbeam run soft --set coupling.macro_step=5e-4 --out results/fine
     """
+    from ..results.recording import FileRecorder
+    from ..scene import load_scene
+    from ..scene.suspicions import implausible
+
     what = load_scene(scene, settings or (), accuracy)
     _refuse_options(what, interval)
     for line in () if quiet or as_json else implausible(what):
@@ -129,6 +130,8 @@ def carry_out(
 
     Raises what keeps the run from recording anything.
     """
+    from ..bodies.protocol import FmuError
+    from ..results.files import load_events, load_summary
     from ..run.outcome import RunStopped
     from ..run.runner import run as run_scene
 
@@ -159,6 +162,7 @@ def carry_out(
 def _drawn(directory: Path, names: Sequence[str]) -> Findings:
     """Draw pictures of the run in ``directory``; an error is that there is no room for them, or no time."""
     from ..pictures.plots import plot_run  # matplotlib takes a second to load
+    from ..results.files import load_trajectory
 
     try:
         pictures = plot_run(load_trajectory(directory), directory, names)
@@ -171,6 +175,8 @@ def _drawn(directory: Path, names: Sequence[str]) -> Findings:
 @contextmanager
 def _progress(t_end: float, *, quiet: bool) -> Iterator[Progress]:
     """Show simulated time, phase and speed on stderr, if that is a terminal."""
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
     state, left = TextColumn("{task.fields[state]}"), TimeRemainingColumn()
     with progress_bar(BarColumn(bar_width=20), TaskProgressColumn(), state, left, quiet=quiet) as bar:
         task = bar.add_task("", total=t_end, state="starting")
@@ -190,6 +196,8 @@ def _progress(t_end: float, *, quiet: bool) -> Iterator[Progress]:
 
 def _in_words(scene: Scene, summary: Mapping[str, Any], events: list[Event]) -> Iterator[str | Text | Table]:
     """Yield what a run has come to: its events, totals, residuals and warnings."""
+    from ..results.totals import in_words
+
     yield Text(scene.title or "(untitled scene)", style="bold")
     if events:
         yield _event_table(events, scene)
@@ -227,6 +235,8 @@ def picked_in_words(accuracy: Mapping[str, Any]) -> str:
 
 def _event_table(events: list[Event], scene: Scene) -> Table:
     """Return the events as a table; of a cascade the first one, and the sums over the others."""
+    from ..results.trajectory import cascades, rounded
+
     position, speed = ("u_tip", "v_tip") if scene.lower is None else ("y", "z")
     columns = (
         *("event", "time\n[s]:.8f", f"{position}\n[m]:", f"{speed}\n[m/s]:"),

@@ -12,14 +12,14 @@ from typing import Annotated, Any
 import typer
 from rich.text import Text
 
-from ..results.files import as_json as json_of
-from ..scene import load_scene, shipped_scenes
-from ..scene.messages import MODELS
+from ..scene.files import beginning, shipped_scenes, tables_of
 from ..studies.tables import Findings, table
 from .common import BAD_INPUT, JsonOption, SceneArgument, SettingsOption, fail
 
 
 def _complete_table(incomplete: str) -> list[str]:
+    from ..scene.messages import MODELS
+
     return [name for name in MODELS if name and name.startswith(incomplete)]
 
 
@@ -30,11 +30,10 @@ def scenes(as_json: JsonOption = False) -> Findings:
     """
     listed: list[dict[str, Any]] = []
     for name, path in shipped_scenes().items():
-        scene = load_scene(path)
-        parts = {"beam": scene.upper, "spring": scene.lower, "stop": scene.stop}
-        contents = [part for part, there in parts.items() if there is not None]
+        scene = tables_of(path)
+        contents = [part for part in ("beam", "spring", "stop") if part in scene]
         listed.append({
-            "name": name, "contains": contents, "t_end": scene.time.t_end, "title": scene.title, "file": path
+            "name": name, "contains": contents, "t_end": scene["time"]["t_end"], "title": scene["title"], "file": path
         })  # fmt: skip
     rows = [(row["name"], row["contains"], row["t_end"], row["title"]) for row in listed]
     shown = table(("scene", "contains", "t_end [s]:g", "title"), rows)
@@ -63,6 +62,8 @@ def keys(
     from ..scene import messages
 
     if schema:
+        from ..results.document import as_json as json_of
+
         found = messages.schema()
         return Findings(found, files=[("", json_of(found).decode())])
     if metrics:
@@ -95,8 +96,6 @@ def new(
 
     Example: springbeam new my_scene
     """
-    from ..scene.messages import beginning
-
     path = Path(name).with_suffix(".toml")
     if path.exists():
         fail(BAD_INPUT, f"{path}: already there; give another NAME")
@@ -117,6 +116,7 @@ def predict(
 
     Example: springbeam predict soft --set coupling.macro_step=4e-3
     """
+    from ..scene import load_scene
     from ..studies.stability.predict import predict as prediction_of
 
     what = load_scene(scene, settings or ())

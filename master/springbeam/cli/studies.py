@@ -17,10 +17,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from .. import scene as scenes
 from ..results.directory import ResultsExist, RunDirectory
-from ..scene import load_scene
 from ..studies.tables import Findings
 from .common import (
     STOPPED,
@@ -110,6 +109,8 @@ def find(once: Once, scene: str, frame: Frame) -> Findings:
 
     The directory is ``out``, else ``results/SCENE-KIND``, or with -2, -3, … behind it where there are results.
     """
+    from rich.progress import TextColumn, TimeElapsedColumn
+
     from ..monolithic.hybrid_system import ReferenceFailure
     from ..run.outcome import RunStopped
 
@@ -187,6 +188,8 @@ def _going_on(records: Records, total: int) -> Iterator[None]:
 
 def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
     """Return all records, and show meanwhile how far it is."""
+    from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
+
     from ..studies.engine import dask_cluster
 
     total, there = len(study.cases()), len(records.by_name)
@@ -255,7 +258,7 @@ def sweep(
     from ..studies.sweep import Sweep
 
     return Sweep(
-        scene=load_scene(scene, settings or ()),
+        scene=scenes.load_scene(scene, settings or ()),
         vary=tuple(vary or ()),
         samples=samples,
         sampling=sampling,
@@ -294,7 +297,7 @@ def fit(
     from ..studies.fit import asked
     from ..studies.fit import fit as find_keys
 
-    what = load_scene(scene, settings or ())
+    what = scenes.load_scene(scene, settings or ())
     announced = "some 25 runs for each key, five times as many where the clock is to be found"
     asked(what, measured, vary or (), names or (), read or ())
     find = partial(find_keys, what, measured, vary or (), names=names or (), read=read or (), shift=shift)
@@ -326,7 +329,7 @@ def tradeoff(
     """
     from ..studies.tradeoff import Tradeoff
 
-    return Tradeoff.of(load_scene(scene, settings or ()), until, repeats=repeats, quick=quick)
+    return Tradeoff.of(scenes.load_scene(scene, settings or ()), until, repeats=repeats, quick=quick)
 
 
 @study_command()
@@ -346,7 +349,7 @@ def converge(
     from ..studies.converge import converge as settle
     from ..studies.metrics import metrics_of
 
-    what = load_scene(scene, settings or ())
+    what = scenes.load_scene(scene, settings or ())
     metrics_of(metric or QUANTITIES)
     announced = f"{len(meshes(what, levels))} runs"
     return Once("converge", announced, partial(settle, what, levels=levels, metric=metric or ()))
@@ -372,7 +375,7 @@ def crosscheck(
     from ..monolithic import event_driven
     from ..studies import crosscheck as study
 
-    what = load_scene(scene, settings or ())
+    what = scenes.load_scene(scene, settings or ())
     event_driven.refuse(what)
     made = picked(what)
     compared = what if made is None else made.scene

@@ -21,6 +21,7 @@ from pydantic_core import to_json
 from ..scene import scene_from_dict
 from .columns import trajectory_of
 from .directory import PARQUET, ResultsUnreadable, RunDirectory
+from .document import as_json
 from .steps import STEP, steps_of
 from .trajectory import EVENT_COLUMNS, PHASES, SHAPE_COLUMNS, Event, Trajectory
 
@@ -52,11 +53,6 @@ def write_summary(run: RunDirectory, summary: Mapping[str, Any]) -> None:
     """Replace ``summary.json``. Raises OSError; the file is then as before."""
     with replaced(run.summary) as file:
         file.write(as_json(summary) + b"\n")
-
-
-def as_json(document: Any) -> bytes:
-    """Return ``document`` as JSON; NaN and infinity become strings, because JSON has no such numbers."""
-    return to_json(document, indent=2, inf_nan_mode="strings", fallback=lambda value: value.tolist())
 
 
 @contextmanager

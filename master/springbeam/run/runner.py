@@ -18,7 +18,8 @@ from ..bodies.protocol import Body
 from ..contact.interface import Rigid
 from ..results.recording import MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
-from ..scene import Scene, SceneError, as_scene, suspicions
+from ..scene import Scene, SceneError, as_scene
+from ..scene.suspicions import suspicions
 from .master import Master
 from .outcome import Progress, RunStopped
 from .setup import set_up

@@ -1,19 +1,37 @@
 """What is simulated: scene files, their keys, and what follows from them before anything is built or loaded.
 
-Imports nothing else of the package. Floors, from below: ``tables`` (the keys), ``loads`` (those of ``[[loads]]``, and
-each load as a function of time; ``recorded`` reads its file) → ``statics`` → ``scene`` (all tables) → ``linearised``
-(energies and frequencies), ``messages`` (keys and errors in words) → ``rules`` (errors and warnings) → ``reading``
-(files, overrides; start here) → ``resolution`` (are steps short enough, which scheme). ``shipped/`` has the scenes that
-come with the package.
+Imports nothing else of the package. Floors, from below: ``tables`` (the keys), ``laws`` and ``loads`` (those of
+``[contact]`` and ``[[loads]]``; ``recorded`` reads the file of a load) → ``scene`` (all tables) → ``messages`` (keys
+and errors in words): these load numpy when they compute. ``statics`` → ``linearised`` (energies and frequencies) →
+``rules`` (errors and warnings) → ``reading`` (files, overrides; start here) → ``resolution`` (are steps short enough,
+which scheme). ``files`` reads TOML; ``shipped/`` has the scenes that come with the package.
 """
 
-from .laws import Contact
-from .loads import Load
-from .messages import key_kind, scene_keys
-from .reading import as_scene, load_scene, parse_value, scene_from_dict, shipped_scenes, with_changes
-from .scene import SAME, Scene
-from .suspicions import suspicions
-from .tables import ArgumentError, Beam, Coupling, SceneError, Spring, Stop, Time
+from typing import TYPE_CHECKING
+
+from ..lazily import attached
+
+if TYPE_CHECKING:
+    from .files import parse_value, shipped_scenes
+    from .laws import Contact
+    from .loads import Load
+    from .messages import key_kind, scene_keys
+    from .reading import as_scene, load_scene, scene_from_dict, with_changes
+    from .scene import SAME, Scene
+    from .tables import ArgumentError, Beam, Coupling, SceneError, Spring, Stop, Time
+else:
+    __getattr__ = attached(
+        __name__,
+        {
+            "files": ("parse_value", "shipped_scenes"),
+            "laws": ("Contact",),
+            "loads": ("Load",),
+            "messages": ("key_kind", "scene_keys"),
+            "reading": ("as_scene", "load_scene", "scene_from_dict", "with_changes"),
+            "scene": ("SAME", "Scene"),
+            "tables": ("ArgumentError", "Beam", "Coupling", "SceneError", "Spring", "Stop", "Time"),
+        },
+    )
 
 __all__ = [
     "SAME",
@@ -34,6 +52,5 @@ __all__ = [
     "scene_from_dict",
     "scene_keys",
     "shipped_scenes",
-    "suspicions",
     "with_changes",
 ]

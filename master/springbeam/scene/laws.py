@@ -14,13 +14,18 @@ again, independently, asks for a law's name. ``docs/contributing.md`` says how a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
-import numpy as np
 from pydantic import model_validator
 from typing_extensions import Self
 
+from ..lazily import Later
 from .tables import OneOf, Table, key
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = Later("numpy")
 
 # -- forces ------------------------------------------------------------------------------------------------------------
 

@@ -11,15 +11,18 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
 from pydantic import Field, model_validator
 from typing_extensions import Self
 
+from ..lazily import Later
 from .recorded import Reading, Recorded
 from .tables import OneOf, Table, key
 
 if TYPE_CHECKING:
+    import numpy as np
     from scipy.interpolate import PPoly
+else:
+    np = Later("numpy")
 
 #: So many lines of a table in a step are data, and no kinks that are worth the end of one.
 LINES_IN_STEP = 4

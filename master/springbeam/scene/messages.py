@@ -11,10 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 from typing import Any, NamedTuple
-
-import tomli_w
 
 from .laws import LAW
 from .loads import SIGNAL
@@ -180,11 +177,6 @@ def _default(model: type[Table], name: str, key: Mapping[str, Any]) -> str:
         return "needed" + (", or dimensionless" if name in model.SCALES else "")
     default = key.get("default")
     return "none" if default in (None, "") else str(default).lower()
-
-
-def beginning(title: str) -> str:
-    """Return a commented scene file to start from: an aluminium beam above a rubber bumper above a stop."""
-    return tomli_w.dumps({"title": title}) + Path(__file__).with_name("beginning.toml").read_text(encoding="utf-8")
 
 
 # -- errors ------------------------------------------------------------------------------------------------------------

@@ -3,30 +3,17 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from .files import parse_value, shipped_scenes, tables_of
 from .messages import VARIANTS, explain, models_of, nearest, one_line
 from .rules import impossible
 from .scene import TABLES, Scene, split_key
 from .tables import PICKED_BY_ACCURACY, ArgumentError, SceneError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
-
-def shipped_scenes() -> dict[str, Path]:
-    """Return names and files of the scenes that come with the package."""
-    folder = Path(str(resources.files("springbeam.scene") / "shipped"))
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
 def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy: float | None = None) -> Scene:
@@ -48,7 +35,7 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy
     """
     path, overrides = _scene_file(path_or_name), list(overrides)
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        data = tables_of(path)
     except (OSError, ValueError, RecursionError) as error:
         raise SceneError(
             f"{path}: cannot be read as TOML: {one_line(str(error), 200)}; a line is a [table] or key = value, with "
@@ -96,17 +83,6 @@ def _settings(overrides: Iterable[str]) -> dict[str, dict[str, Any]]:
             raise ArgumentError(f"--set {override}: must be TABLE.KEY=VALUE, as in coupling.macro_step=1e-3")
         settings.setdefault(split[0], {})[split[1]] = parse_value(value.strip())
     return settings
-
-
-def parse_value(text: str) -> Any:
-    """Return a value given in TOML syntax; a bare word is taken as a string."""
-    with suppress(ValueError, RecursionError):
-        parsed = tomllib.loads(f"value = {text}")
-        if parsed.keys() == {"value"}:
-            return parsed["value"]
-    with suppress(ValueError):
-        return float(text)  # ".5" and "1." are not TOML
-    return text
 
 
 def with_changes(scene: Scene, **changes: Any) -> Scene:

@@ -15,11 +15,15 @@ from collections.abc import Mapping
 from io import BytesIO
 from math import isnan, nan
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
+from ..lazily import Later
 from .tables import Table, key
+
+if TYPE_CHECKING:
+    import numpy as np
+else:
+    np = Later("numpy")
 
 #: Standard gravity [m/s²].
 GRAVITY = 9.80665

@@ -11,7 +11,6 @@ from pydantic import Field
 from .laws import LAW, Contact, SoftLaw, TransmissionContact
 from .loads import SIGNAL, Load
 from .partners import LOWER, UPPER, ForeignFmu, Partner
-from .statics import tip_load_deflection
 from .tables import ORDINARY_SCHEMES, Beam, Coupling, Spring, Stop, Table, Time, key
 
 #: Times closer than the first of these fractions of H are one; a step shorter than the second would drown in rounding.
@@ -145,6 +144,8 @@ class Scene(Table):
             return None
         height: float = getattr(body, body.START)
         if isinstance(body, Beam):
+            from .statics import tip_load_deflection  # numpy, which the keys alone do not need
+
             static = self.massless and body.approach == "elastic" and body.alpha_b == 0.0
             height = tip_load_deflection(body) if static else height * body.length
         return Height(f"{table}.{body.START}", height)

@@ -17,7 +17,6 @@ from operator import or_
 from sys import float_info
 from typing import Annotated, Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import (
     BaseModel,
     ConfigDict,
@@ -87,7 +86,7 @@ def _plain(value: Any) -> Any:
     """Return ``value``, or a dictionary of values, with numbers and arrays of numpy as Python's."""
     if isinstance(value, dict):
         return {name: _plain(content) for name, content in value.items()}
-    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 class Table(BaseModel):

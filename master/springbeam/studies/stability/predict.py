@@ -31,10 +31,11 @@ from ...coupling.projection import penetration_series
 from ...coupling.solver import CONDITIONS
 from ...monolithic.oscillators import GAUSS, Oscillators
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
-from ...scene import Beam, Scene, suspicions
+from ...scene import Beam, Scene
 from ...scene.laws import depth
 from ...scene.linearised import contact_energy, spring_frequency, spring_stiffness
 from ...scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
+from ...scene.suspicions import suspicions
 from ..design import RIGID, SOFT
 
 #: A coupling is called unstable where its spectral radius exceeds 1 by more than this: e-fold growth in 1000 steps.

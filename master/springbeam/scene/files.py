@@ -1,0 +1,44 @@
+"""Scene files as TOML: those that come with the package, and one to start from. Nothing is validated here."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_HERE = Path(__file__).parent
+
+
+def shipped_scenes() -> dict[str, Path]:
+    """Return names and files of the scenes that come with the package."""
+    return {path.stem: path for path in sorted((_HERE / "shipped").glob("*.toml"))}
+
+
+def tables_of(path: Path) -> dict[str, Any]:
+    """Return what the TOML file ``path`` holds. Raises ValueError, RecursionError or OSError if it cannot be read."""
+    found: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    return found
+
+
+def parse_value(text: str) -> Any:
+    """Return a value given in TOML syntax; a bare word is taken as a string."""
+    with suppress(ValueError, RecursionError):
+        parsed = tomllib.loads(f"value = {text}")
+        if parsed.keys() == {"value"}:
+            return parsed["value"]
+    with suppress(ValueError):
+        return float(text)  # ".5" and "1." are not TOML
+    return text
+
+
+def beginning(title: str) -> str:
+    """Return a commented scene file to start from: an aluminium beam above a rubber bumper above a stop."""
+    import tomli_w
+
+    return tomli_w.dumps({"title": title}) + (_HERE / "beginning.toml").read_text(encoding="utf-8")

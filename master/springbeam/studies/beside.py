@@ -1,0 +1,92 @@
+"""Runs beside each other, and a run beside a file of measurements (``springbeam compare``)."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..pictures.diagrams import Diagram, draw_diagrams
+from ..results.totals import LOSS_NAMES, TOTALS, totals
+from ..results.trajectory import Trajectory
+from ..scene import Scene
+from ..signals.measured import model, read_measured, reading_of, residuals, time_shift
+from ..signals.spectra import without_peak
+from .fit import mapping
+from .tables import Findings, table
+
+
+def beside_one_another(names: list[str], runs: list[Trajectory]) -> Findings:
+    """Compare runs."""
+
+    def draw() -> Any:
+        from ..pictures.timeline import draw_compared
+
+        return draw_compared(dict(zip(names, runs, strict=True)))
+
+    keys, results = differing_keys([run.scene for run in runs]), results_of(runs)
+    titles = {"keys that differ": keys, "results": results}
+    columns = ("", *(f"{name}:.5g" for name in names))
+    shown = [table(columns, [(name, *of) for name, of in found.items()], title) for title, found in titles.items()]
+    return Findings({"runs": names, "keys": keys, "results": results}, shown, pictures={"comparison": draw})
+
+
+def beside_measured(run: Trajectory, file: Path, names: list[str], shift: float | None, read: list[str]) -> Findings:
+    """Compare a run with measured curves."""
+    measured = read_measured(file, run.scene, mapping(names), reading_of(read))
+    moved = time_shift(run, measured) if shift is None else shift
+    found = residuals(run, measured, moved)
+
+    covered, curves = model(run, measured, moved)
+    time, diagrams = measured.time[covered] + moved, []
+    for name, curve in curves.items():
+        both = {"measured": measured.values[name][covered], "run": curve}
+        points = {which: np.column_stack([time, values]) for which, values in both.items()}
+        diagrams.append(Diagram("time t [s]", name, points, log=False, dots=("measured",)))
+    columns = ("curve", "points:", "rms:.4g", "of its spread:.2%", "largest:.4g", "at t [s]:.6g")
+    by_what = ", found by correlation" * (shift is None)
+    shown = [
+        table(columns, found),
+        f"shift     {moved:.6g} s{by_what}",
+        *(f"{'read':<10}{note}" for note in measured.notes),
+        *filter(None, [without_peak(run, measured.values)]),
+    ]
+    document = {"shift": moved, "residuals": [row._asdict() for row in found], "read": measured.notes}
+    draw = partial(draw_diagrams, diagrams, "", (8.2, 2.2), wide=1)
+    return Findings(document, shown, pictures={"comparison": draw})
+
+
+def differing_keys(scenes: list[Scene]) -> dict[str, list[Any]]:
+    """Return the values of the keys that are not the same in all scenes, ``None`` where a scene has no such key."""
+    flat = [scene.flat() for scene in scenes]
+    names = dict.fromkeys(name for keys in flat for name in keys)
+    values = {name: [keys.get(name) for keys in flat] for name in names}
+    return {name: found for name, found in values.items() if any(value != found[0] for value in found)}
+
+
+def results_of(runs: list[Trajectory]) -> dict[str, list[Any]]:
+    """Return the numbers of `springbeam.results.totals` that any of the runs has, with their units, by run."""
+    units = {name: unit for name, (_, unit) in TOTALS.items()} | dict.fromkeys(LOSS_NAMES, "J")
+    summaries = _over_one_window(runs)
+    found = {f"{name} [{unit}]" if unit else name: [s.get(name) for s in summaries] for name, unit in units.items()}
+    found = {name: values for name, values in found.items() if any(values)}
+    return {**found, "warnings": [len(run.summary.get("warnings", ())) for run in runs]}
+
+
+def _over_one_window(runs: list[Trajectory]) -> list[dict[str, Any]]:
+    """Return the runs' summaries with their peak forces over one window, the longest of theirs.
+
+    A mean over another window is another quantity. A run without steps, which has no force between its rows, has no
+    peak beside those of other windows.
+    """
+    common = max(run.summary.get("contact_force_window", 0.0) for run in runs)
+    summaries = [dict(run.summary) for run in runs]
+    for run, summary in zip(runs, summaries, strict=True):
+        if summary.get("contact_force_window", common) != common:
+            del summary["contact_force_max"], summary["contact_force_window"]
+            if run.steps is not None:
+                found = totals(run.scene, run.steps, run.events, common)
+                summary |= {"contact_force_max": found["contact_force_max"], "contact_force_window": common}
+    return summaries
