@@ -1,11 +1,10 @@
 """An accuracy asked for is kept: judged by the monolithic reference, on scenes that are not shipped."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import HANGS, printed
+from commands import printed
 from scenes import scene_from_dict
 
 from springbeam import RunStopped, SceneError, load_scene, with_changes
@@ -18,12 +17,12 @@ from springbeam.run.accuracy import simulate
 from springbeam.run.runner import run
 from springbeam.scene.files import tomllib
 from springbeam.studies.crosscheck import orders
+from springbeam.studies.stability.judge import ERRORS, Reference, judge
 
-sys.path.append(str(Path(__file__).parents[1] / "campaign"))
-import judge
-
-judge.TIME_LIMIT = HANGS  # on a busy machine, too, its reference is not given up
-SCENES = tomllib.loads(Path(__file__).with_name("accuracy.toml").read_text(encoding="utf-8"))
+SCENES, FOUND = (
+    tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+    for name in ("accuracy.toml", "found.toml")
+)
 
 
 def errors(found, reference):
@@ -104,60 +103,33 @@ def test_runs_differ_by_the_largest_of_their_motion_and_by_their_peak_force():
     assert found["motion"] == pytest.approx(apart, rel=0.05)
 
 
-@pytest.mark.parametrize("number", [9, 19])
-def test_a_spring_alone_is_right_with_an_accuracy_and_says_so(number):
-    """A scene of the campaign."""
-    (verdict,) = judge.judge(1, number, ["--accuracy 1e-3"])
-    assert (verdict.outcome, verdict.told, verdict.judged, verdict.silent) == ("done", False, True, False)
-    assert max(verdict.motion, verdict.time, verdict.impulse) <= 1e-5
-    assert verdict.calls <= 150
+@pytest.mark.parametrize("name", FOUND["alone"])
+def test_a_spring_alone_is_right_with_an_accuracy_and_says_so(name):
+    found = judge(scene_from_dict({"accuracy": 1e-3, **FOUND["alone"][name]}))
+    assert not found["warns"]
+    assert max(found[error] for error in ERRORS) <= 1e-5
+    assert found["do_steps"] <= 150
 
 
-@pytest.mark.parametrize(("seed", "number"), [(2, 1), (3, 12)])
-def test_impulses_are_part_of_the_promise(seed, number):
-    """Two impacts: in (2, 1) a tenth of a step after the first, in (3, 12) 1.3 steps after a release.
-
-    Runs that miss the second one, or meet with another speed, agree in u_tip and y to 1e-4.
-    """
-    (verdict,) = judge.judge(seed, number, ["--accuracy 1e-3"])
-    assert verdict.judged
-    assert 0.0 < verdict.impulse <= 1e-3
-    assert verdict.factor <= 1.0
+@pytest.mark.parametrize("name", FOUND["impulses"])
+def test_impulses_are_part_of_the_promise(name):
+    scene = scene_from_dict({"accuracy": 1e-3, **FOUND["impulses"][name]})
+    found = judge(scene, Reference(scene))
+    assert 0.0 < found["error_impulses"] <= 1e-3
+    assert found["factor"] <= 1.0
 
 
-MISSED = "differ from the contact law, which moves an end by about"
-
-
-@pytest.mark.parametrize(
-    ("seed", "number", "way", "words"),
-    [
-        (4, 13, "energy 2", MISSED),
-        (5, 8, "energy 0", MISSED),
-        (51, 15, "energy 2", MISSED),
-        (71, 3, "energy 1", MISSED),
-        (72, 10, "energy 2", MISSED),
-        (74, 10, "energy 2, H/4", MISSED),
-        (86, 10, "energy 0", MISSED),
-        (112, 7, "energy 0", MISSED),
-    ],
-)
-def test_what_a_campaign_found_wrong_is_told(seed, number, way, words):
-    """At fixed steps an end is off by 3.7, 1.5, 1.8, 6.3, 2.4, 2.7, 12.6 and 1.1 %.
-
-    Velocities that differ by 5 %, 0.2 rad a step, waves in a contact that turns 0.8 rad, a mismatch of 1.3 % at any of
-    20 strokes, and one that is small by chance where a released tip parts or a short contact ends, do not show it.
-    """
-    coupling = dict(judge.WAYS[way])
-    scene = judge.drawn(seed, number)
-    coupling["macro_step"] = scene.coupling.H / coupling.pop("finer", 1.0)
-    run = simulate(with_changes(scene, coupling=coupling))
+@pytest.mark.parametrize("name", FOUND["warned"])
+def test_what_a_campaign_found_wrong_warns(name):
+    run = simulate(scene_from_dict(FOUND["warned"][name]))
     assert run.summary["resolved"] is False
+    words = "differ from the contact law, which moves an end by about"
     assert any(words in warning for warning in run.summary["warnings"])
 
 
-def test_ends_that_close_a_little_before_they_part_are_let_go():
-    """Degree 0 leaves them a mismatch when they are released; a look at a tenth of the step keeps them, 1.4 % off."""
-    scene = judge.drawn(62, 0)
+@pytest.mark.parametrize("name", FOUND["parts late"])
+def test_ends_that_close_a_little_before_they_part_do_part(name):
+    scene = scene_from_dict(FOUND["parts late"][name])
     run = simulate(with_changes(scene, coupling={"degree": 0}))
     finer = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": scene.coupling.H / 8.0}))
     assert distance(run, finer, np.inf).motion <= 5e-3

@@ -4,7 +4,7 @@ import os
 import signal
 from pathlib import Path
 
-from springbeam.studies.stability.cells import sampled_cells, slice_cells
+from springbeam.studies.stability.draw import EXTREME, drawn, slice_cells
 from springbeam.studies.stability.grid import Grid
 from springbeam.studies.sweep import Sweep
 
@@ -24,11 +24,11 @@ class Deadly(Sweep):
 
 
 class Part(Grid):
-    """Cells of the hypercube, but two of them that take half a minute together, and corners of the slices."""
+    """Cells of the hypercube, and corners of the slices."""
 
     def cases(self):
-        cells = enumerate([*sampled_cells(20, 3)[:16], *slice_cells(2)[::5]])
-        return {str(k): cell for k, cell in cells if k not in (3, 11)}
+        cells = [*({"slice": ""} | cell for cell in drawn(EXTREME, 20, 3)), *slice_cells(2)[::5]]
+        return {str(k): cell for k, cell in enumerate(cells)}
 
 
 class Few(Part):

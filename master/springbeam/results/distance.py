@@ -33,7 +33,7 @@ def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
     Parameters
     ----------
     run, exact
-        Two runs of one scene; a reference has values at its rows only.
+        Two runs of one scene; a reference has values at its rows only, of two references the common ones count.
     window
         Contacts and flights shorter than this [s] are no evidence, those that pass on hardly any impulse.
 
@@ -49,13 +49,14 @@ def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
         not known.
     """
     times = exact.time if exact.steps is None else _all_times(run, exact)
-    columns = exact.columns if exact.steps is None else at(exact, times).columns
+    if run.steps is None:
+        times = times[np.isin(times, run.time)]
     shapes = exact.shapes or run.shapes
     held = 0.0 if shapes is None else HELD * float(np.abs(shapes[1]).max(initial=0.0))
     span = float(exact.time[-1] - exact.time[0])
     impulses = [impulse_difference(run, exact), impulse_difference(exact, run)]
     return Distance(
-        motion(at(run, times).columns, columns, held),
+        motion(_columns_at(run, times), _columns_at(exact, times), held),
         contact_time_difference(run, exact, window) / span,
         max(np.nan_to_num(impulses).tolist()),
         None if exact.scene.contact.rigid else _peaks_apart(run, exact),
@@ -76,6 +77,14 @@ def apart(values: np.ndarray, exact: np.ndarray, least: float = 0.0) -> np.ndarr
     """
     scale = max(float(np.abs(exact - exact[0]).max(initial=0.0)), least) or 1.0
     return np.asarray(np.abs(values - exact) / scale)
+
+
+def _columns_at(run: Trajectory, times: np.ndarray) -> Mapping[str, np.ndarray]:
+    """Return the columns of ``run`` at ``times`` [s], which are rows of it if it is a reference."""
+    if run.steps is not None:
+        return at(run, times).columns
+    rows = np.isin(run.time, times)
+    return {name: values[rows] for name, values in run.columns.items()}
 
 
 def _all_times(run: Trajectory, exact: Trajectory) -> np.ndarray:

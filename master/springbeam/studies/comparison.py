@@ -206,16 +206,16 @@ def _compare_events(
 
 def reference_and_perturbed(scene: Scene, times: np.ndarray) -> tuple[Trajectory, Trajectory]:
     """Return the reference at ``times`` [s], and once more from initial velocities changed by `PERTURBATION`."""
-    return event_driven.simulate(scene, sample_times=times), next(perturbed(scene, sample_times=times))
+    return event_driven.simulate(scene, sample_times=times), next(perturbed(scene, PERTURBATION, sample_times=times))
 
 
-def perturbed(scene: Scene, **options: Any) -> Iterator[Trajectory]:
-    """Yield the reference of ``scene`` from initial velocities changed by `PERTURBATION`; ``options`` of its run.
+def perturbed(scene: Scene, share: float, **options: Any) -> Iterator[Trajectory]:
+    """Yield the reference of ``scene`` from initial velocities changed by ``share`` of them; ``options`` of its run.
 
     First the beam's; then that of a spring beside it, to less and more, where it may have any: a spring that the tip
     meets a little above Ψ is met a little below it, where another phase follows.
     """
-    change = PERTURBATION * initial_speed(scene)
+    change = share * initial_speed(scene)
     yield event_driven.simulate(scene, velocity_perturbation=change, **options)
     if scene.spring is not None and scene.beam is not None:
         start, speed = scene.spring.initial_velocity, change * scene.beam.length

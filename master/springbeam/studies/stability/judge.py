@@ -1,0 +1,235 @@
+"""Judge a run: put it into a class by what it recorded, and compare it with the event-driven reference.
+
+===========  ==========================================================================================================
+conserved    done, energy constant to `ledger.EXACT`, nothing lost
+dissipative  done, energy plus booked losses constant to `ledger.EXACT`
+approximate  done, energy changed by more: within the bound of its scheme (`ledger.bounds`), or the run says so
+refused      a scene that cannot be run, with the reason
+stopped      ended early, with the cause
+garbage      anything else: a run that is wrong beside the reference and does not warn; a coupling that changes no
+             energy and has changed it; energy changed without a warning, numbers that are not finite, bodies that
+             overlap, damping that returns energy, a crash
+===========  ==========================================================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...bodies.protocol import FmuError
+from ...monolithic import event_driven
+from ...results.distance import distance
+from ...results.trajectory import Trajectory
+from ...run.accuracy import pick
+from ...run.ledger import EXACT, bounds
+from ...run.outcome import RunStopped
+from ...run.runner import Simulation
+from ...scene import Scene, SceneError
+from ...scene.resolution import peak_force_doubt
+from ...scene.suspicions import suspicions
+from ..comparison import perturbed
+from ..tables import Row
+
+#: In the order in which pictures and tables show them; the last must stay empty.
+CLASSES = ("conserved", "dissipative", "approximate", "refused", "stopped", "garbage")
+#: A run without an accuracy is wrong if an end is further from the reference than this share of its largest change:
+#: what `springbeam.run.misplaced` is to warn of.
+WRONG = 0.01
+#: Relative change of the initial velocity that shows the conditioning: of the size of the errors that are judged, so
+#: that a contact which such an error makes or misses is one. How many times larger the motion's, or a time's, may be.
+CHANGE, WELL_CONDITIONED = 1e-3, 30.0
+#: Times at which a run is compared, and the processor time that each reference may take [s].
+TIMES, PATIENCE = 200, 30.0
+#: Of a record: parts of the `distance` from the reference.
+ERRORS = ("error_motion", "error_times", "error_impulses")
+#: A run is cut after so many accepted steps, and so many for each macro step: a contact that opens and closes in each.
+_MOST_STEPS, _MOST_PER_MACRO_STEP = 100, 4.0
+#: Bodies may overlap or, joined, part by so much of their motion, or by the coupling's tolerance if that is larger.
+_OVERLAP = 1e-9
+#: A coupling that changes no energy, at whatever step, may change it by so much of the largest, or by what loose
+#: tolerances allow: what rounding leaves of a gap costs energy where the force of a step is very large.
+_GUARANTEED = 1e-6
+#: Rounding of a sum of energies, of the largest so far.
+_SLACK = 1e-10
+
+
+class Reference:
+    """The event-driven solution of a scene, and how well the scene is conditioned; each is computed when it is needed.
+
+    The conditioning is that of the solution itself, not of runs: a run that misses an event would excuse itself.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        times = np.linspace(scene.contact_time or 0.0, scene.time.t_end, TIMES)
+        self._options: dict[str, Any] = {"sample_times": times, "time_limit": PATIENCE}
+
+    @cached_property
+    def run(self) -> Trajectory | None:
+        """The solution; ``None`` where there is none, or not in `PATIENCE`."""
+        try:
+            return event_driven.simulate(self.scene, **self._options)
+        except (SceneError, ValueError, event_driven.ReferenceFailure):
+            return None
+
+    @cached_property
+    def condition(self) -> float:
+        """How many times larger than that of the initial velocity the change of the motion or of a time is.
+
+        It is infinite where the change ends the solution.
+        """
+        assert self.run is not None
+        found = 0.0
+        try:
+            for moved in perturbed(self.scene, CHANGE, **self._options):
+                apart = distance(moved, self.run, 2.0 * self.scene.coupling.H)
+                found = max(found, apart.motion / CHANGE, apart.times / CHANGE)
+        except (ValueError, event_driven.ReferenceFailure):
+            return np.inf
+        return found
+
+
+def judge(scene: Scene, reference: Reference | None = None) -> Row:
+    """Run ``scene`` and return how the run ended: `ended`. Parameters and comparison as of `judged`."""
+    cause = ""
+    try:
+        if scene.accuracy is not None:
+            return judged(pick(scene), reference=reference)
+        simulation = Simulation(scene)
+    except (SceneError, FmuError) as error:
+        return ended("refused", str(error))
+    except RunStopped as stopped:
+        return ended("stopped", str(stopped))
+    most = _MOST_STEPS + int(_MOST_PER_MACRO_STEP * scene.duration / scene.coupling.H)
+    with simulation:
+        try:
+            if all(simulation.step() for _ in range(most)):
+                cause = f"cut after {most} steps, {_MOST_PER_MACRO_STEP:g} to each macro step"
+            found = simulation.run  # where the last steps are checked
+        except RunStopped as stopped:
+            cause, found = stopped.cause, simulation.run
+    if "traceback" in found.summary:  # an error that nobody foresaw
+        return ended("garbage", f"crashed: {cause}")
+    return judged(found, cause, reference)
+
+
+def ended(kind: str, reason: str = "") -> Row:
+    """Return the record of a run that ended as one of `CLASSES`.
+
+    ``reason``: refused, stopped, garbage: why; approximate: the run's warnings. ``warns``: the run is not resolved, or
+    warns of what does not follow from the scene alone. ``residual``: the largest energy residual over the largest
+    energy until then; ``overlap`` of bodies, or the gap of joined ones, over the largest motion. Of runs that were
+    compared, except those whose errors an ill-conditioned scene explains: `ERRORS`, and ``factor``, the error over
+    what it may be: that of the motion over `WRONG`, or the largest over the accuracy that the scene asks for. ``H``:
+    the macro step [s].
+    """
+    measured: Row = dict.fromkeys(("residual", "overlap", *ERRORS, "factor", "H"))
+    counts = dict.fromkeys(("macro_steps", "events", "do_steps"), 0)
+    return {"kind": kind, "reason": " ".join(reason.split()), **measured, "warns": False, **counts}
+
+
+def judged(run: Trajectory, cause: str = "", reference: Reference | None = None) -> Row:
+    """Return the class of a run that is done, or has stopped for ``cause``, from what it recorded, and its errors.
+
+    A run that warns is compared with the reference only where that is given.
+    """
+    picked = run.summary.get("accuracy", {})
+    calls = run.do_steps + picked.get("pilot_steps", 0)
+    counts = {"macro_steps": run.summary["macro_steps"], "events": run.summary["events"], "do_steps": calls}
+    if len(run.time) == 0:
+        return ended("stopped", cause) | counts
+    # The scale is the largest energy so far [J], as in `springbeam.run.ledger.errors`.
+    stored = {name: np.abs(run[name]) for name in ("e_beam", "e_spring", "e_contact") if name in run.columns}
+    if run.scene.spring is not None:
+        stored["e_spring"] = np.maximum(stored["e_spring"], 0.5 * run.scene.spring.mass * run.z**2)
+    mechanical = sum(stored.values())
+    scale, overlap = np.maximum.accumulate(np.maximum(mechanical, abs(run.e_total[0]))), _overlap(run)
+    relative = np.divide(run.energy_residual, scale, out=np.zeros_like(scale), where=scale > 0.0)
+    measured = {"residual": float(np.abs(relative).max()), "overlap": overlap, "warns": warns(run)}
+    measured["H"] = run.scene.coupling.H
+    found = ended(*_class(run, cause, relative, scale, overlap)) | counts | measured
+    if found["kind"] in ("stopped", "garbage") or (found["warns"] and reference is None):
+        return found
+    errors = _errors(run, reference or Reference(run.scene), found["warns"])
+    if errors and errors["factor"] > 1.0 and not found["warns"]:
+        off = max(errors[name] for name in ERRORS)
+        found |= {"kind": "garbage", "reason": f"does not warn, and is up to {off:.1e} from the reference"}
+    return found | errors
+
+
+def warns(run: Trajectory) -> bool:
+    """Tell whether ``run`` is not resolved, or warns of what does not follow from its scene alone."""
+    of_scene = {*suspicions(run.scene), peak_force_doubt(run.scene)}
+    return not run.summary["resolved"] or not of_scene.issuperset(run.summary["warnings"])
+
+
+def _errors(run: Trajectory, reference: Reference, warned: bool) -> Row:
+    """Return the errors of ``run``; none without a reference, or if an ill-conditioned scene explains them."""
+    exact = reference.run
+    if exact is None:
+        return {}
+    asked = run.summary.get("accuracy", {}).get("asked")
+    window = 2.0 * run.scene.coupling.H if asked is None else asked * run.scene.duration
+    found = distance(run, exact, window)
+    of_all = max(found.motion, found.times, found.impulses)
+    factor = found.motion / WRONG if asked is None else of_all / asked
+    if factor > 1.0 and not warned and reference.condition > WELL_CONDITIONED:
+        return {}
+    return dict(zip(ERRORS, found, strict=False)) | {"factor": factor}
+
+
+def _class(run: Trajectory, cause: str, relative: np.ndarray, scale: np.ndarray, overlap: float) -> tuple[str, str]:
+    """Return the class of a run and why, by its relative residuals, the scale of its energy and its overlap."""
+    scene = run.scene
+    residual = float(np.abs(relative).max())
+    keeps = scene.coupling.scheme == "energy"
+    tolerance = max(scene.coupling.tolerance, 0.0 if scene.spring is None else scene.spring.relative_tolerance)
+    allowed, _ = bounds(tolerance, exchanges=not keeps)
+    if keeps and residual > max(_GUARANTEED, allowed):
+        return "garbage", f"energy residual {residual:.1e} of a coupling that changes none; {cause}"
+    if cause:
+        return "stopped", cause
+    if faults := list(_faults(run, overlap, scale)):
+        return "garbage", "; ".join(faults)
+    if residual <= EXACT:
+        lost = run.e_dissipated[-1] + run.e_impact_loss[-1]
+        return "dissipative" if lost > EXACT * scale[-1] else "conserved", ""
+    said = [text for text in run.summary["warnings"] if "energy" in text]
+    if said or residual <= allowed:
+        return "approximate", "; ".join(said)
+    return "garbage", f"energy residual {residual:.1e}, and nothing says so"
+
+
+def _faults(run: Trajectory, overlap: float, scale: np.ndarray) -> Iterator[str]:
+    """Yield what must not be, whatever the scene."""
+    for name, values in run.columns.items():
+        if name != "phase" and not np.all(np.isfinite(values)):
+            yield f"{name} is not finite"
+    lost = {"damping": run.e_dissipated, "impacts": run.e_impact_loss}
+    for what, energy in lost.items():
+        change = np.diff(energy)
+        if np.any(change < -_SLACK * scale[1:]):
+            yield f"energy lost by {what} comes back: {change.min() / scale[-1]:.1e} of the largest"
+    if overlap > max(_OVERLAP, run.scene.coupling.tolerance):
+        yield f"the bodies overlap or part by {overlap:.1e} of their motion"
+
+
+def _overlap(run: Trajectory) -> float:
+    """Return the largest overlap of bodies that may not, over the largest deflection or motion in a step."""
+    scene, overlaps = run.scene, [0.0]
+    positions = [run[name] for name in ("u_tip", "y") if name in run.columns]
+    if run.shapes is not None and len(run.shapes[0]):
+        positions.append(run.shapes[1])  # the tip is as exact as the largest deflection, however little it moves
+    speeds = [run[name] for name in ("v_tip", "z") if name in run.columns]
+    motion, moved = (max(float(np.abs(values).max()) for values in several) for several in (positions, speeds))
+    motion += scene.coupling.H * moved
+    if scene.contact.rigid and scene.coupled:
+        joined, free = np.isin(run.phase, ("tied", "touch")), run.phase == "free"
+        overlaps += [np.abs(run.gap[joined]).max(initial=0.0), np.max(-run.gap[free], initial=0.0)]
+    if scene.stop is not None and not scene.elastic_stop:
+        overlaps.append(np.max(scene.stop.position - (run.y if "y" in run.columns else run.u_tip)))
+    return float(max(overlaps)) / motion if motion > 0.0 else 0.0
