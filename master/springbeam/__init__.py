@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from .api import RunStopped, Simulation, Trajectory, load, simulate
     from .bodies.elements import PointMass, RigidWall, SpringDamper
     from .bodies.protocol import Body, Energies, Motion
-    from .results.trajectory import Event
+    from .motion.events import Event
     from .scene import Scene, SceneError, load_scene, with_changes
 else:
     __getattr__ = attached(
@@ -20,7 +20,7 @@ else:
             "api": ("RunStopped", "Simulation", "Trajectory", "load", "simulate"),
             "bodies.elements": ("PointMass", "RigidWall", "SpringDamper"),
             "bodies.protocol": ("Body", "Energies", "Motion"),
-            "results.trajectory": ("Event",),
+            "motion.events": ("Event",),
             "scene": ("Scene", "SceneError", "load_scene", "with_changes"),
             "version": ("__version__",),
         },

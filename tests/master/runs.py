@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from springbeam.motion.events import Event, EventKind
 from springbeam.results.steps import BEAM_TELLS, SPRING_TELLS, STEP, STEP_COLUMNS
-from springbeam.results.trajectory import Event, EventKind, Trajectory, columns_of
+from springbeam.results.trajectory import Trajectory, columns_of
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.statics import SHAPE_POINTS
 

@@ -12,8 +12,8 @@ from springbeam.contact.phases import (
     Phase,
     Transitions,
 )
+from springbeam.motion.events import EventKind
 from springbeam.results.steps import PHASE_NAMES
-from springbeam.results.trajectory import EventKind
 from springbeam.scene.laws import Compliance, Link, depth
 
 

@@ -11,7 +11,7 @@ from springbeam.bodies.protocol import NO_FORCE, Motion, StepRefused
 from springbeam.contact.events import EventFunctions, locate, no_dip, position_tolerance
 from springbeam.contact.phases import Joint, Phase
 from springbeam.coupling.protocol import Step
-from springbeam.results.paths import Path
+from springbeam.motion.paths import Path
 from springbeam.run.detection import Detector
 from springbeam.run.macro_steps import MacroGrid
 from springbeam.run.setup import set_up

@@ -7,8 +7,8 @@ from numpy.polynomial import Legendre, Polynomial
 from springbeam import load_scene
 from springbeam.bodies import force
 from springbeam.bodies.protocol import Motion
+from springbeam.motion.paths import Path, sign_changes
 from springbeam.results.dense import between_rows
-from springbeam.results.paths import Path, sign_changes
 from springbeam.results.steps import STEP
 
 # -- The path of a position inside a step: quintics exactly, minima, zeros, the order of its error and of the cubic's

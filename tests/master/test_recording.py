@@ -14,6 +14,7 @@ import pytest
 from pyarrow import parquet
 from runs import PAIR, SCENES, block
 
+from springbeam.motion.events import EVENT_COLUMNS, Event
 from springbeam.results import recording
 from springbeam.results.columns import columns, first_not_finite
 from springbeam.results.directory import (
@@ -29,7 +30,7 @@ from springbeam.results.directory import (
 from springbeam.results.files import export, load_summary, load_trajectory, read_run
 from springbeam.results.recording import FileRecorder, MemoryRecorder
 from springbeam.results.steps import PHASE_NAMES, STEP_COLUMNS
-from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, TOLD, Event
+from springbeam.results.trajectory import COLUMNS, TOLD
 from springbeam.run.log import Log
 from springbeam.run.outcome import RunStopped
 from springbeam.scene import SceneError, with_changes

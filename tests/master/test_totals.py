@@ -5,9 +5,9 @@ import pytest
 from bodies import bodies
 
 from springbeam.monolithic.semi_discrete import modal_beam
+from springbeam.motion.events import Event, EventKind
 from springbeam.results.steps import STEP
 from springbeam.results.totals import TOTALS, in_words, shortest_contact, totals
-from springbeam.results.trajectory import Event, EventKind
 from springbeam.run.observed import force_window
 from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair

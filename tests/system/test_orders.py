@@ -7,7 +7,7 @@ from scenes import soft
 
 #: Length of a smooth phase: the tip comes down on the spring at its start, and stays with it [s].
 T = 0.064
-TIE = {"law": "tie", "stiffness": 0.0}
+TIE = {"law": "tie"}
 LINK = {"law": "link", "stiffness": 1e3, "damping": 1.0}
 COMPLIANCE = {"law": "compliance", "stiffness": 1e6, "exponent": 3.0}
 SCHEMES = [

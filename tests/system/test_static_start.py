@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from springbeam.monolithic import event_driven
-from springbeam.results.trajectory import EventKind
+from springbeam.motion.events import EventKind
 from springbeam.run.runner import simulate
 from springbeam.scene import scene_from_dict
 from springbeam.scene.statics import tip_compliance

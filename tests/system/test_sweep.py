@@ -12,7 +12,7 @@ import pytest
 from commands import HANGS, command, swept
 from runs import a_trajectory
 
-from springbeam.results.trajectory import Event, EventKind
+from springbeam.motion.events import Event, EventKind
 from springbeam.run.runner import simulate
 from springbeam.scene import load_scene, scene_from_dict, with_changes
 from springbeam.studies import picture, study, sweep

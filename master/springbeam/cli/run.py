@@ -32,8 +32,9 @@ from .common import (
 )
 
 if TYPE_CHECKING:
+    from ..motion.events import Event
     from ..results.recording import FileRecorder
-    from ..results.trajectory import Event, Trajectory
+    from ..results.trajectory import Trajectory
     from ..run.outcome import Progress
     from ..scene import Scene
 

@@ -11,7 +11,7 @@ from enum import Enum
 from functools import cached_property
 
 from ..bodies.protocol import Ends, Motion
-from ..results.trajectory import EventKind
+from ..motion.events import EventKind
 from .interface import Interface, common_velocity
 
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only); slower than the

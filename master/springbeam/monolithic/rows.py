@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..results.trajectory import Event, Trajectory, columns_of
+from ..motion.events import Event
+from ..results.trajectory import Trajectory, columns_of
 from ..scene import Scene
 from .laws import Phase
 from .semi_discrete import ModalBeam, assemble, constant_forces, points, unit_forces

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..results.trajectory import Event, EventKind
+from ..motion.events import Event, EventKind
 from .hybrid_system import HybridSystem
 from .laws import Phase, Watch
 

@@ -17,7 +17,8 @@ import numpy as np
 
 from ..bodies.fmu_bodies import FmuBeam, FmuSpring
 from ..bodies.protocol import NO_FORCE, BodyFailed, StepRefused
-from ..results.trajectory import Event, EventKind, Trajectory
+from ..motion.events import Event, EventKind
+from ..results.trajectory import Trajectory
 from ..scene import Scene
 from ..scene.laws import TransmissionContact
 from . import problem

@@ -28,7 +28,8 @@ import numpy as np
 import scipy.sparse.linalg as spla
 
 from ..monolithic.semi_discrete import assemble, constant_forces, inner_forces
-from ..results.trajectory import Event, EventKind, Trajectory
+from ..motion.events import Event, EventKind
+from ..results.trajectory import Trajectory
 from ..scene import Scene
 from ..scene.laws import TransmissionContact
 from . import problem

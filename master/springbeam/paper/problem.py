@@ -8,7 +8,8 @@ from typing import Any, Literal
 import numpy as np
 
 from ..monolithic.rows import finished
-from ..results.trajectory import Event, Trajectory
+from ..motion.events import Event
+from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError
 from ..scene.laws import TransmissionContact
 from ..scene.resolution import not_resolved

@@ -10,7 +10,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ..results.trajectory import PHASES, EventKind, Trajectory
+from ..motion.events import EventKind
+from ..results.trajectory import PHASES, Trajectory
 from ..scene import Scene
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"

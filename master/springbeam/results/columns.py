@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ..motion.events import Event
 from ..scene import Scene, Spring
 from .steps import BEAM_TELLS, PHASE_NAMES, SPRING_TELLS, STEP_COLUMNS, common, joined
-from .trajectory import TOLD, Event, Trajectory, columns_of
+from .trajectory import TOLD, Trajectory, columns_of
 
 #: Largest value of a column that the motion does not depend on [N]; pictures multiply two of them.
 MOST_SHOWN = 1e150

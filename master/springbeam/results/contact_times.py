@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..motion.events import Event, EventKind
 from ..scene import Scene
 from .steps import impulse, joined
-from .trajectory import Event, EventKind, Trajectory
+from .trajectory import Trajectory
 
 #: Share of the impulse of a run below which a contact or a stroke is none to speak of.
 SLIGHT = 2e-3

@@ -9,9 +9,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ..motion.events import Event
 from ..scene import Scene
 from .dense import Extremes, extremes
-from .trajectory import Event
 
 #: How far an end may be where it cannot be, over its own range: what curves between right rows may be off by.
 _MOST = 0.01

@@ -4,7 +4,7 @@ Steps end on events and on changes of phase, so that no polynomial reaches acros
 record as at a row, and its columns follow from that (`springbeam.results.columns`). In this record
 
 * positions and velocities of ends that move apart follow the path of order 6 through both ends of the step with its two
-  moments (`springbeam.results.paths`), velocities its slope (order 5);
+  moments (`springbeam.motion.paths`), velocities its slope (order 5);
 * ends that a rigid law joins move together: both take the path of what they have in common, free of the mismatch of
   their velocities, with what the rows say of the gap, linear between them; so does a tip that the foundation holds;
 * contact and foundation force are those of both rows and, between them, the polynomials applied, without what turns
@@ -28,11 +28,12 @@ import numpy as np
 from numpy.polynomial.legendre import legval
 from numpy.polynomial.polynomial import polyval
 
+from ..motion.events import Event
+from ..motion.paths import LAST_MOMENT, Path, derivative, sign_changes, value
 from ..scene import Scene
 from .columns import columns
-from .paths import LAST_MOMENT, Path, derivative, sign_changes, value
 from .steps import common, joined, reduced_mass
-from .trajectory import Event, Trajectory
+from .trajectory import Trajectory
 
 #: Fields that are linear between rows, and do not change with an event.
 _LINEAR = (

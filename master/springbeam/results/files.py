@@ -18,12 +18,13 @@ import msgspec
 import numpy as np
 from pydantic_core import to_json
 
+from ..motion.events import EVENT_COLUMNS, Event
 from ..scene import scene_from_dict
 from .columns import trajectory_of
 from .directory import PARQUET, ResultsUnreadable, RunDirectory
 from .document import as_json
 from .steps import STEP, steps_of
-from .trajectory import EVENT_COLUMNS, PHASES, SHAPE_COLUMNS, Event, Trajectory
+from .trajectory import PHASES, SHAPE_COLUMNS, Trajectory
 
 # -- written -----------------------------------------------------------------------------------------------------------
 

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from ..motion.events import EVENT_COLUMNS, Event
 from ..scene import Scene
 from .columns import blocks, trajectory_of
 from .dense import at_multiples
 from .directory import RunDirectory
 from .files import event_lines, lines, load_events, read_run, write_rows, write_summary
 from .steps import STEP
-from .trajectory import EVENT_COLUMNS, SHAPE_COLUMNS, Event, Trajectory
+from .trajectory import SHAPE_COLUMNS, Trajectory
 
 
 class MemoryRecorder:

@@ -13,11 +13,11 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
+from ..motion.events import Event
 from ..scene import Scene
 from .contact_times import foundation_contacts, kicks, tip_contacts, touches
 from .dense import extremes
 from .steps import FORCE_COLUMNS, impulse, joined
-from .trajectory import Event
 
 
 class Quantity(NamedTuple):

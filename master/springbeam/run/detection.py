@@ -19,8 +19,8 @@ from ..contact.events import (
 )
 from ..contact.phases import VELOCITY_ROUNDING, Joint
 from ..coupling.protocol import Step
-from ..results.paths import Path, Place, Sample, sign_changes
-from ..results.trajectory import Event, EventKind
+from ..motion.events import Event, EventKind
+from ..motion.paths import Path, Place, Sample, sign_changes
 from .macro_steps import AdaptiveSteps, MacroGrid
 from .setup import SAME
 from .stepping import Pair, Present, State

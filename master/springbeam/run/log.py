@@ -7,10 +7,11 @@ from time import monotonic
 
 import numpy as np
 
+from ..motion.events import Event
 from ..results.columns import first_not_finite
 from ..results.recording import Recorder
 from ..results.steps import STEP
-from ..results.trajectory import SHAPE_COLUMNS, Event
+from ..results.trajectory import SHAPE_COLUMNS
 from .outcome import RunStopped
 
 #: Most records that are checked and handed on together, and the longest that one waits for it [s].

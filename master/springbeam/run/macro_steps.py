@@ -13,7 +13,7 @@ from math import ceil, inf, log2, sqrt
 from ..bodies import force
 from ..contact.phases import Joint
 from ..coupling.protocol import Step
-from ..results.paths import Path
+from ..motion.paths import Path
 from .outcome import RunStopped
 from .setup import SAME, SHORTEST_STEP, Setup
 from .stepping import Pair, State

@@ -16,10 +16,10 @@ import numpy as np
 from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, Ends, StepRefused
 from ..contact.phases import Impact, Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
+from ..motion.events import Event, EventKind
 from ..results.columns import ledger
 from ..results.recording import Recorder
 from ..results.steps import BEAM_TELLS, SPRING_TELLS, STEP, packed
-from ..results.trajectory import Event, EventKind
 from .detection import Detector
 from .ledger import Balance
 from .log import TOGETHER, Log

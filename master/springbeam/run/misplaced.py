@@ -18,11 +18,11 @@ import numpy as np
 
 from ..bodies.protocol import Modes
 from ..contact.interface import Interface
+from ..motion.events import Event, EventKind
+from ..motion.paths import Path
 from ..results.distance import HELD
-from ..results.paths import Path
 from ..results.steps import force as applied
 from ..results.steps import joined
-from ..results.trajectory import Event, EventKind
 from ..scene.laws import SoftLaw
 from .stepping import Pair
 

@@ -7,10 +7,10 @@ from math import inf, sqrt
 
 import numpy as np
 
+from ..motion.events import Event
 from ..results.columns import MOST_SHOWN, normal_compliance
 from ..results.dense import between_rows
 from ..results.totals import shortest_contact
-from ..results.trajectory import Event
 from ..scene import Load, Scene
 from ..scene.laws import stiffest
 from ..scene.linearised import contact_energy, spring_frequency

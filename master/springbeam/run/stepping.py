@@ -13,7 +13,7 @@ from ..contact.interface import Interface
 from ..contact.phases import Joint, Phase
 from ..coupling import coupling_of
 from ..coupling.protocol import Step, Uncoupled
-from ..results.trajectory import EventKind
+from ..motion.events import EventKind
 from .loads import Loads
 from .outcome import RunStopped
 from .setup import Setup

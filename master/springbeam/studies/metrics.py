@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from ..motion.events import EventKind
 from ..results.dense import MOTION, Extremes, extremes
 from ..results.totals import LOSS_NAMES, TOTALS
-from ..results.trajectory import COLUMNS, TOLD, EventKind, Trajectory
+from ..results.trajectory import COLUMNS, TOLD, Trajectory
 from ..scene import ArgumentError
 from ..scene.messages import nearest
 from ..signals.driven import drive_of, poincare, settled
