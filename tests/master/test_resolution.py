@@ -16,16 +16,8 @@ from springbeam.run.observed import least_momentum
 from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair
 from springbeam.scene import load_scene, shipped_scenes, with_changes
-from springbeam.scene.resolution import (
-    fastest_frequency,
-    impact_frequency,
-    lateness,
-    mesh_frequency,
-    not_resolved,
-    peak_force_doubt,
-    slow_oscillations,
-    slowest_frequency,
-)
+from springbeam.scene.frequencies import fastest_frequency, impact_frequency, mesh_frequency, slowest_frequency
+from springbeam.scene.resolution import lateness, not_resolved, peak_force_doubt, slow_oscillations
 from springbeam.scene.statics import lowest_frequency, tip_compliance, tip_inertia
 
 BEAMS = [name for name in shipped_scenes() if load_scene(name).beam is not None]

@@ -20,9 +20,9 @@ from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.run.ledger import APPROXIMATE, EXACT
 from springbeam.run.master import Master
 from springbeam.scene import Beam, scene_from_dict
+from springbeam.scene.frequencies import slowest_frequency
 from springbeam.scene.laws import LAW
 from springbeam.scene.linearised import hilltop, spring_frequency
-from springbeam.scene.resolution import slowest_frequency
 from springbeam.scene.statics import bending_stiffness, shear_stiffness, tip_compliance, tip_inertia, tip_reach
 from springbeam.studies.stability import judge
 from springbeam.studies.stability.draw import AT_REST, EXTREME, SLICES, USUAL, drawn, scene_dict, slice_cells

@@ -18,9 +18,10 @@ from ..bodies.protocol import Body
 from ..results.distance import distance
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, as_scene, with_changes
+from ..scene.frequencies import joined_frequency, lasting_frequency
 from ..scene.laws import stiffest
 from ..scene.linearised import contact_energy
-from ..scene.resolution import TURN, joined_frequency, lasting_frequency, slow_oscillations
+from ..scene.resolution import TURN, slow_oscillations
 from . import runner
 from .ledger import CHANGED
 from .outcome import Progress, RunStopped

@@ -12,11 +12,12 @@ from ..results.columns import MOST_SHOWN, normal_compliance
 from ..results.dense import between_rows
 from ..results.totals import shortest_contact
 from ..scene import Load, Scene
+from ..scene.frequencies import slowest_frequency
 from ..scene.laws import stiffest
 from ..scene.linearised import contact_energy, spring_frequency
 from ..scene.loads import TableLoad
 from ..scene.modes import tip_modes
-from ..scene.resolution import SHORT, SHORT_IMPULSE, not_resolved, oscillating, slowest_frequency, window_of
+from ..scene.resolution import SHORT, SHORT_IMPULSE, not_resolved, oscillating, window_of
 from ..scene.statics import tip_inertia
 from .stepping import Pair
 

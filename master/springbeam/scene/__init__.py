@@ -2,7 +2,7 @@
 
 Imports nothing else of the package. Floors, from below: ``tables`` (the keys), ``laws`` and ``loads`` (those of
 ``[contact]`` and ``[[loads]]``; ``recorded`` reads the file of a load) → ``scene`` (all tables) → ``messages`` (keys
-and errors in words): these load numpy when they compute. ``statics`` → ``linearised`` (energies and frequencies) →
+and errors in words): these load numpy when they compute. ``statics`` → ``linearised`` (energies), ``frequencies`` →
 ``rules`` (errors and warnings) → ``reading`` (files, overrides; start here) → ``resolution`` (are steps short enough,
 which scheme). ``files`` reads TOML; ``shipped/`` has the scenes that come with the package.
 """

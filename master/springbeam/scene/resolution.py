@@ -11,10 +11,18 @@ from collections.abc import Iterable, Sequence
 from math import inf, pi, sqrt
 from typing import Any, NamedTuple
 
-from .linearised import bent_energy, spring_frequency, spring_stiffness
+from .frequencies import (
+    fastest_frequency,
+    impact_frequency,
+    joined_frequency,
+    lasting_frequency,
+    shear_frequency,
+    slowest_frequency,
+)
+from .linearised import bent_energy, spring_frequency
 from .messages import Rule, told
 from .scene import Scene
-from .statics import bending_stiffness, initial_kinetic_energy, locking, lowest_frequency, tip_compliance
+from .statics import initial_kinetic_energy
 from .tables import ORDINARY_SCHEMES, Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
@@ -37,8 +45,6 @@ BETWEEN_ROWS = 0.01
 WAVE_LAG, SMOOTH_LAG, SMOOTH_WAVES = 1.0, 0.01, 5.0
 #: Energy of a start that is bent enough to count, over that of its velocity.
 BENT = 1e-4
-#: ω α_b above which waves die out within two periods and need no resolution.
-DIES_OUT = 0.15
 #: Macro steps that a contact must last for its end not to be decided by the force of one or two of them.
 SHORT = 1.0
 #: Share of the smaller momentum of both bodies that the force of a short contact may pass on: it is none to speak of.
@@ -303,76 +309,3 @@ _MESH_DECIDES = Rule(
     "the peak contact force, a mean over {window:.2g} s, depends on the mesh: {contact.law} is rigid. "
     "contact.force_window >= {longer:.2g} s, more elements or more modes settle it",
 )
-
-
-# -- frequencies ----------------------------------------------------------------------------------------------------
-
-
-def slowest_frequency(beam: Beam) -> float:
-    """Return the lowest frequency of the beam, with its tip free [rad/s]."""
-    return lowest_frequency(beam) * sqrt(locking(beam))
-
-
-def joined_frequency(scene: Scene) -> float:
-    """Return the frequency of the spring and a beam without inertia together [rad/s]; 0 if none holds the mass."""
-    beam, spring = scene.beam, scene.spring
-    if beam is None or spring is None:
-        return 0.0
-    return sqrt(max(spring_stiffness(scene) + 1.0 / tip_compliance(beam), 0.0) / spring.mass)
-
-
-def impact_frequency(beam: Beam) -> float:
-    """Return the highest frequency of the waves that an impact sets off and that do not die out at once [rad/s]."""
-    return min(shear_frequency(beam), lasting_frequency(beam))
-
-
-def lasting_frequency(beam: Beam) -> float:
-    """Return the highest frequency kept, of waves that do not die out at once [rad/s]."""
-    fastest = fastest_frequency(beam)
-    return fastest if beam.alpha_b == 0.0 else min(fastest, DIES_OUT / beam.alpha_b)
-
-
-def fastest_frequency(beam: Beam) -> float:
-    """Return the highest frequency kept [rad/s]: of the mesh, or of the ``n_modes``-th wave."""
-    high = mesh_frequency(beam)
-    if beam.integrator != "modal" or beam.n_modes == 0 or modes_below(beam, high) <= beam.n_modes:
-        return high
-    from scipy.optimize import bisect  # takes long to load: only for who leaves modes out
-
-    return float(bisect(lambda omega: modes_below(beam, omega) - beam.n_modes + 0.5, 0.0, high, rtol=1e-3))
-
-
-def mesh_frequency(beam: Beam) -> float:
-    """Return an estimate of the highest frequency of the mesh [rad/s]."""
-    shear = beam.shear_coefficient * beam.shear_modulus
-    stiffness = _gradient(beam) * max(beam.young_modulus, shear) + shear * beam.area / beam.second_moment_of_area
-    return sqrt(stiffness / beam.density)
-
-
-def shear_frequency(beam: Beam) -> float:
-    """Return an estimate of the highest frequency of shear waves on the mesh [rad/s], which an impact sets off."""
-    return sqrt(_gradient(beam) * beam.shear_coefficient * beam.shear_modulus / beam.density)
-
-
-def _gradient(beam: Beam) -> float:
-    """Return max ∫v'²/∫v² over polynomials on an element: 12/h² for p = 1, 60/h² for p = 2, then a little more [1/m²].
-
-    With the averaged mass it is 6/h² for p = 1, and less than this for higher degrees.
-    """
-    h, p = beam.length / beam.n_elements, beam.element_degree
-    if p == 1 and beam.mass_matrix == "averaged":
-        return 6.0 / h**2
-    return p * (p + 1) * (p + 2) * (p + 3) / (2.0 * h**2)
-
-
-def modes_below(beam: Beam, omega: float) -> int:
-    """Estimate how many modes are slower than ``omega`` [rad/s]: half waves of both kinds that fit into the length.
-
-    Wave numbers k of the Timoshenko beam, k² = ω² (a + b)/2 ± ω √(ω² (a − b)²/4 + ρA/EI) with a = ρ/E, b = ρ/KG; the
-    second is real above √(KAG/ρI).
-    """
-    a, b = beam.density / beam.young_modulus, beam.density / (beam.shear_coefficient * beam.shear_modulus)
-    middle = 0.5 * omega**2 * (a + b)
-    apart = omega * sqrt((0.5 * omega * (a - b)) ** 2 + beam.density * beam.area / bending_stiffness(beam))
-    number = beam.length / pi * (sqrt(middle + apart) + sqrt(max(middle - apart, 0.0)))
-    return int(number + 0.5)

@@ -31,7 +31,7 @@ from ..results.distance import apart
 from ..results.trajectory import TOLD, Trajectory, columns_of
 from ..run.runner import simulate
 from ..scene import Scene, SceneError, with_changes
-from ..scene.resolution import mesh_frequency, slowest_frequency
+from ..scene.frequencies import mesh_frequency, slowest_frequency
 from .tables import Row
 
 Verdict = Literal["agrees", "differs", "not comparable"]

@@ -24,7 +24,7 @@ from ..results.trajectory import Trajectory
 from ..run.outcome import RunStopped
 from ..run.runner import simulate
 from ..scene import Scene, SceneError, with_changes
-from ..scene.resolution import slowest_frequency
+from ..scene.frequencies import slowest_frequency
 from .comparison import SHORT_SHARE, comparable_until
 from .design import RIGID, SOFT, with_keys
 from .engine import Measure

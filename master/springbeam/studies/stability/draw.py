@@ -13,8 +13,8 @@ from math import inf, pi, sqrt
 from typing import Any
 
 from ...scene import Beam
+from ...scene.frequencies import slowest_frequency
 from ...scene.laws import LAWS
-from ...scene.resolution import slowest_frequency
 from ...scene.statics import tip_compliance, tip_inertia
 from ..design import RIGID, SOFT, Axis, design
 
