@@ -166,3 +166,37 @@ def test_a_run_that_has_made_no_step_misplaces_nothing(law):
     steps = np.zeros(2, STEP)
     steps["y_after"] = 0.0, 1.0
     assert misplaced(Pair(set_up(scene), *bodies(scene)), steps, []) == 0.0
+
+
+#: Steps of a tip alone on a stop, as degree and share of 1.5 ms: it rests there twice for a few ms, and bounces.
+BOUNCES = [(0, 1.0), (0, 0.5), (0, 0.25), (1, 1.0), (2, 1.0)]
+
+
+@pytest.mark.parametrize(("degree", "share"), BOUNCES)
+def test_bounces_after_a_seat_that_is_left_early_or_late_are_counted(degree, share):
+    """An error of the seat grows at each of a hundred bounces: by then it is known to a factor of 5, and said."""
+    tables = {
+        "time": {"t_end": 0.59801},
+        "beam": {
+            "density": 6162.2,
+            "length": 1.3692,
+            "area": 9.694305848304002e-6,
+            "second_moment_of_area": 9.9672e-9,
+            "young_modulus": 2.234e7,
+            "shear_modulus": 6498500.0,
+            "shear_coefficient": 5.0 / 6.0,
+            "n_elements": 15,
+            "reduced_integration": False,
+            "initial_velocity_slope": -0.1713,
+        },
+        "stop": {"position": 0.0, "restitution": 0.831},
+    }
+    H = 1.495025e-3
+    exact, run = (
+        simulate(scene_from_dict({**tables, "coupling": {"degree": d, "macro_step": h}}))
+        for d, h in ((2, 0.25 * H), (degree, share * H))
+    )
+    said, off = both_ends(run, exact)
+    assert off / 2.0 < said < 5.0 * off
+    assert run.summary["resolved"] is (said < (0.0025, 0.002, 0.001)[degree])
+    assert (off > 0.01) == ((degree, share) == (0, 1.0))

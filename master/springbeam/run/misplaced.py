@@ -8,7 +8,7 @@ mesh.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache, partial
 from itertools import product
 from math import inf
@@ -19,7 +19,7 @@ import numpy as np
 from ..bodies.protocol import Modes
 from ..contact.interface import Interface
 from ..motion.events import Event, EventKind
-from ..motion.paths import Path
+from ..motion.paths import Path, derivative, value
 from ..results.distance import HELD
 from ..results.steps import force as applied
 from ..results.steps import joined
@@ -50,9 +50,9 @@ def misplaced(pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float |
     damping = pair.lower.damping
     if modes is None or stiff is None or damping is None:
         return None
-    ends = _Errors(modes, pair.lower.mass, damping)
+    ends = _Errors(modes, pair.lower.mass, damping, float(np.ptp(steps["time"])))
     stiffness = ends.per_mass * np.broadcast_to(stiff, len(steps)) if ends.per_mass > 0.0 else np.zeros(len(steps))
-    follow = _along_tie if pair.law is None else partial(_along_soft_law, pair.law)
+    follow = partial(_along_tie, pair.interface.alone) if pair.law is None else partial(_along_soft_law, pair.law)
     found = 0.0
     after = _after_events(pair.interface, steps, events)
     for u, y in follow(pair.joined.degree, ends, steps, stiffness, after):
@@ -63,53 +63,110 @@ def misplaced(pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float |
 
 
 class _Errors:
-    """Errors of the modes' displacements and velocities ``x``, (2, n), of the lower end's ``y`` [m] and ``z`` [m/s]."""
+    """Errors of the tip's ``u`` [m] and ``v`` [m/s], the sum of modes, and of the lower end's ``y`` and ``z``.
 
-    def __init__(self, modes: Modes, mass: float, damping: float) -> None:
-        self.tip, self._moves = modes[2], cache(partial(_moves, modes))
-        self.x, self.y, self.z = np.zeros((2, len(self.tip))), 0.0, 0.0
+    Each mode is c₊ exp(r₊ t) + c₋ exp(r₋ t), with r the roots of r² + 2 ζ ω r + ω² = 0; where these are conjugates one
+    of the terms is kept and counts twice. An impulse of 1 N·s on the tip adds φ/(r₊ − r₋) to c₊ and takes it from c₋, a
+    jump of the tip by 1 N·s² adds r times as much.
+    """
+
+    def __init__(self, modes: Modes, mass: float, damping: float, duration: float) -> None:
+        # A free mass is a mode so soft that it does not turn.
+        stiffness = np.maximum(modes[0], (1e-4 / duration) ** 2)
+        decay, tip = 0.5 * modes[1], modes[2]
+        root = np.sqrt(decay**2 - stiffness * (1.0 + 1e-12j))  # never 0
+        creeps = decay**2 >= stiffness
+        self._rates = np.concatenate([root - decay, -(root + decay)[creeps]])
+        pushed = 0.5 * tip / root
+        pushed = np.concatenate([pushed, -pushed[creeps]])
+        shown = np.concatenate([np.where(creeps, 1.0, 2.0) * tip, tip[creeps]])
+        #: What an impulse and a jump of the tip add to the terms, and what these add to u and v, as pairs of reals.
+        self._impulse, self._jump = _reals(pushed), _reals(pushed * self._rates)
+        self._shown = np.array([_reals(np.conj(shown * self._rates**n)) for n in range(2)])
+        self._modes = stiffness, decay, tip, creeps
+        self._damps = np.concatenate([modes[1], modes[1][creeps]])
+        self._terms = np.zeros(len(self._rates), complex)
+        self._pairs = self._terms.view(float)
+        self._moves = cache(self._move)
+        self.u = self.v = self.y = self.z = 0.0
+        self.mobility = float(tip @ tip)
+        self._resisted = float(self._shown[1] @ self._jump)
         self.per_mass = 1.0 / mass if mass > 0.0 else 0.0
         self._resists = self.per_mass * damping
 
-    @property
-    def u(self) -> float:
-        return float(self.tip @ self.x[0])
+    def _move(self, H: float) -> tuple[np.ndarray, np.ndarray, float, float, np.ndarray]:
+        """Return what a step of ``H`` [s] makes of the terms, and what a constant force of 1 N adds to them.
 
-    def advance(
-        self, H: float, stiffness: float, per_mass: float, force: Callable[[float, float], float], shift: float = 0.0
-    ) -> None:
-        """Advance by ``H`` [s] under a force that acts by its mean, the lower end by the midpoint rule.
-
-        ``force`` [N] follows from how far the ends are apart without it, y − u [m], and from how far 1 N brings them
-        together; ``shift`` [N·s²] moves free masses besides. ``stiffness`` is the spring's over its mass [1/s²],
-        ``per_mass`` that of the lower end [1/kg], 0 while the foundation holds it.
+        Further by how much the latter changes u [m/N] and v, and what the step makes of where 1 N·s², which moves a
+        free mass, puts the modes that it follows.
         """
-        free, pushed, flexible, shifted = self._moves(H)
+        stiffness, decay, _, creeps = self._modes
+        moved = np.exp(self._rates * H)
+        impulse, jump = self._impulse.view(complex), self._jump.view(complex)
+        pushed = _reals(impulse * np.expm1(self._rates * H) / self._rates)
+        follows = 1.0 / (1.0 + H * (decay + 0.25 * H * stiffness))
+        shifted = _reals(moved * (jump + self._damps * impulse) * np.concatenate([follows, follows[creeps]]))
+        u, v = (self._shown @ pushed).tolist()
+        return moved, pushed, u, v, shifted
+
+    def drift(self, H: float, stiffness: float, per_mass: float, shift: float = 0.0) -> tuple[float, float]:
+        """Advance by ``H`` [s] without a force, the lower end by the midpoint rule.
+
+        Return y − u at the end [m], and by how much `act` with 1 N reduces it. ``shift`` [N·s²] moves free masses
+        besides. ``stiffness`` is the spring's over its mass [1/s²], ``per_mass`` that of the lower end [1/kg], 0 while
+        the foundation holds it.
+        """
+        moved, pushed, flexible, hastened, shifted = self._moves(H)
+        self._terms *= moved
+        if shift != 0.0:
+            self._pairs += shift * shifted
+            self.y -= shift * per_mass
+        self.u, self.v = (self._shown @ self._pairs).tolist()
         half = 0.5 * H
         slow = 1.0 / (1.0 + half * (self._resists + half * stiffness))
-        self.x = free[:, 0] * self.x[0] + free[:, 1] * self.x[1]
-        if shift != 0.0:
-            self.x += shift * shifted
-        self.y -= shift * per_mass
         mean = slow * (self.z - half * stiffness * self.y)
-        C = force(self.y + H * mean - self.u, flexible + H * half * slow * per_mass)
-        mean -= half * slow * per_mass * C
-        self.x += C * pushed
-        self.y, self.z = self.y + H * mean, 2.0 * mean - self.z
+        self.y += H * mean
+        self.z = 2.0 * mean - self.z
+        faster = H * slow * per_mass
+        self._response = pushed, flexible, hastened, half * faster, faster
+        return self.y - self.u, flexible + half * faster
+
+    def act(self, C: float) -> None:
+        """Let the mean force ``C`` [N] act over the step of the last `drift`, too."""
+        pushed, flexible, hastened, further, faster = self._response
+        self._pairs += C * pushed
+        self.u += C * flexible
+        self.v += C * hastened
+        self.y -= C * further
+        self.z -= C * faster
 
     def strike(self, stays: float, turns: float, most: float) -> None:
         """Do to the lower end what `_after_events` says."""
         self.y, self.z = stays * self.y, stays * self.z + max(-most, min(turns * self.y, most))
 
+    def strike_tip(self, stays: float, turns: float, most: float) -> None:
+        """Do to the tip what `_after_events` says; the impulse that is earlier or later moves the beam besides."""
+        jump = (stays - 1.0) * self.u / self.mobility
+        change = (stays - 1.0) * self.v + max(-most, min(turns * self.u, most))
+        self._pairs += jump * self._jump
+        self.u *= stays
+        self.v += jump * self._resisted
+        self.push(change / self.mobility, 0.0)
+
     def meet(self, apart: float, per_mass: float) -> None:
         """Let v − z be ``apart`` [m/s] by an impulse; ``per_mass`` as of `advance`."""
-        v = float(self.tip @ self.x[1])
-        self.push((apart - v + self.z) / (float(self.tip @ self.tip) + per_mass), per_mass)
+        self.push((apart - self.v + self.z) / (self.mobility + per_mass), per_mass)
 
     def push(self, impulse: float, per_mass: float) -> None:
         """Let an ``impulse`` [N·s] lift the tip and press the lower end; ``per_mass`` as of `advance`."""
-        self.x[1] += impulse * self.tip
+        self._pairs += impulse * self._impulse
+        self.v += impulse * self.mobility
         self.z -= impulse * per_mass
+
+
+def _reals(values: np.ndarray) -> np.ndarray:
+    """Return complex ``values`` as pairs of reals."""
+    return np.ascontiguousarray(values).view(float)
 
 
 def _along_soft_law(
@@ -127,12 +184,10 @@ def _along_soft_law(
     for H, k, stays, turns, most, missed, early, stiffer, rate in zip(
         *(v[first:].tolist() for v in of_steps), strict=True
     ):
-        follows, at_start = 0.5 * stiffer + rate / H, (0.5 * stiffer - rate / H) * (ends.y - ends.u)
-
-        def force(apart: float, gives: float, asked: float = missed + at_start, follows: float = follows) -> float:
-            return (asked + follows * apart) / (1.0 + follows * gives)
-
-        ends.advance(H, k, ends.per_mass, force, 0.5 * H * H * (early - missed))
+        asked = missed + (0.5 * stiffer - rate / H) * (ends.y - ends.u)
+        follows = 0.5 * stiffer + rate / H
+        apart, gives = ends.drift(H, k, ends.per_mass, 0.5 * H * H * (early - missed))
+        ends.act((asked + follows * apart) / (1.0 + follows * gives))
         ends.strike(stays, turns, most)
         yield ends.u, ends.y
 
@@ -160,34 +215,45 @@ def _defect(law: SoftLaw, before: np.ndarray, step: np.ndarray, parts: int) -> n
 
 
 def _along_tie(
-    degree: int, ends: _Errors, steps: np.ndarray, stiffness: np.ndarray, after: np.ndarray
+    alone: bool, degree: int, ends: _Errors, steps: np.ndarray, stiffness: np.ndarray, after: np.ndarray
 ) -> Iterator[tuple[float, float]]:
-    """Yield the errors of both ends [m] along the run, inside steps, too: they leave a gap and different velocities."""
+    """Yield the errors of both ends [m] along the run, inside steps, too: they leave a gap and different velocities.
+
+    ``alone`` says that the tip itself strikes the foundation.
+    """
     parts = degree + 2  # one more than the step has forces
     size = np.where(steps["size"] > 0.0, steps["size"], 1.0)
     path = _penetration(np.roll(steps, 1), steps, size)
     shares = (np.arange(parts) + 1.0) / parts
     inside = np.array([[path.at(s), path.slope(s) / size] for s in shares]).transpose(2, 0, 1)
-    tied, phase = joined(steps), steps["phase"]
-    seated, pulls = phase >= 3.0, applied(steps, size) / np.where(steps["z"], steps["z"], inf)
-    for i in range(1, len(steps)):
-        H, k, stays, turns, most = map(float, (steps["size"][i], stiffness[i], *after[:, i]))
-        per_mass = 0.0 if seated[i - 1] else ends.per_mass
-        if H > 0.0 and not tied[i - 1]:
-            ends.advance(H, k, per_mass, lambda apart, gives: 0.0)
-        for deep, rate in inside[i].tolist() if H > 0.0 and tied[i - 1] else ():
-            ends.advance(H / parts, k, per_mass, lambda apart, gives, deep=deep: (apart + deep) / gives)  # type: ignore[misc]
-            ends.meet(rate, per_mass)
-            yield ends.y, ends.y  # between rows the tip takes the path of the lower end
-        ends.strike(stays, turns, most)
-        if tied[i - 1 : i + 1].any() and (most > 0.0 or tied[i] != tied[i - 1]):
-            per_mass = 0.0 if seated[i] or most > 0.0 else ends.per_mass  # the foundation strikes each end by itself
-            # Below degree 2 the velocities of tied ends go up and down about those of a tie, and ends that part keep
-            # them: taken for an error, they tell five times too much (`soft` in steps of 4 ms).
-            kept = not tied[i] and degree < 2
-            ends.meet(0.0 if kept else float(steps["z_after"][i] - steps["v_tip_after"][i]), per_mass)
-        if phase[i - 1] == 1.0 and phase[i] == 0.0:  # y passes Ψ, sooner or later, where the force pulls
-            ends.push(-pulls[i] * ends.y, per_mass)
+    tied = joined(steps)
+    phase = steps["phase"]
+    seated = phase >= 3.0
+    releases = (phase == 1.0) & (np.append(phase[1:], 1.0) == 0.0)
+    pulls = applied(steps, size) / np.where(steps["z"], steps["z"], inf)
+    apart = steps["z_after"] - steps["v_tip_after"]
+    strike = ends.strike_tip if alone else ends.strike
+    held = seated.tolist()
+    open_ = (~tied).tolist()
+    rows = zip(steps["size"].tolist(), stiffness.tolist(), *after.tolist(), apart.tolist(), strict=True)
+    next(rows)
+    for i, (H, k, stays, turns, most, differ) in enumerate(rows, 1):
+        per_mass = 0.0 if held[i - 1] else ends.per_mass
+        if H > 0.0 and open_[i - 1]:
+            ends.drift(H, k, per_mass)
+        elif H > 0.0:
+            for deep, rate in inside[i].tolist():
+                beyond, gives = ends.drift(H / parts, k, per_mass)
+                ends.act((beyond + deep) / gives)
+                ends.meet(rate, per_mass)
+                yield ends.y, ends.y  # between rows the tip takes the path of the lower end
+        if stays != 1.0:
+            strike(stays, turns, most)
+        if not (open_[i - 1] and open_[i]) and (most > 0.0 or open_[i - 1] != open_[i]):
+            # The foundation strikes each end by itself.
+            ends.meet(differ, 0.0 if held[i] or most > 0.0 else ends.per_mass)
+        if releases[i - 1]:  # y passes Ψ, sooner or later, where the force pulls
+            ends.push(-float(pulls[i]) * ends.y, per_mass)
         yield ends.u, ends.y
 
 
@@ -201,7 +267,7 @@ def _penetration(before: np.ndarray, step: np.ndarray, size: np.ndarray) -> Any:
 
 
 def _after_events(interface: Interface, steps: np.ndarray, events: Sequence[Event]) -> np.ndarray:
-    """Return what the events at each of ``steps`` leave of the lower end's error, (3, len(steps)).
+    """Return what the events at each of ``steps`` leave of the error of the end that is struck, (3, len(steps)).
 
     It is the share of displacement and velocity, none while the end is seated, and by how much each unit of
     displacement changes the velocity [1/s], at most by the jump of the stroke [m/s]: the end is struck earlier or
@@ -210,31 +276,27 @@ def _after_events(interface: Interface, steps: np.ndarray, events: Sequence[Even
     shares, (turns, most) = np.where(steps["phase"] >= 3.0, 0.0, 1.0), np.zeros((2, len(steps)))
     struck = [n for n, event in enumerate(events, 1) if event.kind is EventKind.STOP_IMPACT]
     made = np.flatnonzero(steps["size"] > 0.0)
-    if struck:
+    if struck and len(made):
         rows = np.searchsorted(steps["events"], struck)
         e = interface.restitution
         np.multiply.at(shares, rows, -e)
         at = np.searchsorted(made, rows, side="right") - 1
-        gained = (steps["z"][made] - steps["z_after"][made - 1]) / steps["size"][made]
-        speed = steps["z"][made[at]]
-        turns[rows] = (e * gained[at] + np.append(gained, 0.0)[at + 1]) / np.where(speed, speed, inf)
+        before, step = steps[made - 1], steps[made]
+        speed = step["v_tip" if interface.alone else "z"][at]
+        if interface.alone:  # no force acts on the tip before or after
+            changed = (1.0 + e) * _last_acceleration(before[at], step[at])
+        else:
+            gained = (step["z"] - before["z_after"]) / step["size"]
+            changed = e * gained[at] + np.append(gained, 0.0)[at + 1]
+        turns[rows] = changed / np.where(speed, speed, inf)
         most[rows] = (1.0 + e) * np.abs(speed)
     return np.array([shares, turns, most])
 
 
-def _moves(modes: Modes, H: float) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
-    """Return what a step of ``H`` [s] makes of displacement and velocity of each mode, (2, 2, n).
-
-    Further what a constant force of 1 N adds to them, (2, n), and how far that moves the tip [m/N]; and what the step
-    makes of where 1 N·s², which moves a free mass, puts the modes that it follows, (2, n).
-    """
-    # A free mass is a mode so soft that it does not turn; 1 − cos would leave nothing of a softer one.
-    stiffness, decay, tip = np.maximum(modes[0], 1e-8 / H**2), 0.5 * modes[1], modes[2]
-    root = np.sqrt(decay**2 - stiffness * (1.0 + 1e-12j))  # never 0
-    slower, faster = np.exp((root - decay) * H), np.exp(-(root + decay) * H)
-    cosine, sine = (0.5 * (slower + faster)).real, (0.5 * (slower - faster) / root).real
-    kept = cosine + decay * sine
-    free = np.array([[kept, sine], [-stiffness * sine, cosine - decay * sine]])
-    pushed = np.array([(1.0 - kept) / stiffness * tip, sine * tip])
-    moved = tip / (1.0 + H * (decay + 0.25 * H * stiffness))
-    return free, pushed, float(tip @ pushed[0]), free[:, 0] * moved
+def _last_acceleration(before: np.ndarray, step: np.ndarray) -> Any:
+    """Return ü_tip at the end of each step [m/s²], of the path through both ends and the moments."""
+    size = step["size"]
+    start, end = (before["u_tip_after"], before["v_tip_after"]), (step["u_tip"], step["v_tip"])
+    means = step["u_tip_integral"] / size, step["u_tip_integral_2"] / size**2
+    path = Path.through(start, end, size, means)  # type: ignore[arg-type]
+    return value(derivative(derivative(path.powers)), 1.0) / size**2
