@@ -1,17 +1,21 @@
 """Broken FMUs, where the master names the file and the cause; and archives made to do harm."""
 
+import os
 import re
+import shutil
 import stat
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 from zipfile import ZipFile, ZipInfo
 
 import pytest
-from commands import refused
+from commands import ran, refused
 
 import springbeam
 from springbeam.bodies import archive
-from springbeam.bodies.archive import UnsafeArchive, unpack
+from springbeam.bodies.archive import UnsafeArchive, unpack, unpacked
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.protocol import FmuError
 
@@ -233,3 +237,85 @@ def test_the_command_names_file_and_member(folder):
     said = f"error: {folder / 'spring.fmu'}: not a usable FMU: member '../../evil' is no plain name"
     assert refused("run", "soft", "--out", folder / "out").startswith(said)
     assert not (folder / "out").exists()
+
+
+# -- the cache ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "springbeam" / "fmus"
+
+
+def nothing_to_check(folder):
+    assert (folder / "modelDescription.xml").is_file()
+
+
+def test_an_fmu_is_unpacked_once_for_all_processes(fmu_folder, cache):
+    script = f"""
+from pathlib import Path
+from springbeam.bodies.archive import unpacked
+print(unpacked(Path({str(fmu_folder / "spring.fmu")!r}), {HERE!r}, lambda folder: None))
+"""
+    words = [sys.executable, "-c", script]
+    both = [subprocess.Popen(words, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    found = {process.communicate()[0].strip() for process in both}
+    assert [found] == [{str(path)} for path in cache.iterdir()]
+    changed = [(path, path.stat().st_mtime_ns) for path in cache.rglob("*") if path.is_file()]
+    assert changed
+    assert {ran(*words).strip()} == found
+    assert [(path, path.stat().st_mtime_ns) for path in cache.rglob("*") if path.is_file()] == changed
+
+
+def test_another_content_is_another_entry(fmu_folder, cache, tmp_path):
+    for name in ("spring", "spring3"):
+        shutil.copy(fmu_folder / f"{name}.fmu", tmp_path / "same.fmu")
+        entry = unpacked(tmp_path / "same.fmu", (*HERE, "x86_64-linux"), nothing_to_check)
+        with ZipFile(tmp_path / "same.fmu") as file:
+            assert (entry / "modelDescription.xml").read_bytes() == file.read("modelDescription.xml")
+    assert len(list(cache.iterdir())) == 2
+
+
+@pytest.mark.parametrize("damage", ["cut", "gone"])
+def test_a_damaged_entry_is_not_used(fmu_folder, cache, damage):
+    first = unpacked(fmu_folder / "spring.fmu", HERE, nothing_to_check)
+    file = first / "modelDescription.xml"
+    whole = file.read_bytes()
+    file.unlink()
+    if damage == "cut":
+        file.write_bytes(whole[:-1])
+    second = unpacked(fmu_folder / "spring.fmu", HERE, nothing_to_check)
+    assert cache not in second.parents
+    assert (second / "modelDescription.xml").read_bytes() == whole
+
+
+def test_what_is_refused_leaves_no_entry(fmu_folder, cache):
+    def refuse(folder):
+        raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"):
+        unpacked(fmu_folder / "spring.fmu", HERE, refuse)
+    assert list(cache.iterdir()) == []
+
+
+def test_without_a_cache_the_folder_is_a_temporary_one(fmu_folder, tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    first, second = (unpacked(fmu_folder / "spring.fmu", HERE, nothing_to_check) for _ in range(2))
+    assert first != second
+    assert tmp_path not in first.parents
+
+
+def test_a_process_that_must_have_its_own_copy_gets_it(fmu_folder, cache):
+    first, second = (
+        unpacked(fmu_folder / "spring.fmu", HERE, nothing_to_check, alone=alone) for alone in (False, True)
+    )
+    assert [cache in folder.parents for folder in (first, second)] == [True, False]
+
+
+def test_entries_that_nobody_uses_go(fmu_folder, cache):
+    old = unpacked(fmu_folder / "spring.fmu", HERE, nothing_to_check)
+    os.utime(old, (0, 0))
+    new = unpacked(fmu_folder / "spring3.fmu", (*HERE, "x86_64-linux"), nothing_to_check)
+    assert list(cache.iterdir()) == [new]

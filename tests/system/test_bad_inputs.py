@@ -13,7 +13,7 @@ import tomli_w
 from commands import printed, refused
 
 from springbeam.scene import load_scene, messages, scene_from_dict, shipped_scenes
-from springbeam.scene.files import tomllib
+from springbeam.scene.files import beginning, tomllib
 
 TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("bad_inputs.toml").read_text(encoding="utf-8"))
 COMMANDS = TABLE["commands"]
@@ -108,6 +108,6 @@ def test_the_schema_refuses_it_too(name):
 def test_the_schema_accepts_the_scenes_that_are_shipped_and_begun():
     SCHEMA.check_schema(SCHEMA.schema)
     shipped = [path.read_text(encoding="utf-8") for path in shipped_scenes().values()]
-    for text in [messages.beginning('a "scene"'), *shipped]:
+    for text in [beginning('a "scene"'), *shipped]:
         SCHEMA.validate(tomllib.loads(text))
         scene_from_dict(tomllib.loads(text))

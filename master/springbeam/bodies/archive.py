@@ -1,11 +1,22 @@
-"""FMU files: where they are, and how archives that others made are unpacked so that nothing leaves their folder."""
+"""FMU files: where they are, and how archives that others made are unpacked so that nothing leaves their folder.
+
+What is unpacked is kept for later processes in ``$XDG_CACHE_HOME/springbeam/fmus`` (default: ``~/.cache``), by the hash
+of the archive. An entry appears there whole or not at all, and is never changed.
+"""
 
 from __future__ import annotations
 
+import atexit
 import os
 import re
+import shutil
+import tempfile
 import zipfile
+from collections.abc import Callable
+from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
+from time import time
 
 from .protocol import FmuError
 
@@ -19,6 +30,8 @@ _USED = ("modelDescription.xml", "resources/")
 _BINARIES, _EXECUTABLE = "binaries/", 0o111
 #: What the names of our FMUs end with, by version of FMI.
 ENDINGS = {"2.0": "", "3.0": "3"}
+#: Entries of the cache that nobody has used for so long go [s].
+_KEPT_FOR = 30 * 24 * 3600.0
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -48,6 +61,47 @@ class UnsafeArchive(ValueError):
     """An archive that is not unpacked; the message names the member and the cause."""
 
 
+def unpacked(path: Path, platforms: tuple[str, ...], check: Callable[[Path], object], *, alone: bool = False) -> Path:
+    """Return a folder with what a run needs of the FMU ``path``: that of the cache, or a temporary one.
+
+    The temporary one is for where the cache cannot be used, and if the folder must be this process's ``alone``.
+    ``check`` gets what has just been unpacked, and raises what is wrong with it. Raises what `unpack` and ``check`` do.
+    """
+    if not alone:
+        with suppress(OSError):
+            return _kept(path, platforms, check)
+    folder = Path(tempfile.mkdtemp(prefix="springbeam-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    unpack(path, folder, platforms)
+    check(folder)
+    return folder
+
+
+def _kept(path: Path, platforms: tuple[str, ...], check: Callable[[Path], object]) -> Path:
+    """Return the folder of the cache, made if it is not there. Raises OSError if the cache cannot be used."""
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser(), "springbeam", "fmus")
+    entry = cache / sha256(path.read_bytes()).hexdigest()
+    if not entry.exists():
+        cache.mkdir(parents=True, exist_ok=True)
+        for old in cache.iterdir():
+            if time() - old.stat().st_mtime > _KEPT_FOR:
+                shutil.rmtree(old, ignore_errors=True)
+        part = Path(tempfile.mkdtemp(prefix="part-", dir=cache))
+        try:
+            unpack(path, part, platforms)
+            check(part)
+            with suppress(OSError):  # another process was first
+                part.rename(entry)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+    with zipfile.ZipFile(path) as archive:
+        members = [(entry / member.filename, member.file_size) for member in _used(archive, platforms)]
+    if not all(file.is_dir() or file.stat().st_size == size for file, size in members):
+        raise OSError(f"{entry}: damaged")
+    os.utime(entry)
+    return entry
+
+
 def unpack(path: Path, folder: Path, platforms: tuple[str, ...]) -> None:
     """Unpack what a run needs of the FMU ``path`` into ``folder``; links and devices become plain files.
 
@@ -66,28 +120,33 @@ def unpack(path: Path, folder: Path, platforms: tuple[str, ...]) -> None:
         If it cannot be read, or ``folder`` not be written to.
     """
     with zipfile.ZipFile(path) as archive:
-        members = archive.infolist()
-        if len(members) > MOST_MEMBERS:
-            raise UnsafeArchive(f"{len(members)} members, at most {MOST_MEMBERS} are allowed; pack fewer files")
-        for name in (member.orig_filename for member in members):  # `filename` has been made harmless for this system
-            if not _PLAIN.fullmatch(name):
-                what = f"member {name[:100]!r} is no plain name inside the archive"
-                raise UnsafeArchive(f"{what}; it is not unpacked, take it from its source again")
-        here = tuple(f"{_BINARIES}{platform}/" for platform in platforms)
-        used = [member for member in members if member.filename.startswith((*_USED, *here))]
-        # What is read of a member is never more than the size it declares.
-        size = sum(member.file_size for member in used)
-        if size > MOST_BYTES:
-            what = f"resources/ and the binaries of this platform take {size} bytes unpacked"
-            raise UnsafeArchive(f"{what}, at most {MOST_BYTES} are allowed; pack smaller resources")
-        others = {m.filename.split("/")[1] for m in members if m.filename.startswith(_BINARIES) and not m.is_dir()}
-        if others and others.isdisjoint(platforms):
-            raise ValueError(
-                f"it has binaries for {', '.join(sorted(others))} and none for this platform; export it with those of "
-                f"{' or '.join(platforms)}"
-            )
-        for member in used:
+        for member in _used(archive, platforms):
             unpacked = Path(archive.extract(member, folder))
             # Only whether a file may be executed, as a program among the resources: nothing else of its mode.
             if not member.is_dir() and (mode := member.external_attr >> 16 & _EXECUTABLE):
                 unpacked.chmod(unpacked.stat().st_mode | mode)
+
+
+def _used(archive: zipfile.ZipFile, platforms: tuple[str, ...]) -> list[zipfile.ZipInfo]:
+    """Return the members that a run needs. Raises what `unpack` says."""
+    members = archive.infolist()
+    if len(members) > MOST_MEMBERS:
+        raise UnsafeArchive(f"{len(members)} members, at most {MOST_MEMBERS} are allowed; pack fewer files")
+    for name in (member.orig_filename for member in members):  # `filename` has been made harmless for this system
+        if not _PLAIN.fullmatch(name):
+            what = f"member {name[:100]!r} is no plain name inside the archive"
+            raise UnsafeArchive(f"{what}; it is not unpacked, take it from its source again")
+    here = tuple(f"{_BINARIES}{platform}/" for platform in platforms)
+    used = [member for member in members if member.filename.startswith((*_USED, *here))]
+    # What is read of a member is never more than the size it declares.
+    size = sum(member.file_size for member in used)
+    if size > MOST_BYTES:
+        what = f"resources/ and the binaries of this platform take {size} bytes unpacked"
+        raise UnsafeArchive(f"{what}, at most {MOST_BYTES} are allowed; pack smaller resources")
+    others = {m.filename.split("/")[1] for m in members if m.filename.startswith(_BINARIES) and not m.is_dir()}
+    if others and others.isdisjoint(platforms):
+        raise ValueError(
+            f"it has binaries for {', '.join(sorted(others))} and none for this platform; export it with those of "
+            f"{' or '.join(platforms)}"
+        )
+    return used

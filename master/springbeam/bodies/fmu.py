@@ -9,8 +9,7 @@ from __future__ import annotations
 import atexit
 import difflib
 import os
-import shutil
-import tempfile
+from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from ctypes import byref, c_double, c_int, c_size_t, c_uint, c_void_p, cast
@@ -24,7 +23,7 @@ from xml.parsers import expat
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, read_model_description
 
-from .archive import UnsafeArchive, own_fmu, unpack
+from .archive import UnsafeArchive, own_fmu, unpacked
 from .functions import DISCARD, ERROR, FATAL, FMU2, FMU3, PLATFORMS, VERSIONS, WARNING, Advance, advances
 from .protocol import FmuError, StepRefused
 from .units import Unit, unit_of
@@ -32,15 +31,19 @@ from .units import Unit, unit_of
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 
 
+#: How many instances of a file have returned fmi2Fatal in this process.
+_fatal: Counter[Path] = Counter()
+
+
 @lru_cache(maxsize=8)
-def _opened(path: Path, modified: int) -> tuple[ModelDescription, FMU2 | FMU3]:
-    """Return what the FMU at ``path`` says of itself, and its library. Raises FmuError."""
-    folder = Path(tempfile.mkdtemp(prefix="springbeam-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+def _opened(path: Path, modified: int, fatal: int) -> tuple[ModelDescription, FMU2 | FMU3]:
+    """Return what the FMU at ``path`` says of itself, and its library. Raises FmuError.
+
+    Where there are ``fatal`` instances, the library is another copy, for none of theirs may be called again.
+    """
     try:
-        unpack(path, folder, PLATFORMS)
-        _refuse_document_types(folder / "modelDescription.xml")
-        description = read_model_description(str(folder))
+        folder = unpacked(path, PLATFORMS, _check_description, alone=fatal > 0)
+        description = read_model_description(str(folder), validate=False)  # `_check_description` has
         version = VERSIONS.get(description.fmiVersion)
         if description.coSimulation is None or version is None:
             kind = "co-simulation" if description.coSimulation else "model exchange"
@@ -55,8 +58,12 @@ def _opened(path: Path, modified: int) -> tuple[ModelDescription, FMU2 | FMU3]:
         raise FmuError(f"{path}: not a usable FMU: {' '.join(str(error).split())}") from error
 
 
-def _refuse_document_types(path: Path) -> None:
-    """Raise UnsafeArchive if the XML file ``path`` has one: its entities may name files; FMI's schema has none."""
+def _check_description(folder: Path) -> None:
+    """Raise what is wrong with the modelDescription.xml in ``folder``.
+
+    UnsafeArchive if it has a document type: its entities may name files; FMI's schema has none.
+    """
+    path = folder / "modelDescription.xml"
 
     def refuse(*_: Any) -> NoReturn:
         raise UnsafeArchive("modelDescription.xml: a document type declaration is not part of an FMU")
@@ -67,6 +74,7 @@ def _refuse_document_types(path: Path) -> None:
         parser.Parse(path.read_bytes(), True)
     except expat.ExpatError as error:
         raise ValueError(f"modelDescription.xml is not XML: {error}") from error
+    read_model_description(str(folder))
 
 
 @contextmanager
@@ -144,7 +152,7 @@ class Fmu:
         if not self.path.is_file():
             remedy = "; ./build.sh fmus builds it, SPRINGBEAM_FMUS names another folder" if self._own else ""
             raise FmuError(f"{self.path}: not found{remedy}")
-        description, opened = _opened(self.path, self.path.stat().st_mtime_ns)
+        description, opened = _opened(self.path, self.path.stat().st_mtime_ns, _fatal[self.path])
         identifier = description.coSimulation.modelIdentifier
         if self._own and identifier != self._name:
             raise FmuError(f"{self.path}: model identifier {identifier!r}, expected {self._name!r}")
@@ -366,7 +374,7 @@ class Fmu:
                 with suppress(FmuError):
                     self._asked("cannot free a state", self._slave.freeFMUState, state)
         if self._worst == FATAL:
-            _opened.cache_clear()  # the next instance takes a copy of the library of its own
+            _fatal[self.path] += 1
         else:
             with suppress(OSError):
                 self._slave.freeInstance()
