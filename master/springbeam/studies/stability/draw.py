@@ -1,4 +1,4 @@
-"""Random scenes: a range is a table of axes, a cell has a value for each, and `scene_dict` is the scene of a cell.
+"""Random scenes: a range of ``ranges.toml`` has axes, a cell has a value for each, `scene_dict` is the scene of a cell.
 
 Values are relative to the beam and to the motion, so that a range says what kind of scene it has: the cell's stiffness,
 length, density and speed give the units. `EXTREME` has all that a scene may ask for, `USUAL` what a bench may have. A
@@ -9,10 +9,12 @@ The same seed gives the same cells.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf, pi, sqrt
+from math import inf, sqrt
+from pathlib import Path
 from typing import Any
 
 from ...scene import Beam
+from ...scene.files import tables_of
 from ...scene.frequencies import slowest_frequency
 from ...scene.laws import LAWS
 from ...scene.statics import tip_compliance, tip_inertia
@@ -28,133 +30,25 @@ COUPLINGS = (
     *(("link", *scheme) for scheme in SOFT),
 )
 
-#: What a parameter is where a range does not have it, and in slices: nearly the scene ``soft``, coarser. The *reach*
-#: [m] is how far both bodies go at the tip's speed when each is as stiff as its linear part.
-AT_REST: dict[str, Any] = {
-    "coupling": ("transmission", "energy", 0),
-    "bodies": "both",  # or "beam", "spring"
-    "stiffness": 100.0,  # √(EI·KAG)/L [N]
-    "length": 1.0,  # [m]
-    "density": 1.0,  # [kg/m]
-    "speed": 1.0,  # of the tip, or of a spring alone [m/s]
-    "shear_ratio": 1.0,  # KAG L²/EI
-    "gyration": 1.0,  # √(I/A)/L
-    "macro_step": 0.01,  # by the fastest of the bodies' own slowest motions [rad]
-    "steps": 200,
-    "mass": 1.0,  # of the spring over that of the beam
-    "k1": 0.04,  # over the stiffness of the tip
-    "k2_kind": "softening",  # or "hardening", "linear"
-    "k2": 0.1,  # of a hardening spring, k2·reach²/k1
-    "escape": 6.7,  # the hilltop of a softening spring, in reaches
-    "depth": 0.08,  # of a soft contact, in reaches
-    "exponent": 1.5,
-    "contact_damping": 0.0,  # χ·speed; of a link over √((m + m_tip)(k1 + k_tip))
-    "alpha_b": 0.0,  # α_b ω₁/2
-    "alpha_s": 0.0,  # α_s/√(m k1)
-    "stop_depth": 0.12,  # Ψ − φ in reaches; 0: no stop; a beam alone is on its stop
-    "restitution": 1.0,
-    "elasticity": "given",  # or "plastic", "elastic", whatever the restitution
-    "equilibrium": 0.0,  # Ψ in reaches
-    "clearance": 0.0,  # of the tip above the spring at the start, in reaches
-    "approach": "undeformed",
-    "distributed_load": 0.0,  # these three over the force that moves their body by a reach
-    "tip_load": 0.0,
-    "external_force": 0.0,
-    "direction": 1.0,  # of the loads
-    "fidelity": "dynamic",
-    "n_elements": 20,
-    "element_degree": 1,
-    "n_modes": 0,
-    "integrator": "modal",
-    "reduced_integration": False,
-}
 
-#: A share of the cells has none of what may be 0.
-EXTREME = (
-    Axis("coupling", COUPLINGS),
-    Axis("bodies", (*("both",) * 6, "beam", "spring")),
-    Axis("stiffness", (), 1.0, 3.6e10, log=True),
-    Axis("speed", (), 1e-6, 1000.0, log=True),
-    Axis("shear_ratio", (), 1e-6, 1e6, log=True),
-    Axis("macro_step", (), 1e-6, 1000.0, log=True),
-    Axis("steps", (), 100, 400, log=True),
-    Axis("mass", (), 1e-6, 1e6, log=True),
-    Axis("k1", (), 1e-8, 1e6, log=True),
-    Axis("k2_kind", ("hardening", "hardening", "softening", "linear")),
-    Axis("k2", (), 1e-6, 1e4, log=True),
-    Axis("escape", (), 0.3, 30.0, log=True),
-    Axis("depth", (), 1e-6, 10.0, log=True),
-    Axis("exponent", (), 1.0, 5.0),
-    Axis("contact_damping", (), 0.001, 1000.0, log=True, zero=0.5),
-    Axis("alpha_b", (), 1e-9, 10.0, log=True, zero=0.4),
-    Axis("alpha_s", (), 1e-6, 100.0, log=True, zero=0.4),
-    Axis("stop_depth", (), 1e-9, 1.0, log=True, zero=0.2),
-    Axis("restitution", (), 0.0, 1.0),
-    Axis("elasticity", ("given", "plastic", "elastic")),
-    Axis("equilibrium", (), -1.0, 1.0),
-    Axis("clearance", (), 1e-9, 1.0, log=True, zero=0.6),
-    Axis("approach", ("undeformed", "elastic")),
-    Axis("distributed_load", (), 0.001, 10.0, log=True, zero=0.6),
-    Axis("external_force", (), 0.001, 10.0, log=True, zero=0.6),
-    Axis("direction", (-1.0, 1.0)),
-    Axis("fidelity", (*("dynamic",) * 4, "quasi_static")),
-    Axis("n_elements", (1, 2, 5, 10, 20, 50)),
-    Axis("element_degree", (1, 1, 1, 2, 5, 12)),
-    Axis("n_modes", (0, 0, 1, 4)),
-    Axis("integrator", (*("modal",) * 3, "midpoint")),
-    Axis("reduced_integration", (False, True)),
-)
-#: A macro step is a hundredth of the shortest one of the bodies' own periods: what a user might take.
-USUAL = (
-    Axis("coupling", tuple((law, *RIGID[2]) for law in (*("transmission",) * 4, *("compliance",) * 2, "tie", "link"))),
-    Axis("bodies", (*("both",) * 8, "beam", "spring")),
-    Axis("stiffness", (), 10.0, 1e8, log=True),
-    Axis("length", (), 0.2, 2.0, log=True),
-    Axis("density", (), 0.1, 100.0, log=True),
-    Axis("speed", (), 0.1, 3.0, log=True),
-    Axis("shear_ratio", (), 30.0, 1500.0, log=True),
-    Axis("gyration", (), 0.014, 0.1, log=True),
-    Axis("macro_step", (2.0 * pi / 100.0,)),
-    Axis("steps", (), 40, 400, log=True),
-    Axis("mass", (), 0.01, 1.0, log=True),
-    Axis("k1", (), 0.2, 20.0, log=True),
-    Axis("k2_kind", (*("hardening",) * 4, "linear")),
-    Axis("k2", (), 0.05, 2.0, log=True),
-    Axis("depth", (), 0.02, 0.2, log=True),
-    Axis("exponent", (1.0, 1.5, 2.0, 3.0)),
-    Axis("contact_damping", (), 0.01, 1.0, log=True, zero=0.5),
-    Axis("alpha_b", (), 1e-4, 0.03, log=True, zero=0.6),
-    Axis("alpha_s", (), 0.01, 0.3, log=True, zero=0.5),
-    Axis("stop_depth", (), 0.1, 0.8, log=True, zero=0.65),
-    Axis("restitution", (), 0.2, 0.95),
-    Axis("elasticity", ("given", "elastic")),
-    Axis("clearance", (), 0.05, 0.5, log=True, zero=0.7),
-    Axis("approach", ("elastic",)),
-    Axis("distributed_load", (), 0.1, 0.5, log=True, zero=0.7),
-    Axis("tip_load", (), 0.1, 0.5, log=True, zero=0.8),
-    Axis("external_force", (), 0.1, 0.5, log=True, zero=0.7),
-    Axis("direction", (-1.0, 1.0)),
-    Axis("n_elements", tuple(range(5, 31))),
-    Axis("n_modes", (*(0,) * 4, 2, 4, 8)),
-    Axis("reduced_integration", (True,)),
-)
+def _axes(range_: dict[str, Any]) -> tuple[Axis, ...]:
+    return tuple(Axis(name, **{key: _tuples(value) for key, value in axis.items()}) for name, axis in range_.items())
 
+
+def _tuples(value: Any) -> Any:
+    """Return ``value`` with tuples for lists, which can be members of a set."""
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+_RANGES = tables_of(Path(__file__).with_name("ranges.toml"))
+#: What a parameter is where a range does not have it, and in slices.
+AT_REST: dict[str, Any] = {name: _tuples(value) for name, value in _RANGES["at_rest"].items()}
+EXTREME = (Axis("coupling", COUPLINGS), *_axes(_RANGES["extreme"]))
+USUAL = _axes(_RANGES["usual"])
 #: Two axes over their ranges by the name of the slice, and what else is not at rest.
 SLICES: dict[str, tuple[str, str, dict[str, Any]]] = {
-    "energy 0": ("macro_step", "k1", {}),
-    "energy 2": ("macro_step", "k1", {"coupling": ("transmission", "energy", 2)}),
-    "energy 2, mass": ("macro_step", "mass", {"coupling": ("transmission", "energy", 2)}),
-    "jacobi 0": ("macro_step", "depth", {"coupling": ("compliance", "jacobi", 0)}),
-    "compliance energy": ("macro_step", "depth", {"coupling": ("compliance", "energy", 0)}),
-    "compliance energy 2": ("macro_step", "depth", {"coupling": ("compliance", "energy", 2)}),
-    "damped compliance energy 2": ("contact_damping", "depth", {"coupling": ("compliance", "energy", 2)}),
-    "link energy 1": ("macro_step", "depth", {"coupling": ("link", "energy", 1)}),
-    "tie energy 2": ("macro_step", "mass", {"coupling": ("tie", "energy", 2)}),
-    "compliance exponents": ("exponent", "depth", {"coupling": ("compliance", "energy", 0)}),
-    "hardening": ("k2", "k1", {"k2_kind": "hardening", "coupling": ("transmission", "energy", 1)}),
-    "shear": ("shear_ratio", "alpha_b", {"coupling": ("transmission", "energy", 1)}),
-    "stop": ("stop_depth", "restitution", {"coupling": ("transmission", "energy", 2), "alpha_s": 0.1}),
-    "quasi-static": ("macro_step", "k1", {"fidelity": "quasi_static", "external_force": 1.0}),
+    name: (*fixed.pop("axes"), {key: _tuples(value) for key, value in fixed.items()})
+    for name, fixed in _RANGES["slices"].items()
 }
 
 
