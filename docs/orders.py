@@ -36,7 +36,7 @@ def measured() -> dict[int, np.ndarray]:
         found = []
         for H in STEPS:
             run = simulate(with_changes(soft, coupling={"degree": degree, "macro_step": H}))
-            reference = event_driven.simulate(soft, sample_times=run.time)
+            reference = event_driven.integrate(soft, sample_times=run.time)
             at = np.searchsorted(reference.time, run.time)
             off = np.abs([run.y - reference.y[at], run.v_tip - reference.v_tip[at]])
             inside = [(run.time > a + APART) & (run.time < b - APART) for a, b in PHASES.values()]
@@ -62,7 +62,7 @@ def rows(errors: dict[int, np.ndarray]) -> list[list[str]]:
 def late() -> list[list[str]]:
     """Return errors of the times of the first three events after the start [s], and energy residuals."""
     soft = with_changes(load_scene("soft"), time={"t_end": 0.28})
-    exact = event_driven.simulate(soft)
+    exact = event_driven.integrate(soft)
     found = []
     for degree in DEGREES:
         for H in (1e-3, 2.5e-4):

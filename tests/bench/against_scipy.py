@@ -47,7 +47,7 @@ def accuracy(effort):
     methods = list(RIVALS)[:1] if effort.quick else list(RIVALS)
     for n in (10,) if effort.quick else (50, 200):
         soft = with_changes(load_scene("soft"), beam={"n_elements": n}, time={"t_end": UNTIL})
-        exact = event_driven.simulate(soft, sample_times=TIMES).y
+        exact = event_driven.integrate(soft, sample_times=TIMES).y
         scale = float(np.abs(exact).max())
         families = [
             [_candidate(soft, exact, steps, *tolerances) for steps in (STEPS[-2:] if effort.quick else STEPS)]

@@ -13,7 +13,7 @@ from springbeam.paper import monolithic
 
 
 def simulate(scene):
-    """Run Algorithm 1 as printed; arguments are the defaults of `springbeam.paper.monolithic.simulate`."""
+    """Run Algorithm 1 as printed; arguments are the defaults of `springbeam.paper.monolithic.algorithm_1`."""
     algorithm = _AsPrinted(scene)
     algorithm.run()
     return algorithm.trajectory()

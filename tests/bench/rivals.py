@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 
 from springbeam.monolithic.event_driven import initial
 from springbeam.monolithic.hybrid_system import HybridSystem, ReferenceFailure
-from springbeam.monolithic.laws import Link, Phase, Watch
+from springbeam.monolithic.laws import Link, ReferencePhase, Watch
 from springbeam.monolithic.transitions import HybridState
 from springbeam.results.distance import motion
 from springbeam.results.trajectory import Trajectory
@@ -52,7 +52,7 @@ class Rival:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._system = HybridSystem(scene)
-        self._phases: dict[Phase, _Phase] = {}
+        self._phases: dict[ReferencePhase, _Phase] = {}
 
     def solve(
         self, method: str, rtol: float, atol: float, times: Sequence[float] | np.ndarray, limit: float = np.inf
@@ -137,7 +137,7 @@ def _limited(rhs: Callable[..., np.ndarray], deadline: float, limit: float) -> C
 class _Phase:
     """The equations of one phase of contact, and the functions that end it."""
 
-    def __init__(self, s: HybridSystem, phase: Phase) -> None:
+    def __init__(self, s: HybridSystem, phase: ReferencePhase) -> None:
         self._system, self._phase, self._held = s, phase, s.held(phase)
         self._soft = s.scene.coupled and not s.joined(phase) and s.law.acts(phase.contact)
         self._damped, self._hardening = bool(np.any(s.c)), s.spring.cubic_stiffness / s.spring.mass**2

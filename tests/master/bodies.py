@@ -19,7 +19,7 @@ from springbeam.bodies.force import shifted, work_on
 from springbeam.bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion
 from springbeam.contact.interface import Interface
 from springbeam.coupling.protocol import Step
-from springbeam.monolithic.semi_discrete import Loads, modal_beam
+from springbeam.monolithic.semi_discrete import ModalLoads, modal_beam
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
 from springbeam.run.outcome import RunStopped
@@ -279,7 +279,7 @@ def bodies(scene):
         target = scene.tip_target
         kinematic = scene.beam.approach == "undeformed" and target is not None
         beam = beam_body(scene.beam, target.value / scene.beam.length if kinematic else None)
-        patterns = Loads(scene, modal_beam(scene.beam)).patterns
+        patterns = ModalLoads(scene, modal_beam(scene.beam)).patterns
         beam.patterns = [row for load, row in zip(scene.loads, patterns, strict=True) if load.on != "spring"]
     if (p := scene.spring) is not None:
         spring = DuffingBody(

@@ -4,7 +4,7 @@ import numpy as np
 from scenes import scene_from_dict
 from scipy.integrate import solve_ivp
 
-from springbeam.monolithic.event_driven import simulate
+from springbeam.monolithic.event_driven import integrate
 from springbeam.monolithic.exponential import ExponentialPropagator
 
 
@@ -44,7 +44,7 @@ def integrated_anew(scene, patch, t_end):
         return segment
 
     patch.setattr(ExponentialPropagator, "_step", noted)
-    run = simulate(scene, sample_times=np.linspace(0.0, t_end, 31), t_end=t_end)
+    run = integrate(scene, sample_times=np.linspace(0.0, t_end, 31), t_end=t_end)
     for propagator, segment in (one for some in kept.values() for one in some):
         s, phase = propagator.form.system, propagator.form.phase
 

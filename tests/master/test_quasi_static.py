@@ -133,7 +133,7 @@ def test_what_is_left_out_is_said_with_its_size():
 def test_what_holds_the_ends_is_the_force_of_the_reference_over_the_stiffness():
     """C/k and its rate, by the accelerations of the reference."""
     given = scene(stop={"position": -0.05}, beam={"alpha_b": 0.02})
-    exact = event_driven.simulate(given)
+    exact = event_driven.integrate(given)
     compliance, alpha = statics.tip_compliance(given.beam), given.beam.alpha_b
     joined = np.isin(exact.phase, ("tied", "touch"))
     y, z, force, acceleration = (exact[name][joined] for name in ("y", "z", "contact_force", "a_y"))

@@ -30,7 +30,7 @@ from springbeam.results.directory import (
 from springbeam.results.files import export, load_summary, load_trajectory, read_run
 from springbeam.results.recording import FileRecorder, MemoryRecorder
 from springbeam.results.steps import PHASE_NAMES, STEP_COLUMNS
-from springbeam.results.trajectory import COLUMNS, TOLD
+from springbeam.results.trajectory import BODY_COLUMNS, COLUMNS
 from springbeam.run.log import Log
 from springbeam.run.outcome import RunStopped
 from springbeam.scene import SceneError, with_changes
@@ -184,7 +184,7 @@ def test_files_are_plain_csv_and_json(tmp_path):
     filed(tmp_path / "run", (steps, [Event(0.1, "impact", y=0.5, z=-1.0, energy_loss=0.25)], shapes))
     text = (tmp_path / "run" / "trajectory.csv").read_bytes().decode()
     header, first, *_ = text.split("\n")
-    assert header.split(",") == [*COLUMNS, *(name for name in TOLD if name != "bending_stress")]
+    assert header.split(",") == [*COLUMNS, *(name for name in BODY_COLUMNS if name != "bending_stress")]
     assert Fraction(first.split(",")[1]) == Fraction(repr(1 / 3))
     assert (text.count("\n"), text[-1], text.count("\r")) == (3, "\n", 0)
     assert (tmp_path / "run" / "events.csv").read_text().splitlines() == [

@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.event_driven import first_event
 from springbeam.monolithic.exponential import Segment
-from springbeam.monolithic.laws import Phase, Watch
+from springbeam.monolithic.laws import ReferencePhase, Watch
 from springbeam.monolithic.oscillators import GAUSS
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.scene import Beam, load_scene, with_changes
@@ -34,7 +34,7 @@ EXTENDED_PRECISION = [(0.07122400935981067, 0.298683962257942), (0.1443694562034
 
 def test_soft_agrees_with_extended_precision():
     """The lowest frequencies carry ε·ω_max/ω_min of their own size."""
-    result = event_driven.simulate(soft(50), sample_times=[0.0, 0.05, 0.15], t_end=0.15)
+    result = event_driven.integrate(soft(50), sample_times=[0.0, 0.05, 0.15], t_end=0.15)
     assert kinds(result) == ["impact", "stop_impact", "release"]
     assert (result.events[0].z, result.y[1]) == pytest.approx((-0.0057403607, -0.0087444212), abs=5e-11)
     for event, (time, velocity) in zip(result.events[1:], EXTENDED_PRECISION, strict=True):
@@ -53,13 +53,13 @@ LAWS = [exact.compliant_impact, exact.hunt_crossley, exact.link, exact.damped_li
 def test_the_reference_meets_the_exact_solutions_of_a_run(section, share, monkeypatch):
     """The bounds of laws are errors of a coupling and of IDA, of which the reference has neither."""
     for module in (laws, coupled):
-        monkeypatch.setattr(module, "simulate", event_driven.simulate)
+        monkeypatch.setattr(module, "simulate", event_driven.integrate)
     for check in section():
         assert abs(check.error or 0.0) <= share * check.bound, check
 
 
 def test_the_reference_of_a_bar_on_a_stop_approaches_the_exact_impact(monkeypatch):
-    monkeypatch.setattr(coupled, "simulate", event_driven.simulate)
+    monkeypatch.setattr(coupled, "simulate", event_driven.integrate)
     assert [check.quantity for check in exact.bar_impact.solution(10) if not check.passed] == []
 
 
@@ -85,7 +85,7 @@ def test_a_beam_on_a_link_is_the_matrix_exponential(stiffness, damping, alpha):
     spring = {"damping": 0.4, "external_force": -0.5}
     scene = linear(beam={"alpha_b": alpha, "initial_deflection_slope": 0.02}, spring=spring, contact=contact, stop=None)
     times = np.array([0.01, 0.05, 0.1, 0.2])
-    result = event_driven.simulate(scene, sample_times=times, t_end=0.2)
+    result = event_driven.integrate(scene, sample_times=times, t_end=0.2)
     mesh = assemble(scene.beam)
     x = mesh.slope_shape
     expected = laws.linked(scene, mesh.M.toarray(), mesh.K.toarray(), 0.02 * x, -x, times)
@@ -95,7 +95,7 @@ def test_a_beam_on_a_link_is_the_matrix_exponential(stiffness, damping, alpha):
 
 def test_a_damped_contact_lets_go_where_its_ends_part_fast_and_never_pulls():
     contact = {"law": "compliance", "stiffness": 1e3, "exponent": 1.5, "damping": 5.0}
-    run = event_driven.simulate(linear(contact=contact, stop=None), t_end=0.4)
+    run = event_driven.integrate(linear(contact=contact, stop=None), t_end=0.4)
     slack = (run.phase == "touch") & (run.contact_force == 0.0) & (run.y > run.u_tip)
     assert 30 < np.sum(slack) < 50
     assert np.min(run.contact_force) > -1e-14
@@ -110,14 +110,14 @@ def test_a_spring_that_runs_away_is_a_failure_of_the_reference():
     scene = with_changes(soft(), beam=None, stop=None, time={"t_end": 20.0})
     unchecked = scene.model_copy(update={"lower": scene.spring.model_copy(update={"initial_velocity": 5.0})})
     with pytest.raises(event_driven.ReferenceFailure):
-        event_driven.simulate(unchecked, sample_times=[0.0])
+        event_driven.integrate(unchecked, sample_times=[0.0])
 
 
 @pytest.mark.parametrize(("speed", "kinds_then"), [(1.0, ["stop_impact"]), (-1.0, [])])
 def test_a_tip_that_starts_on_the_stop_strikes_it_only_downward(speed, kinds_then):
     beam = {"n_elements": 8, "initial_deflection_slope": 0.0, "initial_velocity_slope": -speed, "approach": "elastic"}
     scene = with_changes(load_scene("beam-on-stop"), beam=beam, stop={"position": 0.0})
-    assert kinds(event_driven.simulate(scene, sample_times=[0.0], t_end=1e-6)) == kinds_then
+    assert kinds(event_driven.integrate(scene, sample_times=[0.0], t_end=1e-6)) == kinds_then
 
 
 def wave(tau, bottom):
@@ -147,7 +147,7 @@ def test_an_event_is_where_its_function_first_falls_below_rounding(function, exp
         system = SimpleNamespace(motion=lambda _, X: X[..., 0] / size, noise=lambda *_: 1e-15)  # noqa: B023
         segment = Segment(nodes, nodes[:, None], lambda tau: np.array([tau]))
         later = Watch("later", lambda tau: 0.9 - tau, "m")
-        found = first_event(system, Phase("free"), [Watch("it", function, "m"), later], segment)
+        found = first_event(system, ReferencePhase("free"), [Watch("it", function, "m"), later], segment)
         assert (found[0].name, found[1] / size) == (
             ("later", pytest.approx(0.9)) if expected is None else ("it", pytest.approx(expected, abs=1e-11))
         )
@@ -156,7 +156,7 @@ def test_an_event_is_where_its_function_first_falls_below_rounding(function, exp
 def test_a_dip_between_nodes_is_not_missed():
     """After 8 impacts it dips 7 μm past the foundation."""
     scene, times = dips(0.7, 1.0)
-    assert [event.time for event in event_driven.simulate(scene).events] == pytest.approx(times, abs=1e-8)
+    assert [event.time for event in event_driven.integrate(scene).events] == pytest.approx(times, abs=1e-8)
 
 
 # -- its beam -------------------------------------------------------------------------------------------------------

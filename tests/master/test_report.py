@@ -17,7 +17,7 @@ from springbeam.pictures.frames import MOST_FRAMES
 from springbeam.pictures.panels import panels
 from springbeam.pictures.report import page
 from springbeam.results.directory import REPORT
-from springbeam.results.trajectory import TOLD
+from springbeam.results.trajectory import BODY_COLUMNS
 from springbeam.scene import scene_from_dict, with_changes
 from springbeam.scene.files import tomllib
 
@@ -113,7 +113,7 @@ def test_curves_are_the_columns_bit_for_bit_in_single_precision(scene):
     for panel, curve in drawn:
         assert ("stackgroup" in found[curve.name]) == curve.stacked
         if curve.name in run.columns and curve.name != "energy_residual":
-            of = run.felt() if curve.name in TOLD else run
+            of = run.without_start() if curve.name in BODY_COLUMNS else run
             for axis, values in (("x", of.time), ("y", panel.unit.factor * of[curve.name])):
                 drawn_values = array(found[curve.name][axis])
                 assert np.array_equal(drawn_values, values.astype(drawn_values.dtype))

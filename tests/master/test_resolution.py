@@ -86,7 +86,7 @@ def test_what_alternates_while_ends_are_tied_matters_where_they_part():
     assert np.abs(run.steps["v_tip_after"] - run.steps["z_after"])[tied].max() > 0.15
     assert [event.kind for event in run.events] == ["impact"]
     assert run.summary["resolved"] is True
-    exact = event_driven.simulate(run.scene, sample_times=run.time)
+    exact = event_driven.integrate(run.scene, sample_times=run.time)
     assert np.abs(run.y[1:] - exact.y[-len(run) + 1 :]).max() < 1e-3 * np.ptp(exact.y)
     assert whole.summary["resolved"] is False
     assert "moves an end by about 2.1 %" in whole.summary["warnings"][0]
@@ -130,7 +130,7 @@ def test_errors_of_steps_within_the_tolerance_add_up(tolerance, resolved):
     link = with_changes(PAIR, time={"t_end": 1.0}, beam={"n_elements": 10}, contact={"law": "link", "stiffness": 1e3})
     run = simulate(with_changes(link, coupling={"relative_tolerance": tolerance}))
     rows = slice(None, None, max(len(run) // 200, 1))
-    exact = event_driven.simulate(with_changes(link, coupling={"degree": 2}), sample_times=run.time[rows])
+    exact = event_driven.integrate(with_changes(link, coupling={"degree": 2}), sample_times=run.time[rows])
     off = np.abs(run.u_tip[rows] - exact.u_tip).max() / np.ptp(exact.u_tip)
     assert run.summary["resolved"] is resolved
     assert (off < 0.01) == resolved

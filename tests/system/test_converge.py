@@ -7,21 +7,24 @@ from commands import printed
 from rich.console import Console
 
 from springbeam.scene import load_scene, with_changes
-from springbeam.studies.converge import judged, meshes, settled
+from springbeam.studies.converge import extrapolated, judged, meshes
 
 
 @pytest.mark.parametrize("sizes", [(1, 2, 4, 8), (1, 2, 5, 10), (3, 4, 7, 30)])
 @pytest.mark.parametrize("order", [0.7, 2.0, 4.0])
 def test_a_sequence_of_one_order_gives_it_and_its_limit(order, sizes):
     """Sizes need not be halvings: 10, 5, 2 and 1 modes were taken for these."""
-    found = settled([3.0 + 0.1 * n**-order for n in sizes], sizes)
+    found = extrapolated([3.0 + 0.1 * n**-order for n in sizes], sizes)
     assert (found.order, found.limit) == pytest.approx((order, 3.0), rel=1e-9)
     assert found.error == pytest.approx(0.1 * sizes[-1] ** -order, rel=1e-6)
 
 
 def test_what_hardly_converges_has_no_limit():
-    assert [settled([n**-order for n in (1, 2, 4)], (1, 2, 4)).limit is None for order in (0.4, 0.6)] == [True, False]
-    assert settled([1.0, 2.0, 1.5], (1, 2, 4)) == settled([2.0, 1.5], (1, 2)) == (-0.5, None, None, None)
+    assert [extrapolated([n**-order for n in (1, 2, 4)], (1, 2, 4)).limit is None for order in (0.4, 0.6)] == [
+        True,
+        False,
+    ]
+    assert extrapolated([1.0, 2.0, 1.5], (1, 2, 4)) == extrapolated([2.0, 1.5], (1, 2)) == (-0.5, None, None, None)
 
 
 def test_errors_are_from_the_limit_and_as_given_is_the_mesh_of_the_scene():
@@ -43,8 +46,8 @@ def test_errors_are_from_the_limit_and_as_given_is_the_mesh_of_the_scene():
 def test_beyond_all_modes_there_is_nothing():
     """24 of 24 modes are the mesh's own solution. Its "error" was extrapolated from 6 and 12."""
     values, sizes = (1.0, 1.5, 1.75), (6, 12, 24)
-    assert settled(values, sizes).limit == pytest.approx(2.0)
-    assert settled(values, sizes, complete=True) == (0.25, None, 1.75, 0.0)
+    assert extrapolated(values, sizes).limit == pytest.approx(2.0)
+    assert extrapolated(values, sizes, complete=True) == (0.25, None, 1.75, 0.0)
     for elements, error in ((12, 0.0), (24, 0.25)):  # of 24 modes, of 48
         scene = with_changes(load_scene("soft"), beam={"n_elements": elements, "n_modes": 24})
         rows = [

@@ -107,9 +107,9 @@ WRONG = {
 @pytest.mark.parametrize("what", WRONG)
 def test_a_wrong_reference_fails(monkeypatch, what):
     """The reference is given another problem than the co-simulation: nothing in the bounds may hide that."""
-    right = event_driven.simulate
+    right = event_driven.integrate
     monkeypatch.setattr(
-        event_driven, "simulate", lambda scene, **options: right(with_changes(scene, **WRONG[what]), **options)
+        event_driven, "integrate", lambda scene, **options: right(with_changes(scene, **WRONG[what]), **options)
     )
     coupling = {"macro_step": 1e-3, "degree": 0 if what == "law" else 2}
     assert compare(with_changes(SOFT, time={"t_end": 0.1}, coupling=coupling))["verdict"] == "differs"
@@ -136,10 +136,13 @@ def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
     """Results stay as they are until they are to be replaced."""
     out = tmp_path / "both"
     arguments = ["crosscheck", "duffing", "--set", "time.t_end=1", "--out", out]
-    right = event_driven.simulate
+    right = event_driven.integrate
     for options, mass, code in (([], 1.0, 0), ([], 1.01, 2), (["--force"], 1.01, 1)):
-        wrong = {"spring": {"mass": mass}}
-        monkeypatch.setattr(event_driven, "simulate", lambda scene, **more: right(with_changes(scene, **wrong), **more))  # noqa: B023
+
+        def heavier(scene, mass=mass, **more):
+            return right(with_changes(scene, spring={"mass": mass}), **more)
+
+        monkeypatch.setattr(event_driven, "integrate", heavier)
         assert command(*arguments, *options).exit_code == code
     assert (out / "crosscheck.png").stat().st_size > 10_000
 

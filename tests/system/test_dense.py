@@ -128,7 +128,7 @@ def test_times_that_are_not_known_are_refused(tmp_path):
         (run, [0.01, 0.06], r"time 0\.06 s: the run is known from 0\.0 s to 0\.05 s"),
         (run, np.nan, "time nan s"),
         (run, [[0.01, 0.02]], r"shape \(1, 2\)"),
-        (event_driven.simulate(run.scene), 0.01, "this run has no data between its rows"),
+        (event_driven.integrate(run.scene), 0.01, "this run has no data between its rows"),
     ):
         with pytest.raises(ValueError, match=said):
             known.at(times)

@@ -34,7 +34,7 @@ def test_they_converge_to_the_reference_of_the_same_mesh(changes):
         run = simulate(scene)
         assert np.array_equal(run.a_tip, run.a_y)  # joined throughout
         times = run.time[2:-1]
-        exact = event_driven.simulate(scene, sample_times=times)
+        exact = event_driven.integrate(scene, sample_times=times)
         rows = np.searchsorted(exact.time, times)
         assert np.array_equal(exact.time[rows], times)
         off = {
@@ -72,7 +72,7 @@ def test_at_an_event_the_tip_has_the_acceleration_before_it():
         ({"loads": [{"on": "base", "amplitude": 0.5}]}, -6.0, -6.0),
     ],
 )
-@pytest.mark.parametrize("simulated", [simulate, event_driven.simulate])
+@pytest.mark.parametrize("simulated", [simulate, event_driven.integrate])
 def test_the_clamp_bears_what_loads_a_beam_at_rest(given, force, moment, simulated):
     """ρA = 6 kg/m, L = 2 m; N and N·m of the load about the clamp, on the beam and on its reference."""
     beam = {"density": 2.0, "area": 3.0, "length": 2.0, "n_elements": 4, "approach": "elastic"}
@@ -103,7 +103,7 @@ TURNS = with_changes(load_scene("steel-bumper"), time={"t_end": 2e-3})
 
 def test_what_a_turning_beam_feels_at_its_start_is_no_largest_value():
     run = simulate(TURNS)
-    later, felt = run.time > 0.0, run.felt()
+    later, felt = run.time > 0.0, run.without_start()
     for name in ("clamp_force", "clamp_moment", "bending_stress"):
         largest = np.abs(run[name][later]).max()
         assert np.abs(run[name]).max() > 3.0 * largest
@@ -117,6 +117,6 @@ def test_what_a_turning_beam_feels_at_its_start_is_no_largest_value():
 
 def test_a_start_that_the_clamp_allows_counts():
     run = simulate(with_changes(SOFT, beam={"initial_velocity_slope": 0.0}, loads=LOADS[2:3]))
-    assert run.felt() is run
+    assert run.without_start() is run
     leaning = {"initial_velocity_slope": 0.0, "initial_deflection_slope": 0.01, "approach": "elastic"}
-    assert simulate(with_changes(SOFT, beam=leaning, time={"t_end": 1e-3})).felt().time[0] > 0.0
+    assert simulate(with_changes(SOFT, beam=leaning, time={"t_end": 1e-3})).without_start().time[0] > 0.0

@@ -90,11 +90,11 @@ def test_the_cases_of_the_figures_run_to_their_end_with_the_law_transmission(num
 
 
 def test_other_readings_are_other_algorithms():
-    guess = monolithic.simulate(load_scene("paper-fig2"), y_temp="guess")
+    guess = monolithic.algorithm_1(load_scene("paper-fig2"), y_temp="guess")
     assert np.max(np.abs(guess.y)) == 0.0  # nothing ever reaches the spring
-    assert monolithic.simulate(load_scene("paper-fig2"), y_temp="both").summary["steps_apart"] > 1
+    assert monolithic.algorithm_1(load_scene("paper-fig2"), y_temp="both").summary["steps_apart"] > 1
     with pytest.raises(AlgorithmFailure) as failure:
-        monolithic.simulate(load_scene("paper-fig4"), at_contact="tip")
+        monolithic.algorithm_1(load_scene("paper-fig4"), at_contact="tip")
     assert np.max(failure.value.trajectory.e_total) > 1e9
 
 

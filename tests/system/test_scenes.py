@@ -30,7 +30,7 @@ def beside_reference(scene, run_of, bounds, _):
     """Compare events, motion and energy with those of the event-driven reference."""
     run = run_of(scene)
     rows = np.searchsorted(run.time, np.unique(run.time)[:: len(run) // 100 + 1], side="right") - 1
-    exact = event_driven.simulate(scene, sample_times=run.time[rows])
+    exact = event_driven.integrate(scene, sample_times=run.time[rows])
     starts, among = bounds.get("starts", []), bounds.get("among", [])
     for found in (scenes.kinds(run), scenes.kinds(exact)):
         assert found[: len(starts)] == starts

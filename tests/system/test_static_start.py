@@ -125,7 +125,7 @@ def test_a_reference_of_its_own_starts_at_the_same_rest(tables):
     beam = {**BEAM, "alpha_b": 1e-5, "n_modes": 2}
     steps = {"coupling": {"macro_step": 5e-5, "degree": 2}, "time": {**TIME, "t_end": 2.5e-3}}
     what = scene(**tables, **steps, beam=beam, loads=[WEIGHT, shock])
-    run, reference = simulate(what), event_driven.simulate(what, sample_times=[0.0, 2.5e-3])
+    run, reference = simulate(what), event_driven.integrate(what, sample_times=[0.0, 2.5e-3])
     assert reference.columns["u_tip"][0] == pytest.approx(run.columns["u_tip"][0], rel=1e-11)
     assert reference.columns["u_tip"][-1] == pytest.approx(run.columns["u_tip"][-1], rel=1e-7)
     assert reference.columns["y"][-1] == pytest.approx(run.columns["y"][-1], rel=1e-7)
@@ -161,7 +161,7 @@ def test_a_spring_may_start_on_its_stop(force, velocity, events):
             "coupling": {"macro_step": 0.01},
         }
     )  # fmt: skip
-    run, exact = simulate(scene), event_driven.simulate(scene)
+    run, exact = simulate(scene), event_driven.integrate(scene)
     # Bounces that die out end at another one where each counts them by rounding.
     for found in (run, exact):
         assert [event.kind.value for event in found.events][:10] == events

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..scene import Beam, Scene, SceneError, Spring
 from ..scene.loads import TableLoad
-from ..scene.partners import ForeignFmu, Partner, RigidWall
+from ..scene.partners import ForeignFmu, Partner, RigidWallElement
 from ..scene.statics import resting_height, tip_compliance, tip_load_deflection
 from .archive import fmu_directory, own_fmu
 from .elements import ELEMENTS
@@ -86,7 +86,7 @@ def top_at_rest(scene: Scene, contact: float) -> float:
     Raises SceneError where the spring rests nowhere.
     """
     if (spring := scene.spring) is None:
-        level = scene.lower if isinstance(scene.lower, RigidWall) else scene.stop
+        level = scene.lower if isinstance(scene.lower, RigidWallElement) else scene.stop
         return -inf if level is None else level.position
     force = spring.external_force - contact
     for load in scene.loads:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..scene import SAME, Scene, SceneError
-from ..scene.messages import Rule, told
+from ..scene.messages import Rule, texts_of
 from ..scene.tables import ORDINARY_SCHEMES
 from .protocol import Abilities, Body
 
@@ -106,7 +106,7 @@ LACKING: tuple[Rule, ...] = (
 
 def refusals(scene: Scene, abilities: Mapping[str, Abilities]) -> list[str]:
     """Return why ``scene`` cannot be run with bodies of these ``abilities``, by table, each with a remedy."""
-    return [line for table, body in abilities.items() for line in told(scene, LACKING, body, table)]
+    return [line for table, body in abilities.items() for line in texts_of(scene, LACKING, body, table)]
 
 
 #: What a capability allows, for people: (capability, how a body shows it, what is offered with it, what without it).
@@ -188,7 +188,7 @@ def admit(scene: Scene, start_time: float, upper: Body | None, lower: Body | Non
         # An undeformed tip has come down by v t, which rounds.
         apart = not scene.static and abs(u - y) > _SAME_PLACE * max(abs(u), abs(y), start_time * abs(v))
         start = {"time": start_time, "u": u, "y": y, "z": z, "mass": lower.mass, "apart": apart}
-        lines += told(scene, FORBIDDEN_STARTS, start)
+        lines += texts_of(scene, FORBIDDEN_STARTS, start)
         if scene.contact.lasting and scene.contact.rigid:
             lines += _joined(scene, upper, lower)
     if lines:

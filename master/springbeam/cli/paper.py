@@ -47,7 +47,7 @@ def paper(
     scene = load_scene(f"paper-fig{figure}", settings or ())
     failed = ""
     try:
-        made = (as_one_system if monolithic else co_simulation).simulate(scene)
+        made = (as_one_system if monolithic else co_simulation).algorithm_1(scene)
     except AlgorithmFailure as failure:
         failed = f"the run stopped early: {failure}"
         if failure.trajectory is None:

@@ -20,12 +20,12 @@ from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError
 from .exponential import ExponentialPropagator, LinearForm, Segment
 from .hybrid_system import NOISE, HybridSystem, QuasiStaticSystem, ReferenceFailure
-from .laws import Phase, Watch
+from .laws import ReferencePhase, Watch
 from .oscillators import GAUSS, STAGES
 from .rows import Rows
 from .transitions import HybridState
 
-__all__ = ["ReferenceFailure", "refuse", "simulate"]
+__all__ = ["ReferenceFailure", "integrate", "refuse"]
 
 #: More events than this at one time are a fault, not physics.
 _AT_ONCE = 20
@@ -39,7 +39,7 @@ _CLOSE = 1e-6
 _TO_LEGENDRE = np.linalg.inv(legendre.legvander(2.0 * np.r_[0.0, GAUSS.nodes, 1.0] - 1.0, STAGES + 1))
 
 
-def simulate(
+def integrate(
     scene: Scene,
     *,
     sample_times: Sequence[float] | np.ndarray | None = None,
@@ -91,7 +91,7 @@ def refuse(scene: Scene) -> None:
 
 
 class _Run:
-    """A run to ``t_end`` [s]; see `simulate`."""
+    """A run to ``t_end`` [s]; see `integrate`."""
 
     def __init__(
         self,
@@ -106,7 +106,7 @@ class _Run:
         self.rows = Rows(self.state)
         self._every_event, self._due = sample_times is None, self._samples(sample_times)
         self._limit, self._began = time_limit, clock.process_time()
-        self._forms: dict[Phase, LinearForm] = {}
+        self._forms: dict[ReferencePhase, LinearForm] = {}
         self._counts = {"steps": 0, "phases": 0}
 
     def execute(self) -> Trajectory:
@@ -177,7 +177,7 @@ class _Run:
 
 
 def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
-    """Return time [s] and state at the start, where an undeformed tip arrives; ``perturbation``: see `simulate`."""
+    """Return time [s] and state at the start, where an undeformed tip arrives; ``perturbation``: see `integrate`."""
     scene, X, time = s.scene, np.zeros(s.size), 0.0
     if scene.static:
         return time, _at_rest(s)
@@ -192,7 +192,7 @@ def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
         x[: s.r] = slope * s.beam.slope_shape
         x_dot[: s.r] = (rate + perturbation * inertia) * s.beam.slope_shape
         if scene.beam.approach == "elastic":
-            s.synchronise(Phase("free"), X)
+            s.synchronise(ReferencePhase("free"), X)
     X[s.T] = time
     return time, X
 
@@ -232,7 +232,7 @@ def _at_rest(s: HybridSystem) -> np.ndarray:
 
 
 def first_event(
-    s: HybridSystem, phase: Phase, watched: Iterable[Watch], segment: Segment
+    s: HybridSystem, phase: ReferencePhase, watched: Iterable[Watch], segment: Segment
 ) -> tuple[Watch, float] | None:
     """Return the event of a phase that comes first in a segment, and when, after its start [s]; ``None`` without one.
 
@@ -243,7 +243,9 @@ def first_event(
     return min(((watch, tau) for watch, tau in crossings if tau is not None), key=itemgetter(1), default=None)
 
 
-def _crossing(s: HybridSystem, phase: Phase, watch: Watch, segment: Segment, values: np.ndarray) -> float | None:
+def _crossing(
+    s: HybridSystem, phase: ReferencePhase, watch: Watch, segment: Segment, values: np.ndarray
+) -> float | None:
     """Return where a function, whose ``values`` at the nodes are given, first falls through zero."""
 
     def g(tau: float) -> float:

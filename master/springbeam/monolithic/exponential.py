@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .hybrid_system import NOISE, HybridSystem, ReferenceFailure
-from .laws import Phase
+from .laws import ReferencePhase
 from .oscillators import GAUSS, STAGES, TARGETS, Oscillators
 from .semi_discrete import singular_modes
 
@@ -57,7 +57,7 @@ class LinearForm:
         u and y are ends @ ξ + at.
     """
 
-    def __init__(self, system: HybridSystem, phase: Phase) -> None:
+    def __init__(self, system: HybridSystem, phase: ReferencePhase) -> None:
         self.system, self.phase = s, phase = system, phase
         self.unresolved = f"no step resolves the interface force in phase {phase.name}"
         (omega2, c, load), held = s.oscillating(phase), s.held(phase)

@@ -22,8 +22,8 @@ import numpy as np
 import scipy.linalg
 
 from ..scene import Beam, Scene, Spring, Stop
-from .laws import Motion, Phase, law_of
-from .semi_discrete import Loads, ModalBeam, modal_beam, points
+from .laws import EndsMotion, ReferencePhase, law_of
+from .semi_discrete import ModalBeam, ModalLoads, modal_beam, points
 
 #: What rounding leaves of a sum that is exactly zero, as a share of its terms.
 NOISE = 16.0 * float(np.finfo(float).eps)
@@ -72,7 +72,7 @@ class HybridSystem:
         one = np.ones(int(self.has_spring))
         omega2, load, b = (np.zeros(0),) * 3 if beam is None else (beam.omega**2, beam.load, beam.tip)
         self.alpha_b = 0.0 if beam is None else beam.alpha
-        self.loads = Loads(scene, beam)
+        self.loads = ModalLoads(scene, beam)
         self.r, self.n = len(b), len(b) + len(one)
         self.omega2 = np.append(omega2, one * p.linear_stiffness / p.mass)
         self.c = np.append(self.alpha_b * omega2, one * p.damping / p.mass)
@@ -95,15 +95,15 @@ class HybridSystem:
 
     # Phases ---------------------------------------------------------------------------------------------------------
 
-    def joined(self, phase: Phase) -> bool:
+    def joined(self, phase: ReferencePhase) -> bool:
         """Whether u = y holds as a constraint."""
         return self.alone or (self.law.rigid and phase.contact != "free")
 
-    def pressed(self, phase: Phase) -> bool:
+    def pressed(self, phase: ReferencePhase) -> bool:
         """Whether the law's energies count."""
         return not self.law.rigid and phase.contact != "free"
 
-    def held(self, phase: Phase, level: float | None = None) -> Held:
+    def held(self, phase: ReferencePhase, level: float | None = None) -> Held:
         """Return what joins or holds the ends; the top, and the tip that is joined to it, at ``level`` [m] if given."""
         joined = self.joined(phase)
         if phase.seated or level is not None:
@@ -114,24 +114,24 @@ class HybridSystem:
         levels = np.full(len(rows), self.stop.position * phase.seated if level is None else level)
         return Held(rows, rows / np.sum(rows**2, axis=1, keepdims=True), levels)
 
-    def space(self, phase: Phase) -> np.ndarray:
+    def space(self, phase: ReferencePhase) -> np.ndarray:
         """Return the directions in which x can move, orthonormal, (n, p)."""
         rows = self.held(phase).rows
         return scipy.linalg.null_space(rows) if len(rows) else np.eye(self.n)
 
-    def oscillating(self, phase: Phase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def oscillating(self, phase: ReferencePhase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return ω² and c [1/s², 1/s] and the constant loads of the coordinates in a phase."""
         return self.omega2, self.c, self.load
 
     # Motion ---------------------------------------------------------------------------------------------------------
 
-    def ends(self, phase: Phase, X: np.ndarray) -> tuple[np.ndarray, ...]:
+    def ends(self, phase: ReferencePhase, X: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return u, v, y and z of states of shape (..., 2n + 3)."""
         x, x_dot = X[..., self.A], X[..., self.V]
         y, z = x @ self.top + self.floor, x_dot @ self.top
         return (y, z, y, z) if self.joined(phase) else (x @ self.tip, x_dot @ self.tip, y, z)
 
-    def motion(self, phase: Phase, X: np.ndarray) -> Motion:
+    def motion(self, phase: ReferencePhase, X: np.ndarray) -> EndsMotion:
         """Return accelerations and interface quantities of states of shape (..., 2n + 3)."""
         u, v, y, z = self.ends(phase, X)
         own = self.load - self.omega2 * X[..., self.A] - self.c * X[..., self.V]
@@ -148,13 +148,13 @@ class HybridSystem:
         if phase.seated:
             N = C - self.mass * (own @ self.top)
             a[..., self.r :] = 0.0
-        return Motion(u, v, y, z, C, N, a, a @ self.top)
+        return EndsMotion(u, v, y, z, C, N, a, a @ self.top)
 
     def load_power(self, X: np.ndarray) -> np.ndarray:
         """Return the power of the loads that vary [W] on states of shape (..., 2n + 3)."""
         return np.asarray(np.sum(self.loads.values(X[..., self.T]) * (X[..., self.V] @ self.patterns.T), axis=-1))
 
-    def dissipation_rate(self, phase: Phase, X: np.ndarray) -> np.ndarray:
+    def dissipation_rate(self, phase: ReferencePhase, X: np.ndarray) -> np.ndarray:
         """Return ẋᵀ c ẋ, and what the law takes [W]."""
         rate = np.asarray(X[..., self.V] ** 2 @ self.c)
         if self.law.damping and self.pressed(phase):
@@ -162,7 +162,7 @@ class HybridSystem:
             rate = rate + self.law.dissipation(phase.contact, y - u, z - v)
         return rate
 
-    def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
+    def synchronise(self, phase: ReferencePhase, X: np.ndarray) -> np.ndarray:
         """Remove from X, in place, what rounding or an impact leaves of a constraint; return X."""
         held = self.held(phase)
         held.hold(X[..., self.A], held.levels)
@@ -181,7 +181,7 @@ class HybridSystem:
         a, v = states[:, : self.r], states[:, self.n : self.n + self.r]
         return np.hstack([a @ self.beam.sampler.T, (a + self.alpha_b * v) @ self.beam.inner.T])
 
-    def energies(self, X: np.ndarray, phase: Phase) -> dict[str, np.ndarray]:
+    def energies(self, X: np.ndarray, phase: ReferencePhase) -> dict[str, np.ndarray]:
         """Return energies [J] of states of shape (k, 2n + 3); ``e_load`` is minus the work of the loads."""
         x, x_dot = X[..., self.A], X[..., self.V]
         u, _, y, _ = self.ends(phase, X)
@@ -230,7 +230,7 @@ class QuasiStaticSystem(HybridSystem):
         self._rest, self.inertia = rest, np.array([0.0, 1.0])
         self._hidden = stored - 0.5 * k * rest**2
 
-    def held(self, phase: Phase, level: float | None = None) -> Held:
+    def held(self, phase: ReferencePhase, level: float | None = None) -> Held:
         """Return what holds the ends: a tip that has no mass is moved without a force, or rests by itself."""
         rows, along, levels = super().held(phase, level)
         if self.joined(phase):
@@ -240,17 +240,17 @@ class QuasiStaticSystem(HybridSystem):
             levels = np.append(self._rest, levels)
         return Held(rows, along, levels)
 
-    def space(self, phase: Phase) -> np.ndarray:
+    def space(self, phase: ReferencePhase) -> np.ndarray:
         """Return the directions in which u and y can move, with a unit of √m y where they are joined."""
         return super().space(phase) * (np.sqrt(1.0 + 1.0 / self.mass) if self.joined(phase) else 1.0)
 
-    def oscillating(self, phase: Phase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def oscillating(self, phase: ReferencePhase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if self.joined(phase) or not self.alpha_b:
             return super().oscillating(phase)
         omega2, c, load = (own[1:] for own in super().oscillating(phase))
         return np.append(0.0, omega2), np.append(1.0 / self.alpha_b, c), np.append(0.0, load)
 
-    def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
+    def synchronise(self, phase: ReferencePhase, X: np.ndarray) -> np.ndarray:
         """Hold X, in place, where the phase has it, or let its tip relax by itself; return X."""
         super().synchronise(phase, X)
         if self.alpha_b and not self.joined(phase):

@@ -2,7 +2,7 @@
 
 C [N] lifts the tip and presses the spring; p = y − u is the penetration [m], ṗ = z − v its rate. A rigid law has u = y
 in every phase but `free`, and C is the multiplier of that; any other law is a force C(p, ṗ). To add one, write a class
-here and name it in `LAWS`: the equations of motion, the integrator and the event logic ask it for the rest.
+here and name it in `REFERENCE_LAWS`: the equations of motion, the integrator and the event logic ask it for the rest.
 
 Phases: `free` without force; `tied` and `touch`, joined for either sign of C and while C ≥ 0; `slack`, touching without
 force (results have it as `touch`).
@@ -17,13 +17,13 @@ import numpy as np
 
 from ..scene import Scene, SceneError
 
-Contact = Literal["free", "touch", "slack", "tied"]
+ContactState = Literal["free", "touch", "slack", "tied"]
 
 
-class Phase(NamedTuple):
+class ReferencePhase(NamedTuple):
     """Which equations hold: what joins the ends, and whether the lower one stands on the foundation."""
 
-    contact: Contact
+    contact: ContactState
     seated: bool = False
 
     @property
@@ -32,7 +32,7 @@ class Phase(NamedTuple):
         return "seated" if self.seated else "touch" if self.contact == "slack" else self.contact
 
 
-class Motion(NamedTuple):
+class EndsMotion(NamedTuple):
     """Interface quantities of states X, each with the leading shape of X."""
 
     u: np.ndarray  #: tip deflection [m]
@@ -49,13 +49,13 @@ class Watch(NamedTuple):
     """A function of the motion that is ≥ 0 as long as its phase lasts."""
 
     name: str  #: of what happens where it becomes negative
-    function: Callable[[Motion], np.ndarray]
+    function: Callable[[EndsMotion], np.ndarray]
     unit: Literal["m", "m/s", "N"]  #: of its values; tells what rounding leaves of a zero
     level: float | None = None  #: where the spring's top is when it happens [m]
 
 
 #: What follows most events: the contact, and the event's name in results if it is one there.
-_AFTER: dict[str, tuple[Contact, str | None]] = {
+_AFTER: dict[str, tuple[ContactState, str | None]] = {
     "meet": ("touch", "impact"),
     "separate": ("free", "separation"),
     "retie": ("tied", "retie"),
@@ -70,7 +70,7 @@ class Law:
     #: Whether u = y in every phase but `free`.
     rigid = False
     #: Where a run starts; a law that starts elsewhere than in `free` joins the ends for good.
-    start: Contact = "free"
+    start: ContactState = "free"
 
     def __init__(self, scene: Scene) -> None:
         self.stiffness: float = getattr(scene.contact, "stiffness", 0.0)
@@ -78,7 +78,7 @@ class Law:
         self.damping: float = getattr(scene.contact, "damping", 0.0)
         self.equilibrium = 0.0 if scene.spring is None else scene.spring.equilibrium
 
-    def acts(self, contact: Contact) -> bool:
+    def acts(self, contact: ContactState) -> bool:
         """Return whether C is `force`."""
         return not self.rigid and contact in ("touch", "tied")
 
@@ -90,7 +90,7 @@ class Law:
         """Return the energy [J] that the law stores."""
         raise NotImplementedError
 
-    def dissipation(self, contact: Contact, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    def dissipation(self, contact: ContactState, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """Return the power [W] that the law takes: C ṗ less the growth of `potential`."""
         return np.zeros_like(p)
 
@@ -98,7 +98,7 @@ class Law:
         """Return the part of C that is normal compliance [N], at tip deflections u [m]."""
         return C
 
-    def watched(self, phase: Phase) -> list[Watch]:
+    def watched(self, phase: ReferencePhase) -> list[Watch]:
         """Return what ends a phase, but for the foundation; nothing ends one that the ends are joined in for good."""
         if self.start != "free":
             return []
@@ -106,7 +106,7 @@ class Law:
             return [Watch("meet", lambda m: m.u - m.y, "m")]
         return [Watch("separate", lambda m: m.y - m.u, "m")]
 
-    def after(self, happened: str, together: Motion, noise: float) -> tuple[Contact, str | None]:
+    def after(self, happened: str, together: EndsMotion, noise: float) -> tuple[ContactState, str | None]:
         """Return the contact that follows what has happened, and the event's name in results if it is one there.
 
         ``together`` is the motion if the ends stay together, ``noise`` what rounding leaves of a height that is 0 [m].
@@ -123,7 +123,7 @@ class Transmission(Law):
         """Return λ_nc (Ψ − u)₊^q [N]."""
         return np.asarray(self.stiffness * np.maximum(self.equilibrium - u, 0.0) ** self.exponent)
 
-    def watched(self, phase: Phase) -> list[Watch]:
+    def watched(self, phase: ReferencePhase) -> list[Watch]:
         psi = self.equilibrium
         if phase.contact == "free":
             return super().watched(phase)
@@ -131,7 +131,7 @@ class Transmission(Law):
             return [Watch("retie", lambda m: m.y - psi, "m", level=psi), Watch("separate", lambda m: m.C, "N")]
         return [] if phase.seated else [Watch("release", lambda m: psi - m.y, "m", level=psi)]
 
-    def after(self, happened: str, together: Motion, noise: float) -> tuple[Contact, str | None]:
+    def after(self, happened: str, together: EndsMotion, noise: float) -> tuple[ContactState, str | None]:
         if happened == "release":
             return "touch" if together.C > 0.0 else "free", "release"
         height = float(together.y) - self.equilibrium
@@ -150,7 +150,7 @@ class Tie(Law):
         """Return zeros: nothing is compliant."""
         return np.zeros_like(C)
 
-    def after(self, happened: str, together: Motion, noise: float) -> tuple[Contact, str | None]:
+    def after(self, happened: str, together: EndsMotion, noise: float) -> tuple[ContactState, str | None]:
         return "tied", "impact"
 
 
@@ -165,7 +165,7 @@ class Link(Law):
     def potential(self, p: np.ndarray) -> np.ndarray:
         return np.asarray(0.5 * self.stiffness * p**2)
 
-    def dissipation(self, contact: Contact, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    def dissipation(self, contact: ContactState, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
         return np.asarray(self.damping * rate**2)
 
 
@@ -185,10 +185,10 @@ class Compliance(Law):
     def potential(self, p: np.ndarray) -> np.ndarray:
         return np.asarray(self._elastic(p) * np.maximum(p, 0.0) / (self.exponent + 1.0))
 
-    def dissipation(self, contact: Contact, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    def dissipation(self, contact: ContactState, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
         return np.asarray(self._elastic(p) * rate * (-1.0 if contact == "slack" else self.damping * rate))
 
-    def watched(self, phase: Phase) -> list[Watch]:
+    def watched(self, phase: ReferencePhase) -> list[Watch]:
         watched = super().watched(phase)
         if self.damping == 0.0 or phase.contact == "free":
             return watched
@@ -199,12 +199,17 @@ class Compliance(Law):
 
 
 #: By their names in a scene.
-LAWS: dict[str, type[Law]] = {"transmission": Transmission, "compliance": Compliance, "tie": Tie, "link": Link}
+REFERENCE_LAWS: dict[str, type[Law]] = {
+    "transmission": Transmission,
+    "compliance": Compliance,
+    "tie": Tie,
+    "link": Link,
+}
 
 
 def law_of(scene: Scene) -> Law:
-    """Return the law of a scene. Raises SceneError if it is none of `LAWS`."""
-    if scene.contact.law not in LAWS:
-        known = ", ".join(f"'{name}'" for name in LAWS)
+    """Return the law of a scene. Raises SceneError if it is none of `REFERENCE_LAWS`."""
+    if scene.contact.law not in REFERENCE_LAWS:
+        known = ", ".join(f"'{name}'" for name in REFERENCE_LAWS)
         raise SceneError(f"contact.law = '{scene.contact.law}': no reference has it; those there are know {known}")
-    return LAWS[scene.contact.law](scene)
+    return REFERENCE_LAWS[scene.contact.law](scene)

@@ -10,7 +10,7 @@ import numpy as np
 from ..motion.events import Event
 from ..results.trajectory import Trajectory, columns_of
 from ..scene import Scene
-from .laws import Phase
+from .laws import ReferencePhase
 from .semi_discrete import ModalBeam, assemble, constant_forces, points, unit_forces
 from .transitions import HybridState
 
@@ -22,7 +22,7 @@ class Rows:
 
     def __init__(self, state: HybridState) -> None:
         self._state = state
-        self._rows: list[tuple[float, np.ndarray, Phase, float]] = []
+        self._rows: list[tuple[float, np.ndarray, ReferencePhase, float]] = []
 
     def record(self) -> None:
         """Keep the state in which the run is."""

@@ -292,7 +292,7 @@ def _rayleigh_ritz(discrete: SemiDiscreteBeam, space: np.ndarray | None = None) 
 _TURN = 1.0
 
 
-class Loads:
+class ModalLoads:
     """Patterns and values of the loads.
 
     Attributes

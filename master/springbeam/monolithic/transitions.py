@@ -20,7 +20,7 @@ import numpy as np
 
 from ..motion.events import Event, EventKind
 from .hybrid_system import HybridSystem
-from .laws import Phase, Watch
+from .laws import ReferencePhase, Watch
 
 
 class HybridState:
@@ -28,16 +28,16 @@ class HybridState:
 
     def __init__(self, system: HybridSystem, time: float, X: np.ndarray) -> None:
         self.system, self.time, self.X = system, time, X
-        self.phase = Phase("free")
+        self.phase = ReferencePhase("free")
         self.loss = 0.0
         self.events: list[Event] = []
         m = system.motion(self.phase, X)
         if not (system.law.rigid and abs(float(m.v - m.z)) > system.noise("m/s", X)):
-            self.phase = Phase(system.law.start)
+            self.phase = ReferencePhase(system.law.start)
             if not system.scene.static:  # then it is what the ends joined have
                 system.synchronise(self.phase, X)
         if system.scene.static and not system.law.rigid and m.u < m.y and self.phase.contact == "free":
-            self.phase = Phase("touch")
+            self.phase = ReferencePhase("touch")
 
     def watched(self) -> list[Watch]:
         """Return the functions that are ≥ 0 as long as the phase lasts."""
@@ -82,8 +82,8 @@ class HybridState:
         s, X = self.system, self.X
         if s.scene.massless and before is None:  # a tip that is let go may jump
             before = self._mechanical_energy()
-        contact, kind = s.law.after(happened, s.motion(Phase("tied"), X), s.noise("m", X))
-        self.phase = Phase(contact, self.phase.seated)
+        contact, kind = s.law.after(happened, s.motion(ReferencePhase("tied"), X), s.noise("m", X))
+        self.phase = ReferencePhase(contact, self.phase.seated)
         s.synchronise(self.phase, X)
         if kind is not None:
             lost = 0.0 if before is None else before - self._mechanical_energy()
@@ -96,7 +96,7 @@ class HybridState:
             return
         m, before = s.motion(self.phase, X), self._mechanical_energy()
         impulse = float(m.z - m.v) / s.mobility
-        was_seated, self.phase = self.phase.seated, Phase("tied")
+        was_seated, self.phase = self.phase.seated, ReferencePhase("tied")
         s.synchronise(self.phase, X)
         self._go_on("meet", before, impulse)
         if was_seated:  # the spring already stands on the foundation
@@ -111,13 +111,13 @@ class HybridState:
         s, X, e, contact = self.system, self.X, self.system.stop.restitution, self.phase.contact
         self._place(s.stop.position)
         before, arriving, velocity = self._mechanical_energy(), s.motion(self.phase, X), X[s.V].copy()
-        self.phase = Phase(contact)
+        self.phase = ReferencePhase(contact)
         held = s.held(self.phase, s.stop.position)
         held.hold(X[s.V], -e * (velocity @ held.rows.T))
         m = s.motion(self.phase, X)
         seats = e == 0.0 or 0.5 * float(m.z) ** 2 <= -float(m.z_dot) * self.seat_height()
         if seats:
-            X[s.V], e, self.phase = velocity, 0.0, Phase(contact, seated=True)
+            X[s.V], e, self.phase = velocity, 0.0, ReferencePhase(contact, seated=True)
         s.synchronise(self.phase, X)
         on_tip = -(1.0 + e) * float(arriving.v) / s.tip_mobility if s.joined(self.phase) else 0.0
         self._emit(
@@ -135,7 +135,7 @@ class HybridState:
         held.hold(self.X[self.system.A], held.levels)
 
     def _unseat(self) -> None:
-        self.phase = Phase(self.phase.contact)
+        self.phase = ReferencePhase(self.phase.contact)
         self._emit("unseated" if self.system.has_spring else "separation")
 
     def seat_height(self) -> float:

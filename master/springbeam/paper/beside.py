@@ -26,13 +26,13 @@ Rows = tuple[list[str], list[list[str]]]
 @cache
 def monolithic_run(number: int) -> Trajectory:
     """Return Figure ``number`` by Algorithm 1 as one system."""
-    return monolithic.simulate(load_scene(f"paper-fig{number}"))
+    return monolithic.algorithm_1(load_scene(f"paper-fig{number}"))
 
 
 @cache
 def fmu_run(number: int) -> Trajectory:
     """Return Figure ``number`` by Algorithm 1 through the FMUs."""
-    return co_simulation.simulate(load_scene(f"paper-fig{number}"))
+    return co_simulation.algorithm_1(load_scene(f"paper-fig{number}"))
 
 
 def extremes(runs: Mapping[int, Mapping[str, Trajectory]]) -> Rows:
@@ -112,7 +112,7 @@ def loads() -> Rows:
     bare = monolithic_run(2)
     rows = []
     for coefficient in (-6.0, -1.2e4, -6e6, -6e8):
-        run = monolithic.simulate(with_changes(scene, beam={"tip_load_coefficient": coefficient}))
+        run = monolithic.algorithm_1(with_changes(scene, beam={"tip_load_coefficient": coefficient}))
         moved = np.abs(run.u_tip - bare.u_tip).max()
         rows.append([f"{coefficient:g}", f"{run.summary['iterations_per_solve']:.3f}", f"{moved:.1e}"])
     return ["load coefficient at the tip", "iterations", "u_tip differs from Figure 2 by at most [m]"], rows
@@ -144,7 +144,7 @@ def _measured(scene: Scene, **choices: Any) -> list[str]:
     """Return iterations, largest displacement of the tip and largest energy, also of a run that breaks down."""
     stop = ""
     try:
-        run = monolithic.simulate(scene, **choices)
+        run = monolithic.algorithm_1(scene, **choices)
     except AlgorithmFailure as failure:
         if failure.trajectory is None:
             raise

@@ -60,7 +60,7 @@ class Row(NamedTuple):
     e_injected_spring: float
 
 
-def simulate(scene: Scene, *, at_contact: AtContact = "rest") -> Trajectory:
+def algorithm_1(scene: Scene, *, at_contact: AtContact = "rest") -> Trajectory:
     """Run Algorithm 1 through the FMUs with h_t = ``coupling.macro_step`` on a scene with beam and spring.
 
     Parameters
@@ -72,7 +72,8 @@ def simulate(scene: Scene, *, at_contact: AtContact = "rest") -> Trajectory:
     -------
     Trajectory
         A row per step from t_c on (from 0 with ``approach = "elastic"``), as of
-        `springbeam.paper.monolithic.simulate`. ``summary["iterations_per_solve"]`` (Table 2) are steps of the spring.
+        `springbeam.paper.monolithic.algorithm_1`. ``summary["iterations_per_solve"]`` (Table 2) are steps of the
+        spring.
 
     Raises
     ------

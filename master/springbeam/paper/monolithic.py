@@ -58,7 +58,7 @@ class _Row(NamedTuple):
     booked: bool = False  #: whether the step was one in contact
 
 
-def simulate(scene: Scene, *, at_contact: AtContact = "rest", y_temp: YTemp = "equation") -> Trajectory:
+def algorithm_1(scene: Scene, *, at_contact: AtContact = "rest", y_temp: YTemp = "equation") -> Trajectory:
     """Run Algorithm 1 with h_t = ``coupling.macro_step`` on a scene with beam and spring, and a shorter last step to
     ``time.t_end`` where that is off the grid.
 

@@ -164,7 +164,7 @@ def loads(trajectory: Trajectory) -> list[Panel]:
 
 def inside(trajectory: Trajectory) -> list[Panel]:
     """Return accelerations, what the clamp does to the beam, and the largest stress along it."""
-    run = trajectory.felt()
+    run = trajectory.without_start()
     return [
         Panel(name, heading, quantity, unit, _curves(run, looks), height)
         for name, heading, quantity, unit, looks, height in _FELT

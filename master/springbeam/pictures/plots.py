@@ -114,7 +114,7 @@ def _shapes_later(trajectory: Trajectory) -> Figure | None:
 
 
 def _moments(trajectory: Trajectory) -> Figure | None:
-    trajectory = trajectory.felt()
+    trajectory = trajectory.without_start()
     if trajectory.bending_moment is None or trajectory.shear_force is None:
         return None
     drawn = {"bending moment": ("N·m", trajectory.bending_moment), "shear force": ("N", trajectory.shear_force)}

@@ -10,7 +10,7 @@ import numpy as np
 from ..motion.events import Event
 from ..scene import Scene, Spring
 from .steps import BEAM_TELLS, PHASE_NAMES, SPRING_TELLS, STEP_COLUMNS, common, joined
-from .trajectory import TOLD, Trajectory, columns_of
+from .trajectory import BODY_COLUMNS, Trajectory, columns_of
 
 #: Largest value of a column that the motion does not depend on [N]; pictures multiply two of them.
 MOST_SHOWN = 1e150
@@ -71,7 +71,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     if rigid and "a_tip" in found and (scene.lower is None or "a_y" in found):
         # Ends that are joined move as one: beside that, the tip's own acceleration alternates from step to step.
         found["a_tip"] = np.where(apart, found["a_tip"], found.get("a_y", 0.0))
-    return {name: np.array(found[name]) for name in columns_of(scene) if name in found or name not in TOLD}
+    return {name: np.array(found[name]) for name in columns_of(scene) if name in found or name not in BODY_COLUMNS}
 
 
 def _acceleration(scene: Scene, spring: Spring, found: Mapping[str, np.ndarray], steps: np.ndarray) -> np.ndarray:

@@ -68,7 +68,7 @@ def contact_time_difference(first: Trajectory, second: Trajectory, window: float
     worst = 0.0
     for ours, theirs in zip(_contacts_and_strokes(first, end), _contacts_and_strokes(second, end), strict=True):
         for one, other in ((ours, theirs), (theirs, ours)):
-            worst = max(worst, _furthest(_felt(*one, window), other[0], end))
+            worst = max(worst, _furthest(_lasting(*one, window), other[0], end))
     return worst
 
 
@@ -170,18 +170,18 @@ def _contacts_and_strokes(run: Trajectory, end: float) -> Iterator[tuple[list[In
     )
 
 
-def _felt(intervals: list[Interval], times: np.ndarray, passed: np.ndarray, window: float) -> list[Interval]:
+def _lasting(intervals: list[Interval], times: np.ndarray, passed: np.ndarray, window: float) -> list[Interval]:
     """Join ``intervals`` closer than ``window`` [s]; return those longer or transmitting `SLIGHT` of all impulses.
 
     Other parameters as of `_contacts_and_strokes`.
     """
     least = SLIGHT * passed.sum() if times.size else inf
 
-    def felt(since: float, until: float) -> bool:
+    def lasts(since: float, until: float) -> bool:
         within = slice(np.searchsorted(times, since, "left"), np.searchsorted(times, until, "right"))
         return until - since > window or passed[within].sum() >= least
 
-    return [interval for interval in _merged(intervals, window) if felt(*interval)]
+    return [interval for interval in _merged(intervals, window) if lasts(*interval)]
 
 
 def kicks(times: np.ndarray, events: Iterable[Event]) -> np.ndarray:

@@ -45,7 +45,7 @@ COLUMNS = {
     "energy_residual": ("J", ""),
 }
 #: Columns after the loads: the unit of each, and the body that tells it. A body that does not tell leaves it out.
-TOLD = {
+BODY_COLUMNS = {
     "a_tip": ("m/s²", "beam"),
     "clamp_force": ("N", "beam"),
     "clamp_moment": ("N·m", "beam"),
@@ -75,8 +75,8 @@ def cascades(events: Iterable[Event]) -> Iterator[list[Event]]:
 def columns_of(scene: Scene) -> dict[str, str]:
     """Return the columns of ``scene`` in file order with their units, "" for ``phase``, which has none.
 
-    They are `COLUMNS` without those of absent bodies, its loads: ``load_0`` for ``loads.0``, and `TOLD` without those
-    of bodies that are not our own. ``gap`` is u_tip − y of a pair, u_tip − φ of a beam above a stop.
+    They are `COLUMNS` without those of absent bodies, its loads: ``load_0`` for ``loads.0``, and `BODY_COLUMNS` without
+    those of bodies that are not our own. ``gap`` is u_tip − y of a pair, u_tip − φ of a beam above a stop.
     """
     beam, spring, stop = scene.upper is not None, scene.lower is not None, scene.stop is not None
     there = {
@@ -91,8 +91,8 @@ def columns_of(scene: Scene) -> dict[str, str]:
     units |= {f"load_{i}": load.unit for i, load in enumerate(scene.loads)}
     own = scene.beam is not None and not scene.massless
     section = own and scene.beam is not None and scene.beam.section_height > 0.0
-    tells = {"beam": own, "section": section, "spring": scene.spring is not None}
-    return units | {name: unit for name, (unit, body) in TOLD.items() if tells[body]}
+    there_is = {"beam": own, "section": section, "spring": scene.spring is not None}
+    return units | {name: unit for name, (unit, body) in BODY_COLUMNS.items() if there_is[body]}
 
 
 def rounded(value: float, scale: float) -> str:
@@ -170,10 +170,10 @@ class Trajectory:
     def _along(self, part: int) -> np.ndarray:
         return np.split(np.asarray(self.shape_table)[:, 1:], 3, axis=1)[part]
 
-    def felt(self) -> Trajectory:
+    def without_start(self) -> Trajectory:
         """Return the run without its start, where the beam leans or turns there as its clamp does not let it.
 
-        What clamp and sections feel at that instant grows with the number of elements and has gone by the next row.
+        Forces in clamp and sections at that instant grow with the number of elements and has gone by the next row.
         """
         beam, later = self.scene.beam, self.time > self.time[:1]
         leans = beam is not None and (beam.initial_deflection_slope, beam.initial_velocity_slope) != (0.0, 0.0)

@@ -298,17 +298,17 @@ class Rule(NamedTuple):
     numbers: Callable[..., Mapping[str, Any]] = lambda *of: {}
 
 
-def told(scene: Scene, rules: Iterable[Rule], *of: Any) -> Iterator[str]:
+def texts_of(scene: Scene, rules: Iterable[Rule], *of: Any) -> Iterator[str]:
     """Yield what ``rules`` tell of ``scene``, and of what in it they are for."""
     for rule in rules:
         if found := rule.when(scene, *of):
             yield filled(scene, rule.text, **(found if isinstance(found, dict) else rule.numbers(scene, *of)))
 
 
-def told_of_loads(scene: Scene, rules: Sequence[Rule]) -> Iterator[str]:
+def texts_of_loads(scene: Scene, rules: Sequence[Rule]) -> Iterator[str]:
     """Yield what ``rules`` tell of each load of ``scene``, which is ``[load]`` in their texts."""
     for number, load in enumerate(scene.loads):
         name = f"loads.{number}"
         texts = [rule.text.replace("{load.", f"{{{name}.").replace("[load]", f"[{name}]") for rule in rules]
         here = [rule._replace(text=text) for rule, text in zip(rules, texts, strict=True)]
-        yield from told(scene, here, load)
+        yield from texts_of(scene, here, load)

@@ -56,7 +56,7 @@ class ForeignFmu(Table):
         return 0 if self.integral is None else 1 if self.integral_2 is None else 2
 
 
-class PointMass(Table):
+class PointMassElement(Table):
     """A free mass, m ẍ = ± C + N + f."""
 
     START = "displacement"
@@ -68,7 +68,7 @@ class PointMass(Table):
     external_force: float = key("N", "constant force f, upward", 0.0)
 
 
-class SpringDamper(PointMass):
+class SpringDamperElement(PointMassElement):
     """A mass on a linear spring and damper, m ẍ + c ẋ + k (x − x₀) = ± C + N + f."""
 
     element: Literal["spring_damper"] = key("–", "a mass on a linear spring and damper")  # type: ignore[assignment]
@@ -77,7 +77,7 @@ class SpringDamper(PointMass):
     rest: float = key("m", "where the spring has no force, x₀", 0.0)
 
 
-class RigidWall(Table):
+class RigidWallElement(Table):
     """An end that is held at rest, whatever acts on it."""
 
     START = "position"
@@ -86,13 +86,13 @@ class RigidWall(Table):
     position: float = key("m", "where it is", 0.0)
 
 
-Partner = ForeignFmu | PointMass | SpringDamper | RigidWall
+Partner = ForeignFmu | PointMassElement | SpringDamperElement | RigidWallElement
 #: The tables of partners by what names them: the key ``fmu``, or the value of ``element``.
 PARTNERS: dict[str, type[Table]] = {
     "fmu": ForeignFmu,
-    "point_mass": PointMass,
-    "spring_damper": SpringDamper,
-    "rigid_wall": RigidWall,
+    "point_mass": PointMassElement,
+    "spring_damper": SpringDamperElement,
+    "rigid_wall": RigidWallElement,
 }
 OWN = "own"
 

@@ -20,7 +20,7 @@ from .frequencies import (
     slowest_frequency,
 )
 from .linearised import bent_energy, spring_frequency
-from .messages import Rule, told
+from .messages import Rule, texts_of
 from .scene import Scene
 from .statics import initial_kinetic_energy
 from .tables import ORDINARY_SCHEMES, Beam
@@ -99,7 +99,7 @@ def not_resolved(
     """
     slow = slow_oscillations(scene) if oscillations is None else oscillations
     causes = _OF_ALL_STEPS if scene.coupling.adaptive else (*_OF_EQUAL_STEPS, *_OF_ALL_STEPS)
-    return next(told(scene, causes, _Seen(misplaced, shortest_contact, left_out, between_rows, H, slow)), None)
+    return next(texts_of(scene, causes, _Seen(misplaced, shortest_contact, left_out, between_rows, H, slow)), None)
 
 
 def lateness(scene: Scene, turn: float) -> float:
@@ -193,7 +193,7 @@ def peak_force_doubt(scene: Scene) -> str | None:
     At a rigid impact the force at an instant grows with the mesh. Its mean over a window settles where the window is
     longer than `SETTLED` periods of the fastest wave kept (``docs/choose.md`` has the numbers).
     """
-    return next(told(scene, (_MESH_DECIDES,)), None)
+    return next(texts_of(scene, (_MESH_DECIDES,)), None)
 
 
 def _settling(scene: Scene) -> dict[str, float]:

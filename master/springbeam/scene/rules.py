@@ -12,8 +12,8 @@ from typing import Any
 from .laws import LAWS
 from .linearised import hilltop, largest_load, spring_energy, well_depth
 from .loads import MOST_POINTS
-from .messages import Rule, at, either, told, told_of_loads
-from .partners import RigidWall
+from .messages import Rule, at, either, texts_of, texts_of_loads
+from .partners import RigidWallElement
 from .scene import Scene
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
 from .suspicions import suspicions
@@ -36,7 +36,7 @@ MOST_MACRO_STEPS = 1e12
 def impossible(scene: Scene) -> list[str]:
     """Return why ``scene`` cannot be run, as lines ``[table] key = value: reason and remedy``; empty if it can."""
     try:
-        found = [*told(scene, FORBIDDEN), *told_of_loads(scene, FORBIDDEN_LOADS)]
+        found = [*texts_of(scene, FORBIDDEN), *texts_of_loads(scene, FORBIDDEN_LOADS)]
         if not found and (scene.beam is None or _is_finite(scene.beam)):
             suspicions(scene)  # what is certain to overflow once the scene runs overflows here
             return []
@@ -60,7 +60,7 @@ def _most_extreme(scene: Scene) -> str:
 
 
 def _wall_below(scene: Scene) -> bool:
-    return isinstance(scene.lower, RigidWall)
+    return isinstance(scene.lower, RigidWallElement)
 
 
 def _averages(scene: Scene) -> bool:
@@ -141,7 +141,7 @@ FORBIDDEN: tuple[Rule, ...] = (
     # Bodies
     Rule(lambda s: s.upper is None and s.lower is None, "no body: a scene needs [beam], [spring] or both"),
     Rule(
-        lambda s: isinstance(s.upper, RigidWall) and (s.lower is None or _wall_below(s)),
+        lambda s: isinstance(s.upper, RigidWallElement) and (s.lower is None or _wall_below(s)),
         "{beam.element}: nothing moves in this scene; give it a body in [spring]",
     ),
     Rule(
@@ -156,7 +156,7 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     *(
         Rule(
-            lambda s, table=table: s.static and not isinstance(s.under(table), Beam | Spring | RigidWall | None),
+            lambda s, table=table: s.static and not isinstance(s.under(table), Beam | Spring | RigidWallElement | None),
             f"{{time.initial_state}}: only our own beam and spring and a rigid_wall can start at rest, not the body in "
             f"[{table}]; leave initial_state out",
         )
@@ -396,7 +396,7 @@ FORBIDDEN_LOADS: tuple[Rule, ...] = (
     ),
     *(
         Rule(
-            lambda s, load, table=table, end=end: load.on == end and isinstance(s.under(table), RigidWall),
+            lambda s, load, table=table, end=end: load.on == end and isinstance(s.under(table), RigidWallElement),
             f"{{load.on}}: {{{table}.element}} stays where it is under any load; take the load out",
         )
         for table, end in (("beam", "tip"), ("spring", "spring"))

@@ -17,7 +17,7 @@ from .tables import ORDINARY_SCHEMES, Beam, Coupling, Spring, Stop, Table, Time,
 SAME, SHORTEST_STEP = 1e-9, 1e-6
 
 
-class Height(NamedTuple):
+class StartHeight(NamedTuple):
     """A height [m], and ``"table.key"`` of the key that gives it."""
 
     key: str
@@ -133,7 +133,7 @@ class Scene(Table):
         """Whether a contact law acts at all: between the tip and the spring top, or an elastic stop."""
         return self.upper is not None and (self.lower is not None or self.elastic_stop)
 
-    def at_start(self, table: str) -> Height | None:
+    def at_start(self, table: str) -> StartHeight | None:
         """Return where the end of the body ``[table]``, or the stop, is at the start.
 
         ``None`` where only an FMU knows, or it is found. For our spring that is Ψ, for our beam s₀ L, or its static
@@ -148,10 +148,10 @@ class Scene(Table):
 
             static = self.massless and body.approach == "elastic" and body.alpha_b == 0.0
             height = tip_load_deflection(body) if static else height * body.length
-        return Height(f"{table}.{body.START}", height)
+        return StartHeight(f"{table}.{body.START}", height)
 
     @property
-    def tip_target(self) -> Height | None:
+    def tip_target(self) -> StartHeight | None:
         """What the upper end meets first: the lower body, else the stop.
 
         ``None`` where there is nothing to meet, where only an FMU knows, or where the law joins the ends at once.

@@ -8,7 +8,7 @@ from typing import Any
 
 from .laws import LAW
 from .linearised import beam_energy, spring_energy, well_depth
-from .messages import Rule, told, told_of_loads
+from .messages import Rule, texts_of, texts_of_loads
 from .scene import TABLES, Scene
 from .statics import initial_kinetic_energy, locking, tip_compliance, tip_inertia
 from .tables import ORDINARY_SCHEMES
@@ -29,8 +29,8 @@ def suspicions(scene: Scene) -> list[str]:
     """Return warnings about values that can be run but are probably mistaken, or play no part."""
     return [
         *implausible(scene),
-        *told(scene, (*SUSPICIOUS, *EFFECTS)),
-        *told_of_loads(scene, SUSPICIOUS_LOADS),
+        *texts_of(scene, (*SUSPICIOUS, *EFFECTS)),
+        *texts_of_loads(scene, SUSPICIOUS_LOADS),
     ]
 
 
@@ -40,7 +40,7 @@ def implausible(scene: Scene) -> Iterator[str]:
     A beam with area = 1 or density = 1 is taken to be in units of its own: nothing is said about it.
     """
     beam = scene.beam
-    return told(scene, IMPLAUSIBLE if beam is not None and 1.0 not in (beam.area, beam.density) else ())
+    return texts_of(scene, IMPLAUSIBLE if beam is not None and 1.0 not in (beam.area, beam.density) else ())
 
 
 # -- what can hardly be meant ---------------------------------------------------------------------------------------

@@ -28,7 +28,7 @@ from ..pictures.drawing import present
 from ..results.contact_times import ContactChange, contact_changes
 from ..results.dense import at
 from ..results.distance import apart
-from ..results.trajectory import TOLD, Trajectory, columns_of
+from ..results.trajectory import BODY_COLUMNS, Trajectory, columns_of
 from ..run.runner import simulate
 from ..scene import Scene, SceneError, with_changes
 from ..scene.frequencies import mesh_frequency, slowest_frequency
@@ -171,7 +171,7 @@ def _rounding(scene: Scene, name: str) -> float:
     if beam is None:
         return 0.0
     ratio = max(1.0, mesh_frequency(beam) / slowest_frequency(beam))
-    return float(np.finfo(float).eps * ratio ** (2 if name in TOLD else 1))
+    return float(np.finfo(float).eps * ratio ** (2 if name in BODY_COLUMNS else 1))
 
 
 def _agree_until(first: list[ContactChange], second: list[ContactChange], start: float, t_end: float) -> float:
@@ -206,7 +206,7 @@ def _compare_events(
 
 def reference_and_perturbed(scene: Scene, times: np.ndarray) -> tuple[Trajectory, Trajectory]:
     """Return the reference at ``times`` [s], and once more from initial velocities changed by `PERTURBATION`."""
-    return event_driven.simulate(scene, sample_times=times), next(perturbed(scene, PERTURBATION, sample_times=times))
+    return event_driven.integrate(scene, sample_times=times), next(perturbed(scene, PERTURBATION, sample_times=times))
 
 
 def perturbed(scene: Scene, share: float, **options: Any) -> Iterator[Trajectory]:
@@ -216,13 +216,13 @@ def perturbed(scene: Scene, share: float, **options: Any) -> Iterator[Trajectory
     meets a little above Ψ is met a little below it, where another phase follows.
     """
     change = share * initial_speed(scene)
-    yield event_driven.simulate(scene, velocity_perturbation=change, **options)
+    yield event_driven.integrate(scene, velocity_perturbation=change, **options)
     if scene.spring is not None and scene.beam is not None:
         start, speed = scene.spring.initial_velocity, change * scene.beam.length
         for velocity in (start - speed, start + speed):
             with suppress(SceneError):  # a spring that is kept still until the tip has come
                 pushed = with_changes(scene, spring={"initial_velocity": velocity})
-                yield event_driven.simulate(pushed, **options)
+                yield event_driven.integrate(pushed, **options)
 
 
 def initial_speed(scene: Scene) -> float:
@@ -259,7 +259,7 @@ def away_from(times: np.ndarray, events: Iterable[float], size: float) -> np.nda
 
 def quantities(scene: Scene) -> list[str]:
     """Return the columns that are compared."""
-    wanted = ("u_tip", "v_tip", "e_beam", "y", "z", "e_spring", "contact_force", *TOLD)
+    wanted = ("u_tip", "v_tip", "e_beam", "y", "z", "e_spring", "contact_force", *BODY_COLUMNS)
     there = columns_of(scene).keys() - {"bending_stress"}  # which follows from strains: the references have none
     return [name for name in wanted if name in there]
 

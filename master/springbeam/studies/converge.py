@@ -37,7 +37,7 @@ _LEAST_ORDER, _MOST_ORDER = 0.5, 20.0
 _ROUNDING = 1e-12
 
 
-class Settled(NamedTuple):
+class Extrapolated(NamedTuple):
     """How a quantity converges; ``None`` where its values do not say."""
 
     change: float | None = None  #: from the last level but one to the last
@@ -46,18 +46,18 @@ class Settled(NamedTuple):
     error: float | None = None  #: of the last level, from the limit
 
 
-def settled(values: Sequence[float | None], sizes: Sequence[int], *, complete: bool = False) -> Settled:
+def extrapolated(values: Sequence[float | None], sizes: Sequence[int], *, complete: bool = False) -> Extrapolated:
     """Return the observed order and the limit of the last three of ``values``, at meshes of ascending ``sizes``.
 
     With errors e·n⁻ᵖ at the sizes n the order p follows from the two changes. Values that do not approach anything
     monotonically have none. If the last mesh is ``complete``, as with all modes, its value is the limit.
     """
     if len(values) < 2 or None in values[-3:]:
-        return Settled()
+        return Extrapolated()
     *_, coarser, last = (float(value) for value in values if value is not None)
     change = last - coarser
     if complete or abs(change) <= _ROUNDING * abs(last):
-        return Settled(change, None, last, 0.0)
+        return Extrapolated(change, None, last, 0.0)
     before = coarser - float(values[-3]) if len(values) > 2 and values[-3] is not None else 0.0
     a, b = (math.log(n / sizes[-2]) for n in (sizes[-3:][0], sizes[-1]))  # a < 0 < b
 
@@ -65,10 +65,10 @@ def settled(values: Sequence[float | None], sizes: Sequence[int], *, complete: b
         return math.expm1(-a * p) / -math.expm1(-b * p) - before / change
 
     if before * change <= 0.0 or excess(_LEAST_ORDER) > 0.0:
-        return Settled(change)
+        return Extrapolated(change)
     order = float(brentq(excess, _LEAST_ORDER, _MOST_ORDER)) if excess(_MOST_ORDER) > 0.0 else _MOST_ORDER
     rest = change / math.expm1(b * order)
-    return Settled(change, order, last + rest, abs(rest))
+    return Extrapolated(change, order, last + rest, abs(rest))
 
 
 def converge(scene: Scene, *, levels: int = 4, metric: Sequence[str] = ()) -> Findings:
@@ -136,7 +136,7 @@ def judged(scene: Scene, rows: Sequence[Row], metric: Sequence[str] = ()) -> Fin
         mine = list(several)
         sizes = [row["beam.n_elements" if refined == "elements" else "unknowns"] for row in mine]
         complete = refined == "modes" and beam is not None and beam.modes_kept == beam.unknowns
-        found = {name: settled([row[name] for row in mine], sizes, complete=complete) for name in names}
+        found = {name: extrapolated([row[name] for row in mine], sizes, complete=complete) for name in names}
         document[refined] = {"levels": mine, "settled": {name: s._asdict() for name, s in found.items()}}
         columns = ("", "as given:.6g", "extrapolated:.6g", "error:.1e", "order:.1f")
         cells = [(heading(name), given[name], s.limit, _error(given[name], s), s.order) for name, s in found.items()]
@@ -158,7 +158,7 @@ def judged(scene: Scene, rows: Sequence[Row], metric: Sequence[str] = ()) -> Fin
     return Findings(document, shown, tables={"converge": made}, pictures={"converge": draw})
 
 
-def _error(given: float | None, found: Settled) -> float | str | None:
+def _error(given: float | None, found: Extrapolated) -> float | str | None:
     """Return the error of the mesh as given, or the last change in brackets."""
     if found.limit is None and found.change is not None:
         return f"({found.change:.1e})"

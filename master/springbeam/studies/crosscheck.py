@@ -94,7 +94,7 @@ def orders(scene: Scene, *, quick: bool = False) -> Findings:
     event_driven.refuse(scene)
     H, halvings = scene.coupling.H, range(_HALVINGS + 1 - quick)
     sizes = {f"H/{2**k}" if k else "H": H / 2**k for k in halvings}
-    reference = event_driven.simulate(scene, sample_times=macro_points(scene))
+    reference = event_driven.integrate(scene, sample_times=macro_points(scene))
     found, stopped = dict[str, list[Row]](), dict[str, str]()
     for step, size in sizes.items():
         try:

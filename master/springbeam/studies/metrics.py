@@ -15,7 +15,7 @@ import numpy as np
 from ..motion.events import EventKind
 from ..results.dense import MOTION, Extremes, extremes
 from ..results.totals import LOSS_NAMES, TOTALS
-from ..results.trajectory import COLUMNS, TOLD, Trajectory
+from ..results.trajectory import BODY_COLUMNS, COLUMNS, Trajectory
 from ..scene import ArgumentError
 from ..scene.messages import nearest
 from ..signals.driven import drive_of, poincare, settled
@@ -53,8 +53,8 @@ def _extreme(column: str, pick: Callable[[Extremes], float]) -> Callable[[Trajec
     def of(run: Trajectory) -> float | None:
         if column not in run.columns:
             return None
-        if column in TOLD:
-            run = run.felt()
+        if column in BODY_COLUMNS:
+            run = run.without_start()
         if run.steps is None or column not in MOTION:  # which is known at its rows only
             return pick(Extremes.of_rows(run.time, run[column]))
         return pick(extremes(run.scene, run.steps, column))
@@ -98,7 +98,7 @@ def _stroboscopic(run: Trajectory) -> list[float] | None:
 
 
 #: Columns with a unit, whose largest magnitudes are metrics.
-_UNITS = {name: unit for name, (unit, _) in (COLUMNS | TOLD).items() if unit and name != "time"}
+_UNITS = {name: unit for name, (unit, _) in (COLUMNS | BODY_COLUMNS).items() if unit and name != "time"}
 
 METRICS: dict[str, Metric] = {
     "u_tip_min": Metric("m", "lowest place of the tip", _extreme("u_tip", attrgetter("lowest"))),

@@ -143,7 +143,7 @@ class Tradeoff(Study):
     @cached_property
     def reference(self) -> Trajectory:
         """The solution of the same model."""
-        return event_driven.simulate(self.scene, sample_times=self.times)
+        return event_driven.integrate(self.scene, sample_times=self.times)
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Name the cheapest configurations, and those that nothing beats."""

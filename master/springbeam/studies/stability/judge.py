@@ -72,7 +72,7 @@ class Reference:
     def run(self) -> Trajectory | None:
         """The solution; ``None`` where there is none, or not in `PATIENCE`."""
         try:
-            return event_driven.simulate(self.scene, **self._options)
+            return event_driven.integrate(self.scene, **self._options)
         except (SceneError, ValueError, event_driven.ReferenceFailure):
             return None
 
