@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-import springbeam
+import springbeam.api  # attaches what a trajectory can do
 from springbeam.bodies.fmu import release
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -79,7 +79,8 @@ def _asked(name: str, version: str) -> dict[str, Any]:
     from ..bodies.known_answers import QUESTIONS
     from ..bodies.protocol import FmuError, StepRefused
 
-    question, path = QUESTIONS[name], own_fmu(name, version)
+    question = QUESTIONS[name]
+    path = own_fmu(name, version)
     found = {"path": path, "fmi": version, "answer": question.words, "exact": question.exact, "bound": question.bound}
     try:
         error = question.ask(name, version)
@@ -96,18 +97,21 @@ def _examine(scene: Scene) -> Findings:
     from ..bodies.units import described
     from ..scene.partners import kind_of
 
-    found, shown = findings(scene), list[Any]()
+    found = findings(scene)
+    shown = list[Any]()
     for name, body in {"beam": scene.upper, "spring": scene.lower}.items():
         if name not in found:
             if body is not None:
                 shown.append(f"[{name}] {kind_of(body).replace('_', ' ')}: everything is offered")
             continue
-        finding, given = found[name], scene.foreign[name]
+        finding = found[name]
+        given = scene.foreign[name]
         mass = "(measured)" if given.mass is None else f"measured, {given.mass:.9g} kg given"
         shown.append(Text(f"[{name}] {given.fmu}", style="bold"))
         shown.append(f"mass that a force or an impulse meets: {finding.mass:.9g} kg {mass}")
         shown += described(given.named, finding.units)
-        names, told = ("", "capability", "shown by", "what is offered"), asdict(finding.abilities)
+        names = ("", "capability", "shown by", "what is offered")
+        told = asdict(finding.abilities)
         rows = [
             ("yes", key, shown_by, having) if told[key] > 0 else ("no", key, shown_by, lacking)
             for key, shown_by, having, lacking in OFFERED

@@ -260,7 +260,8 @@ def interruptible() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    acted, (receiver, sender) = threading.Event(), os.pipe()
+    acted = threading.Event()
+    receiver, sender = os.pipe()
     os.set_blocking(sender, False)
 
     def interrupt(*_: Any) -> NoReturn:

@@ -94,7 +94,8 @@ def run(
         directory = RunDirectory.create_numbered(default)
     else:
         directory = RunDirectory.create(out or default, replace=force)
-    recorder, silent = FileRecorder(what, directory, interval), quiet or as_json
+    recorder = FileRecorder(what, directory, interval)
+    silent = quiet or as_json
     return carry_out(recorder, made=made, no_plots=no_plots, silent=silent)
 
 
@@ -136,7 +137,9 @@ def carry_out(
     from ..run.outcome import RunStopped
     from ..run.runner import run as run_scene
 
-    directory, t_end, error = recorder.directory, recorder.scene.time.t_end, ""
+    directory = recorder.directory
+    t_end = recorder.scene.time.t_end
+    error = ""
     try:
         with _progress(t_end, quiet=silent) as progress, recorder:
             if made is not None:
@@ -155,7 +158,8 @@ def carry_out(
             directory.discard()
     summary = load_summary(directory.path)
     shown = list(_in_words(recorder.scene, summary, load_events(directory.path)))
-    document, files = {"directory": directory.path, **summary}, [("results", directory.path)]
+    document = {"directory": directory.path, **summary}
+    files = [("results", directory.path)]
     draw = None if no_plots else partial(_drawn, directory.path, pictures)
     return Findings(document, shown, files, directory.path, STOPPED if error else 0, error, draw)
 
@@ -178,7 +182,8 @@ def _progress(t_end: float, *, quiet: bool) -> Iterator[Progress]:
     """Show simulated time, phase and speed on stderr, if that is a terminal."""
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-    state, left = TextColumn("{task.fields[state]}"), TimeRemainingColumn()
+    state = TextColumn("{task.fields[state]}")
+    left = TimeRemainingColumn()
     with progress_bar(BarColumn(bar_width=20), TaskProgressColumn(), state, left, quiet=quiet) as bar:
         task = bar.add_task("", total=t_end, state="starting")
         start = shown = monotonic()
@@ -186,7 +191,8 @@ def _progress(t_end: float, *, quiet: bool) -> Iterator[Progress]:
         def show(time: float, phase: str, macro_steps: int) -> None:
             nonlocal shown
             if not bar.disable and (now := monotonic()) - shown >= _REFRESH_SECONDS:
-                shown, speed = now, macro_steps / (now - start)
+                shown = now
+                speed = macro_steps / (now - start)
                 bar.update(task, completed=time, state=f"t = {time:.4g}/{t_end:g} s  {phase:<7}{speed:7.0f} steps/s")
 
         yield show

@@ -132,7 +132,8 @@ def predict(
 
 def _lines(p: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield what is predicted, a line a subject."""
-    e, H = p["estimates"], p["macro_step"]
+    e = p["estimates"]
+    H = p["macro_step"]
     yield "mass", _listed(("beam {:.4g} kg", e["beam_mass"]), ("spring {:.4g} kg", e["spring_mass"]))
     if e["frequency"] is not None and p["frequencies"]:
         found = ", ".join(f"{frequency:.4g}" for frequency in p["frequencies"])

@@ -96,7 +96,8 @@ def study_command(*of_workers: str) -> Callable[[Callable[..., Study | Once]], C
                 return find(made, given["scene"], frame)
             return carry_out(made, given.get("scene"), frame)
 
-        command.__name__, command.__doc__ = make.__name__, make.__doc__
+        command.__name__ = make.__name__
+        command.__doc__ = make.__doc__
         parameters = [p.replace(kind=p.KEYWORD_ONLY) for p in (own | shared).values()]
         command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         return command
@@ -192,7 +193,8 @@ def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
 
     from ..studies.engine import dask_cluster
 
-    total, there = len(study.cases()), len(records.by_name)
+    total = len(study.cases())
+    there = len(records.by_name)
     if there == total:
         return study.computed(records)
     silent = frame.quiet or frame.as_json

@@ -101,16 +101,21 @@ class _Run:
         sample_times: Sequence[float] | np.ndarray | None,
         time_limit: float | None,
     ) -> None:
-        self.system, self.t_end = (QuasiStaticSystem if scene.massless else HybridSystem)(scene), t_end
+        self.system = (QuasiStaticSystem if scene.massless else HybridSystem)(scene)
+        self.t_end = t_end
         self.state = HybridState(self.system, *initial(self.system, velocity_perturbation))
         self.rows = Rows(self.state)
-        self._every_event, self._due = sample_times is None, self._samples(sample_times)
-        self._limit, self._began = time_limit, clock.process_time()
+        self._every_event = sample_times is None
+        self._due = self._samples(sample_times)
+        self._limit = time_limit
+        self._began = clock.process_time()
         self._forms: dict[ReferencePhase, LinearForm] = {}
         self._counts = {"steps": 0, "phases": 0}
 
     def execute(self) -> Trajectory:
-        began, state, happened = clock.perf_counter(), self.state, [-np.inf] * _AT_ONCE
+        began = clock.perf_counter()
+        state = self.state
+        happened = [-np.inf] * _AT_ONCE
         self._record_event()
         state.start()
         self._record_due()
@@ -130,7 +135,10 @@ class _Run:
 
     def _until_event(self) -> Watch | None:
         """Integrate until something happens, or until a load has a kink or the run ends; return what has happened."""
-        s, state, begin, watched = self.system, self.state, self.state.time, self.state.watched()
+        s = self.system
+        state = self.state
+        begin = self.state.time
+        watched = self.state.watched()
         self._counts["phases"] += 1
         end = min(s.loads.smooth_from(begin), self.t_end)
         if state.phase not in self._forms:
@@ -155,7 +163,8 @@ class _Run:
 
     def _samples(self, sample_times: Sequence[float] | np.ndarray | None) -> deque[float]:
         """Return the times of the rows [s] but for those of events."""
-        start, samples = self.state.time, sample_times
+        start = self.state.time
+        samples = sample_times
         if samples is None:
             H = self.system.scene.coupling.macro_step or (self.t_end - start) / _SAMPLES
             whole = max(int((self.t_end - start) / H * (1.0 - 1e-9)), 0)  # of those before the end
@@ -178,17 +187,22 @@ class _Run:
 
 def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
     """Return time [s] and state at the start, where an undeformed tip arrives; ``perturbation``: see `integrate`."""
-    scene, X, time = s.scene, np.zeros(s.size), 0.0
+    scene = s.scene
+    X = np.zeros(s.size)
+    time = 0.0
     if scene.static:
         return time, _at_rest(s)
     inertia = s.tip_mobility not in (0.0, np.inf)
-    x, x_dot = X[s.A], X[s.V]
+    x = X[s.A]
+    x_dot = X[s.V]
     x[s.r :] = s.root_mass * s.spring.equilibrium
     x_dot[s.r :] = s.root_mass * (s.spring.initial_velocity + (0.0 if inertia else perturbation))
     if scene.beam is not None and s.beam is not None:
-        slope, rate = scene.beam.initial_deflection_slope, scene.beam.initial_velocity_slope
+        slope = scene.beam.initial_deflection_slope
+        rate = scene.beam.initial_velocity_slope
         if scene.contact_time and scene.tip_target is not None:
-            time, slope = scene.contact_time, scene.tip_target.value / scene.beam.length
+            time = scene.contact_time
+            slope = scene.tip_target.value / scene.beam.length
         x[: s.r] = slope * s.beam.slope_shape
         x_dot[: s.r] = (rate + perturbation * inertia) * s.beam.slope_shape
         if scene.beam.approach == "elastic":
@@ -202,15 +216,19 @@ def _at_rest(s: HybridSystem) -> np.ndarray:
 
     Raises ReferenceFailure where the spring rests nowhere near Ψ.
     """
-    X, p = np.zeros(s.size), s.spring
+    X = np.zeros(s.size)
+    p = s.spring
     force = s.load + s.loads.values(np.zeros(())) @ s.patterns
-    b, k = s.tip[: s.r], s.omega2[: s.r]
-    bent, on_spring = force[: s.r] / k, s.mass * float(force @ s.top)
+    b = s.tip[: s.r]
+    k = s.omega2[: s.r]
+    bent = force[: s.r] / k
+    on_spring = s.mass * float(force @ s.top)
 
     def top(C: float) -> float:
         if not s.has_spring:
             return s.stop.position
-        k1, k2 = p.linear_stiffness, p.cubic_stiffness
+        k1 = p.linear_stiffness
+        k2 = p.cubic_stiffness
         try:
             y = newton(lambda y: (k1 + k2 * y**2) * y - on_spring + C, p.equilibrium, lambda y: k1 + 3.0 * k2 * y**2)
         except RuntimeError as error:
@@ -221,7 +239,8 @@ def _at_rest(s: HybridSystem) -> np.ndarray:
         p = top(C) - float(b @ (bent + b * C / k))
         return p if s.law.rigid else float(s.law.force(np.array(p), np.zeros(()))) - C
 
-    C, deep = 0.0, top(0.0) - float(b @ bent)
+    C = 0.0
+    deep = top(0.0) - float(b @ bent)
     if s.r and (s.has_spring or s.scene.stop is not None) and (deep > 0.0 or s.law.start != "free") and deep != 0.0:
         far = deep / float(b @ (b / k))
         while mismatch(far) * deep > 0.0:
@@ -255,11 +274,13 @@ def _crossing(
     close = np.abs(there) <= _CLOSE * np.ptp(values)
     there[close] = [g(tau) for tau in turns[close]]
     order = np.argsort(np.r_[segment.nodes, turns])
-    times, values = np.r_[segment.nodes, turns][order], np.r_[values, there][order]
+    times = np.r_[segment.nodes, turns][order]
+    values = np.r_[values, there][order]
     below = np.flatnonzero(values < -s.noise(watch.unit, segment.states[0]))
     if not len(below):
         return None
-    low, high = float(times[max(below[0] - 1, 0)]), float(times[below[0]])
+    low = float(times[max(below[0] - 1, 0)])
+    high = float(times[below[0]])
     if g(low) <= 0.0 or g(high) >= 0.0:  # what the nodes have and the exact state differ by less than either's error
         return low if g(low) <= 0.0 else high
     # A root at a segment's very start needs no more than the rounding of the segment.

@@ -60,18 +60,22 @@ class LinearForm:
     def __init__(self, system: HybridSystem, phase: ReferencePhase) -> None:
         self.system, self.phase = s, phase = system, phase
         self.unresolved = f"no step resolves the interface force in phase {phase.name}"
-        (omega2, c, load), held = s.oscillating(phase), s.held(phase)
+        (omega2, c, load) = s.oscillating(phase)
+        held = s.held(phase)
         self.offset = held.levels @ held.along
         self.omega2, self.basis = _modes(omega2, s.space(phase))
         self.inverse = self.basis / np.sum(self.basis**2, axis=0)  # its columns are at right angles
-        self.c, self.damping = c @ self.basis**2, 0.0  # where nothing is joined a mode is a coordinate
+        self.c = c @ self.basis**2  # where nothing is joined a mode is a coordinate
+        self.damping = 0.0
         if s.joined(phase):
             self.c = s.alpha_b * self.omega2
             #: Damping of the spring that ``c`` does not hold [N·s/m].
             self.damping = s.spring.damping - s.alpha_b * s.spring.linear_stiffness
-        self.constant, self.loads = (load - omega2 * self.offset) @ self.basis, s.patterns @ self.basis
+        self.constant = (load - omega2 * self.offset) @ self.basis
+        self.loads = s.patterns @ self.basis
         ends = np.array([s.tip, s.top])
-        self.ends, self.at = ends @ self.basis, (ends @ self.offset)[:, None] + [[0.0], [s.floor]]
+        self.ends = ends @ self.basis
+        self.at = (ends @ self.offset)[:, None] + [[0.0], [s.floor]]
         nonlinear = bool(self.damping or s.spring.cubic_stiffness)
         self.of_spring = nonlinear and s.has_spring and bool(np.any(self.ends[1]))
         self.of_law = s.law.acts(phase.contact)
@@ -90,8 +94,10 @@ class LinearForm:
 
     def forces(self, xi: np.ndarray, xi_dot: np.ndarray) -> np.ndarray:
         """Return R: forces (k, inputs) at modes (k, p)."""
-        (u, y), (v, z) = self.ends @ xi.T + self.at, self.ends @ xi_dot.T
-        found, spring = [], self.system.spring
+        u, y = self.ends @ xi.T + self.at
+        v, z = self.ends @ xi_dot.T
+        found = []
+        spring = self.system.spring
         if self.of_spring:
             found.append(-self.damping * z - spring.cubic_stiffness * y**3)
         if self.of_law:
@@ -116,13 +122,16 @@ class LinearForm:
         """
         s = self.system
         weights = self.weights(float(f"{size:.12e}"))  # sizes recur but for rounding
-        times, (xi, xi_dot) = X[s.T] + size * TARGETS, self.modal(X)
-        load, r = self.load_at(times[:-1]), np.repeat(self.forces(xi[None], xi_dot[None]), STAGES, axis=0)
+        times = X[s.T] + size * TARGETS
+        xi, xi_dot = self.modal(X)
+        load = self.load_at(times[:-1])
+        r = np.repeat(self.forces(xi[None], xi_dot[None]), STAGES, axis=0)
         for iteration in range(_MAX_ITERATIONS):
             with np.errstate(over="ignore", invalid="ignore"):  # an escaping spring; found below
                 moved = weights.motion(xi, xi_dot, load + r @ self.inputs)
                 new = self.forces(*(at_targets[:-1] for at_targets in moved))
-                change, scale = np.max(np.abs(new - r), initial=0.0), np.max(np.abs(new), initial=0.0)
+                change = np.max(np.abs(new - r), initial=0.0)
+                scale = np.max(np.abs(new), initial=0.0)
             r = new
             if change <= (4e-16 if iteration < 9 else 1e-14) * scale:
                 break
@@ -152,7 +161,8 @@ class ExponentialPropagator:
     """Integrates a phase from X on: exact in the linear part, ``form``, by Gauss collocation in the rest."""
 
     def __init__(self, form: LinearForm, X: np.ndarray, speed: float = 0.0) -> None:
-        self.form, self.X = form, X
+        self.form = form
+        self.X = X
         self._speed = speed  #: the largest of the ends so far, the scale of `_TAIL` [m/s]
         self._force_limit = np.inf  #: what resolving r allows [s]
         self.elapsed = 0.0  #: since the start [s]
@@ -178,7 +188,8 @@ class ExponentialPropagator:
 
     def _step(self, size: float) -> Segment:
         """Make one step. Raises ReferenceFailure where it is too long for the forces r."""
-        form, X = self.form, self.X
+        form = self.form
+        X = self.X
         states, pulled = form.step(X, size)
         u, v, y, z = np.abs(form.system.ends(form.phase, states))
         self._speed = max(self._speed, float(np.max([v, z])))

@@ -61,19 +61,22 @@ class HybridSystem:
     """
 
     def __init__(self, scene: Scene, beam: ModalBeam | None = None) -> None:
-        self.scene, self.law = scene, law_of(scene)
+        self.scene = scene
+        self.law = law_of(scene)
         self.beam = beam = modal_beam(scene.beam) if beam is None and scene.beam is not None else beam
         self.has_spring = scene.spring is not None
         self.alone = not (self.has_spring or scene.elastic_stop)
         #: Without a spring its terms vanish, and without a stop nothing is ever seated on this one.
         self.spring = p = scene.spring or Spring(mass=1.0, linear_stiffness=0.0)
         self.stop = scene.stop or Stop(position=0.0)
-        self.mass, self.root_mass = p.mass * self.has_spring, float(np.sqrt(p.mass))
+        self.mass = p.mass * self.has_spring
+        self.root_mass = float(np.sqrt(p.mass))
         one = np.ones(int(self.has_spring))
         omega2, load, b = (np.zeros(0),) * 3 if beam is None else (beam.omega**2, beam.load, beam.tip)
         self.alpha_b = 0.0 if beam is None else beam.alpha
         self.loads = ModalLoads(scene, beam)
-        self.r, self.n = len(b), len(b) + len(one)
+        self.r = len(b)
+        self.n = len(b) + len(one)
         self.omega2 = np.append(omega2, one * p.linear_stiffness / p.mass)
         self.c = np.append(self.alpha_b * omega2, one * p.damping / p.mass)
         self.load = np.append(load, one * p.external_force / self.root_mass)
@@ -82,7 +85,8 @@ class HybridSystem:
         self.top = self.tip if self.alone else np.append(0.0 * b, one / self.root_mass)
         self.between = self.tip if self.alone else self.tip - self.top
         #: What an impulse of 1 N·s adds to the velocity of the tip, and to that between the ends [1/kg].
-        self.tip_mobility, self.mobility = float(self.tip @ self.tip), float(self.between @ self.between)
+        self.tip_mobility = float(self.tip @ self.tip)
+        self.mobility = float(self.between @ self.between)
         #: y where nothing moves it.
         self.floor = self.stop.position * self.scene.elastic_stop
         #: What counts of ẋ²/2 as kinetic energy.
@@ -90,8 +94,11 @@ class HybridSystem:
         #: Strain energy [J] under the constant loads that x does not tell.
         self._hidden = 0.0
         self.size = 2 * self.n + 3
-        self.A, self.V = slice(0, self.n), slice(self.n, 2 * self.n)
-        self.D, self.W, self.T = 2 * self.n, 2 * self.n + 1, 2 * self.n + 2
+        self.A = slice(0, self.n)
+        self.V = slice(self.n, 2 * self.n)
+        self.D = 2 * self.n
+        self.W = 2 * self.n + 1
+        self.T = 2 * self.n + 2
 
     # Phases ---------------------------------------------------------------------------------------------------------
 
@@ -127,8 +134,10 @@ class HybridSystem:
 
     def ends(self, phase: ReferencePhase, X: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return u, v, y and z of states of shape (..., 2n + 3)."""
-        x, x_dot = X[..., self.A], X[..., self.V]
-        y, z = x @ self.top + self.floor, x_dot @ self.top
+        x = X[..., self.A]
+        x_dot = X[..., self.V]
+        y = x @ self.top + self.floor
+        z = x_dot @ self.top
         return (y, z, y, z) if self.joined(phase) else (x @ self.tip, x_dot @ self.tip, y, z)
 
     def motion(self, phase: ReferencePhase, X: np.ndarray) -> EndsMotion:
@@ -139,7 +148,9 @@ class HybridSystem:
             own = own + self.loads.values(X[..., self.T]) @ self.patterns
         if self.spring.cubic_stiffness:
             own = own - (self.spring.cubic_stiffness * y**3)[..., None] * self.top
-        held, C, N = self.held(phase), np.zeros_like(u), np.zeros_like(u)
+        held = self.held(phase)
+        C = np.zeros_like(u)
+        N = np.zeros_like(u)
         if self.joined(phase) and len(held.rows):
             C = -own @ held.along[0]
         elif self.law.acts(phase.contact) and not self.alone:
@@ -178,12 +189,14 @@ class HybridSystem:
         """
         if self.beam is None or self.scene.massless:  # whose coordinate is that of the tip alone
             return None
-        a, v = states[:, : self.r], states[:, self.n : self.n + self.r]
+        a = states[:, : self.r]
+        v = states[:, self.n : self.n + self.r]
         return np.hstack([a @ self.beam.sampler.T, (a + self.alpha_b * v) @ self.beam.inner.T])
 
     def energies(self, X: np.ndarray, phase: ReferencePhase) -> dict[str, np.ndarray]:
         """Return energies [J] of states of shape (k, 2n + 3); ``e_load`` is minus the work of the loads."""
-        x, x_dot = X[..., self.A], X[..., self.V]
+        x = X[..., self.A]
+        x_dot = X[..., self.V]
         u, _, y, _ = self.ends(phase, X)
         linear = 0.5 * (self.inertia * x_dot**2 + self.omega2 * x**2)
         return {
@@ -196,7 +209,10 @@ class HybridSystem:
 
     def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
         """Return what rounding leaves of a displacement, velocity or contact force that is exactly zero."""
-        x, x_dot, tip, top = np.abs(X[self.A]), np.abs(X[self.V]), np.abs(self.tip), np.abs(self.top)
+        x = np.abs(X[self.A])
+        x_dot = np.abs(X[self.V])
+        tip = np.abs(self.tip)
+        top = np.abs(self.top)
         if unit == "m":
             return NOISE * (float((tip + top) @ x) + abs(self.stop.position))
         if unit == "m/s":
@@ -222,12 +238,14 @@ class QuasiStaticSystem(HybridSystem):
         assert scene.beam is not None
         k, rest, stored = _statics(scene.beam)
         one = np.ones(1)
-        shape, length = one[None], scene.beam.length * one
+        shape = one[None]
+        length = scene.beam.length * one
         super().__init__(
             scene, ModalBeam(np.sqrt(k) * one, one, k * rest * one, length, shape, shape, shape, scene.beam.alpha_b)
         )
         self.tip_mobility = self.mobility = np.inf
-        self._rest, self.inertia = rest, np.array([0.0, 1.0])
+        self._rest = rest
+        self.inertia = np.array([0.0, 1.0])
         self._hidden = stored - 0.5 * k * rest**2
 
     def held(self, phase: ReferencePhase, level: float | None = None) -> Held:
@@ -269,9 +287,11 @@ def _statics(beam: Beam) -> tuple[float, float, float]:
     x, dx = points(beam)
     EI = beam.young_modulus * beam.second_moment_of_area
     KAG = beam.shear_coefficient * beam.area * beam.shear_modulus
-    h, arm = beam.length / beam.n_elements, beam.length - x
+    h = beam.length / beam.n_elements
+    arm = beam.length - x
     near = np.minimum(arm, h)  # of the tip: where the hat function of its load is not zero
-    hat, lever = near - near**2 / (2.0 * h), near**2 / 2.0 - near**3 / (3.0 * h)
+    hat = near - near**2 / (2.0 * h)
+    lever = near**2 / 2.0 - near**3 / (3.0 * h)
     shear = beam.distributed_load * arm + beam.tip_load_coefficient * hat
     moment = 0.5 * beam.distributed_load * arm**2 + beam.tip_load_coefficient * (arm * hat - lever)
     compliance = float(dx @ (arm**2 / EI + 1.0 / KAG))

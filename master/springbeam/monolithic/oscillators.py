@@ -79,13 +79,16 @@ class Oscillators:
     """
 
     def __init__(self, omega2: np.ndarray, c: np.ndarray) -> None:
-        self.omega2, self.c, self.sigma = omega2, c, 0.5 * c
+        self.omega2 = omega2
+        self.c = c
+        self.sigma = 0.5 * c
         #: s₁, s₂ with |s₁| ≤ |s₂|, (p,) complex; apart, so that one can divide by their difference.
         self.slow, self.fast = self._roots(_CRITICAL)
 
     def _roots(self, apart: float) -> tuple[np.ndarray, np.ndarray]:
         """Return s₁ and s₂, nearer ones moved ``apart`` by this share of σ on either side."""
-        sigma, discriminant = self.sigma, self.sigma**2 - self.omega2
+        sigma = self.sigma
+        discriminant = self.sigma**2 - self.omega2
         root = np.maximum(np.sqrt(np.abs(discriminant)), apart * np.abs(sigma))
         over = discriminant > 0.0
         half = np.where(over, np.copysign(root, sigma), 1j * root)
@@ -97,7 +100,8 @@ class Oscillators:
 
     def kernels(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return S and Ṡ = s₁ S + e^{s₂τ} at times ``tau``, shape tau.shape + (p,)."""
-        t, (slow, fast) = tau[..., None], self._roots(0.0)
+        t = tau[..., None]
+        slow, fast = self._roots(0.0)
         between = (fast - slow) * t
         with np.errstate(divide="ignore", invalid="ignore"):
             mean = np.where(between == 0.0, 1.0, np.expm1(between) / between)  # of e^{(s₂ − s₁)ν} over [0, τ]
@@ -108,7 +112,8 @@ class Oscillators:
         """Return the weights of a step of ``size`` [s], of those targets that ``at`` picks."""
         S, S_dot = self.kernels(TARGETS[at] * size)
         shape = (len(S), STAGES, len(self.omega2))
-        force, force_dot = np.empty(shape), np.empty(shape)
+        force = np.empty(shape)
+        force_dot = np.empty(shape)
         near = np.abs(self.fast) * size <= _SLOW
         if np.any(near):
             oscillators = Oscillators(self.omega2[near], self.c[near])
@@ -117,8 +122,10 @@ class Oscillators:
             force_dot[..., near] = np.matmul(_WEIGHTED[at] * size, kernel_dot)
         if not np.all(near):
             far = ~near
-            slow, fast = self.slow[far], self.fast[far]
-            with_slow, with_fast = _convolve(slow, size, at), _convolve(fast, size, at)
+            slow = self.slow[far]
+            fast = self.fast[far]
+            with_slow = _convolve(slow, size, at)
+            with_fast = _convolve(fast, size, at)
             force[..., far] = ((with_slow - with_fast) / (slow - fast)).real
             force_dot[..., far] = ((slow * with_slow - fast * with_fast) / (slow - fast)).real
         return StepWeights(S_dot + self.c * S, S, -self.omega2 * S, S_dot, force, force_dot)

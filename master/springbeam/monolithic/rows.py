@@ -88,8 +88,11 @@ class Clamp:
     def __init__(self, scene: Scene, modes: ModalBeam) -> None:
         beam = scene.beam
         assert beam is not None
-        self._length, mesh, (x, dx) = beam.length, assemble(beam), points(beam)
-        mass, inertia = beam.density * beam.area, beam.density * beam.second_moment_of_area
+        self._length = beam.length
+        mesh = assemble(beam)
+        x, dx = points(beam)
+        mass = beam.density * beam.area
+        inertia = beam.density * beam.second_moment_of_area
         deflection = mesh.nodal(x, dx)  # its integral of each unknown of the mesh
         rotation = np.roll(deflection, -1)  # θ has the shapes of u, one place before it
         #: Rates of momentum and of moment of momentum of a unit of each modal acceleration, shape (2, r).

@@ -126,7 +126,8 @@ def assemble(beam: Beam) -> SemiDiscreteBeam:
 
     With ``reduced_integration`` the shear takes p Gauss points instead of p + 1.
     """
-    n, p = beam.n_elements, beam.element_degree
+    n = beam.n_elements
+    p = beam.element_degree
     h = beam.length / n
     bending = beam.young_modulus * beam.second_moment_of_area
     shear = beam.shear_coefficient * beam.area * beam.shear_modulus
@@ -261,7 +262,8 @@ def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
     """Return the lowest modes, the static shapes and the start, (2N, n_modes + 3)."""
     # Without units of length and time, in unknowns (L θ, u): no wanted eigenvalue of K⁻¹M far below 1.
     D = sp.diags(np.where(np.arange(discrete.size) % 2, 1.0, 1.0 / discrete.length)).tocsc()
-    K, M = D @ discrete.K @ D, D @ discrete.M @ D
+    K = D @ discrete.K @ D
+    M = D @ discrete.M @ D
     loads = np.column_stack([discrete.tip_vector, discrete.nodal(*points(beam))])
     static = D @ spla.splu(K).solve(D @ loads)
     if discrete.size <= _DENSE_SIZE or 2 * beam.n_modes > discrete.size:

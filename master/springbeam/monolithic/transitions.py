@@ -27,7 +27,9 @@ class HybridState:
     """Time, state and phase of a run, what impacts have lost so far [J], and its events."""
 
     def __init__(self, system: HybridSystem, time: float, X: np.ndarray) -> None:
-        self.system, self.time, self.X = system, time, X
+        self.system = system
+        self.time = time
+        self.X = X
         self.phase = ReferencePhase("free")
         self.loss = 0.0
         self.events: list[Event] = []
@@ -41,7 +43,8 @@ class HybridState:
 
     def watched(self) -> list[Watch]:
         """Return the functions that are ≥ 0 as long as the phase lasts."""
-        s, phi = self.system, self.system.stop.position
+        s = self.system
+        phi = self.system.stop.position
         watched = s.law.watched(self.phase) if s.scene.coupled else []
         if self.phase.seated:
             return [*watched, Watch("unseat", lambda m: m.N, "N")]
@@ -62,8 +65,10 @@ class HybridState:
 
     def start(self) -> None:
         """Make first contact, and its impact, where tip and obstacle touch at the start or are joined from there on."""
-        s, X = self.system, self.X
-        m, noise = s.motion(self.phase, X), s.noise("m", X)
+        s = self.system
+        X = self.X
+        m = s.motion(self.phase, X)
+        noise = s.noise("m", X)
         if s.law.start != "free":
             meets = self.phase.contact == "free"
         else:
@@ -79,7 +84,8 @@ class HybridState:
 
     def _go_on(self, happened: str, before: float | None = None, impulse: float = 0.0) -> None:
         """Begin the phase that follows; ``before`` is the energy [J] before an impact."""
-        s, X = self.system, self.X
+        s = self.system
+        X = self.X
         if s.scene.massless and before is None:  # a tip that is let go may jump
             before = self._mechanical_energy()
         contact, kind = s.law.after(happened, s.motion(ReferencePhase("tied"), X), s.noise("m", X))
@@ -90,13 +96,16 @@ class HybridState:
             self._emit(kind, impulse_contact=impulse, energy_loss=lost)
 
     def _meet(self) -> None:
-        s, X = self.system, self.X
+        s = self.system
+        X = self.X
         if not s.law.rigid:
             self._go_on("meet")
             return
-        m, before = s.motion(self.phase, X), self._mechanical_energy()
+        m = s.motion(self.phase, X)
+        before = self._mechanical_energy()
         impulse = float(m.z - m.v) / s.mobility
-        was_seated, self.phase = self.phase.seated, ReferencePhase("tied")
+        was_seated = self.phase.seated
+        self.phase = ReferencePhase("tied")
         s.synchronise(self.phase, X)
         self._go_on("meet", before, impulse)
         if was_seated:  # the spring already stands on the foundation
@@ -108,9 +117,14 @@ class HybridState:
 
     def _hit_stop(self) -> None:
         """Apply Newton's impact law on the foundation, and seat what has bounced for the last time."""
-        s, X, e, contact = self.system, self.X, self.system.stop.restitution, self.phase.contact
+        s = self.system
+        X = self.X
+        e = self.system.stop.restitution
+        contact = self.phase.contact
         self._place(s.stop.position)
-        before, arriving, velocity = self._mechanical_energy(), s.motion(self.phase, X), X[s.V].copy()
+        before = self._mechanical_energy()
+        arriving = s.motion(self.phase, X)
+        velocity = X[s.V].copy()
         self.phase = ReferencePhase(contact)
         held = s.held(self.phase, s.stop.position)
         held.hold(X[s.V], -e * (velocity @ held.rows.T))
@@ -144,7 +158,8 @@ class HybridState:
         It is 1e-12 of the distance |Ψ − φ|, or of the tip's deflection if larger. What is cut off changes no impulse,
         and the displacement by less than (velocity × remaining time) of the bounces left out.
         """
-        s, phi = self.system, self.system.stop.position
+        s = self.system
+        phi = self.system.stop.position
         deflection = float(np.abs(self.X[s.A]) @ np.abs(s.tip))
         return 1e-12 * max(abs(s.spring.equilibrium - phi), deflection, abs(phi), 1e-9)
 

@@ -173,7 +173,8 @@ class _Algorithm:
 
     def _first_contact(self) -> None:
         """Make lines 5 and 6."""
-        self._touched, self._stiffness = True, self._contact.stiffness
+        self._touched = True
+        self._stiffness = self._contact.stiffness
         self._y = self._spring.equilibrium
         if self._at_contact == "tip":
             self._z = self._beam.motion().velocity
@@ -181,23 +182,30 @@ class _Algorithm:
 
     def _contact_step(self, end: float) -> None:
         """Make lines 8–30."""
-        psi, h, y, z = self._spring.equilibrium, self._h, self._y, self._z
+        psi = self._spring.equilibrium
+        h = self._h
+        y = self._y
+        z = self._z
         u = self._beam.motion().displacement
         energy = self._spring_energy()
         self._beam.mark()
         u_free = self._beam.advance(self.time, h, NO_FORCE).displacement
         u_new = self._predicted_tip(u_free, u)  # line 9
-        acting, case, phase = self._stiffness, 0, "free"
+        acting = self._stiffness
+        case = 0
+        phase = "free"
         reached = None
         joined = u_new <= psi  # line 14 then asks for no y_new
         if not joined:
             reached = self._spring_step(y, z)  # line 10
             if psi < reached.y < u_new:  # lines 11–13
-                case, self._stiffness = 11, 0.0
+                case = 11
+                self._stiffness = 0.0
             else:
                 joined = u_new <= reached.y  # line 14
         if joined:
-            case, phase = 14, "tied"
+            case = 14
+            phase = "tied"
             self._stiffness = acting = self._contact.stiffness  # line 15
             reached = self._spring_step(u_new, z)  # lines 16, 17
             if reached.y <= self._phi:  # lines 20–24
@@ -222,7 +230,9 @@ class _Algorithm:
 
     def _predicted_tip(self, u_free: float, u: float) -> float:
         """Return uˡ⁺¹ of (62), nonlinear only at the tip: u = u_free + b ½ (λ(Ψ−u)₊^p + λ(Ψ−uˡ)₊^p)."""
-        before, w, half = self._law(u), u, 0.5 * self._response
+        before = self._law(u)
+        w = u
+        half = 0.5 * self._response
         for _ in range(_MAX_ITERATIONS):
             force = self._law(w)
             change = (w - u_free - half * (force + before)) / (1.0 - half * self._slope(w, force))
@@ -244,7 +254,8 @@ class _Algorithm:
 
     def _spring_step(self, y: float, z: float) -> SpringStep:
         """Return the step from ``y`` and ``z`` under the mean force of the law."""
-        before, end = self._law(y), y
+        before = self._law(y)
+        end = y
         with closing(self._new_spring(y, z)) as spring:
             spring.mark()
             response = 0.5 * self._h**2 / spring.mass
@@ -266,7 +277,8 @@ class _Algorithm:
         pressing = 0.5 * (self._law(self._phi) + self._law(y))
         with closing(self._new_spring(y, z)) as spring:
             spring.mark()
-            n, response = 0.0, 0.5 * self._h**2 / spring.mass
+            n = 0.0
+            response = 0.5 * self._h**2 / spring.mass
             for _ in range(_MAX_ITERATIONS):
                 spring.rewind()
                 motion = spring.advance(self.time, self._h, (pressing, 0.0, 0.0), (n, 0.0, 0.0))
@@ -277,7 +289,8 @@ class _Algorithm:
         raise StepRefused("line 24 of Algorithm 1: no foundation force found")
 
     def _take(self, reached: SpringStep) -> None:
-        self._y, self._z = reached.y, reached.z
+        self._y = reached.y
+        self._z = reached.z
         self._dissipated += reached.dissipated
         if not (isfinite(reached.y) and isfinite(reached.z)):
             raise OverflowError("the solution overflows")
@@ -296,12 +309,15 @@ class _Algorithm:
 
     def _spring_energy(self) -> float:
         """Return ½ m z² + ½ k1 y² + ¼ k2 y⁴ [J]."""
-        p, y, z = self._spring, self._y, self._z
+        p = self._spring
+        y = self._y
+        z = self._z
         return 0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4
 
     def _measure_response(self) -> None:
         """Find the response to a force that moves the tip as far as it moves by itself; to 1 N it may be rounding."""
-        beam, size = self._beam, self._h
+        beam = self._beam
+        size = self._h
         beam.mark()
         alone = beam.advance(self.time, size, NO_FORCE)
         length = max(abs(alone.displacement), size * abs(alone.velocity))
@@ -316,7 +332,8 @@ class _Algorithm:
     def _record(
         self, time: float, phase: str, contact: float = 0.0, inside: float = 0.0, foundation: float = 0.0, case: int = 0
     ) -> None:
-        tip, energies = self._beam.motion(), self._beam.energies()
+        tip = self._beam.motion()
+        energies = self._beam.energies()
         self._shapes.append(self._beam.shape())
         self._rows.append(
             Row(

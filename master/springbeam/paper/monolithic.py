@@ -38,7 +38,8 @@ from .problem import AlgorithmFailure, AtContact
 YTemp = Literal["equation", "guess", "both"]
 
 #: Of Newton's method, on the change of the unknown [m].
-_MAX_ITERATIONS, _TOLERANCE = 50, 1e-12
+_MAX_ITERATIONS = 50
+_TOLERANCE = 1e-12
 
 
 class _Row(NamedTuple):
@@ -104,7 +105,8 @@ class _Algorithm:
         self.beam = scene.beam
         self.spring = scene.spring
         self.contact = scene.contact
-        self.at_contact, self.y_temp = at_contact, y_temp
+        self.at_contact = at_contact
+        self.y_temp = y_temp
         self.discrete = d = assemble(scene.beam)
         self.load = d.nodal(*constant_forces(scene.beam))
         self._set_step(scene.coupling.H)
@@ -117,7 +119,8 @@ class _Algorithm:
 
     def _set_step(self, h: float) -> None:
         """Factorise (62) for steps of ``h`` [s]."""
-        d, alpha = self.discrete, self.beam.alpha_b
+        d = self.discrete
+        alpha = self.beam.alpha_b
         self.h = h
         self.B = (4.0 * d.M + (2.0 * alpha * h - h**2) * d.K).tocsr()
         self.solve = spla.splu((4.0 * d.M + (h**2 + 2.0 * alpha * h) * d.K).tocsc()).solve
@@ -128,7 +131,8 @@ class _Algorithm:
 
     def _compliance(self, w: float, stiffness: float) -> tuple[float, float]:
         """Return λ (Ψ − w)₊^p and its derivative by w."""
-        depth, p = max(self.spring.equilibrium - w, 0.0), self.contact.exponent
+        depth = max(self.spring.equilibrium - w, 0.0)
+        p = self.contact.exponent
         return stiffness * depth**p, -p * stiffness * depth ** (p - 1.0) if depth > 0.0 else 0.0
 
     def _newton(self, f: Callable[[float], tuple[float, float]], guess: float, solve: str) -> float:
@@ -146,7 +150,8 @@ class _Algorithm:
 
     def _foundation_force(self, y: float, z: float, Y: float) -> tuple[float, float]:
         """Return N of (53) with (54) for a step from (y, z) that ends at ``Y``, and its derivative by ``Y``."""
-        p, h = self.spring, self.h
+        p = self.spring
+        h = self.h
         force, slope = self._compliance(Y, self.stiffness)
         value = (
             2.0 * p.mass * ((Y - y) / h - z) / h
@@ -165,7 +170,8 @@ class _Algorithm:
     def run(self) -> None:
         """Make all steps; `trajectory` has them, also where one fails."""
         self.began = clock.perf_counter()
-        row, psi = self._start(), self.spring.equilibrium
+        row = self._start()
+        psi = self.spring.equilibrium
         touched = self.beam.approach == "undeformed" or row.q[-1] <= psi  # else lines 1–4 come first
         self.rows.append(self._first_contact(row)._replace(phase="tied") if touched else row)
         for end, size in problem.steps(self.scene):
@@ -174,11 +180,14 @@ class _Algorithm:
                 self._set_step(size)
             row = self._contact_step(self.rows[-1]) if touched else self._free_step(self.rows[-1])
             if not touched and row.q[-1] <= psi:
-                touched, row = True, self._first_contact(row)
+                touched = True
+                row = self._first_contact(row)
             self.rows.append(row)
 
     def _start(self) -> _Row:
-        beam, shape, psi = self.beam, self.discrete.slope_shape, self.spring.equilibrium
+        beam = self.beam
+        shape = self.discrete.slope_shape
+        psi = self.spring.equilibrium
         slope = psi / beam.length if beam.approach == "undeformed" else beam.initial_deflection_slope
         return _Row(self.time, slope * shape, beam.initial_velocity_slope * shape, psi, self.spring.initial_velocity)
 
@@ -209,9 +218,15 @@ class _Algorithm:
 
     def _contact_step(self, before: _Row) -> _Row:
         """Make lines 8–30."""
-        h, psi, response = self.h, self.spring.equilibrium, self.tip_response
-        q, v, y, z = before.q, before.v, before.y, before.z
-        known, at_start = self._unforced(before), self._compliance(q[-1], self.stiffness)[0]
+        h = self.h
+        psi = self.spring.equilibrium
+        response = self.tip_response
+        q = before.q
+        v = before.v
+        y = before.y
+        z = before.z
+        known = self._unforced(before)
+        at_start = self._compliance(q[-1], self.stiffness)[0]
         known_tip = float(known[-1] + h**2 * response[-1] * at_start)
 
         def tip(w: float) -> tuple[float, float]:  # (62), which is nonlinear only there
@@ -220,9 +235,13 @@ class _Algorithm:
 
         u_new = self._newton(tip, float(q[-1]), "beam")  # line 9
         y_new = self._newton(partial(self._foundation_force, y, z), y, "predicted")  # line 10, N = 0
-        case, foundation, y_used, acting = 0, 0.0, y, self.stiffness
+        case = 0
+        foundation = 0.0
+        y_used = y
+        acting = self.stiffness
         if psi < y_new < u_new:  # lines 11–13: the interior of (62) does not see λ_nc
-            case, self.stiffness = 11, 0.0
+            case = 11
+            self.stiffness = 0.0
         elif u_new <= psi or u_new <= y_new:  # line 14
             case = 14
             self.stiffness = acting = self.contact.stiffness  # line 15
@@ -233,7 +252,8 @@ class _Algorithm:
                 u_new = y_new = self.phi
                 foundation, _ = self._foundation_force(y, z, y_new)
         force = (u_new - known[-1]) / response[-1]  # lines 13, 19, 22: the tip's row of (62) is overwritten
-        q_new, on_tip = known + response * force, float(force / (2.0 * h**2))
+        q_new = known + response * force
+        on_tip = float(force / (2.0 * h**2))
         v_new = 2.0 * (q_new - q) / h - v  # line 29
         z_new = 2.0 * (y_new - (y_used if self.y_temp == "both" and case == 14 else y)) / h - z
         if not (np.all(np.isfinite(v_new)) and np.isfinite(z_new)):
@@ -256,12 +276,17 @@ class _Algorithm:
         That is the work of the overwritten tip on the beam, and of yˡ's exchange on the spring.
         """
         seconds = clock.perf_counter() - self.began
-        d, p, alpha = self.discrete, self.spring, self.beam.alpha_b
+        d = self.discrete
+        p = self.spring
+        alpha = self.beam.alpha_b
         found = {
             name: np.array(values) for name, values in zip(_Row._fields, zip(*self.rows, strict=True), strict=True)
         }
         q, v, y, z = (found[name] for name in "qvyz")
-        h, dq, dy, booked = np.diff(found["time"]), np.diff(q, axis=0), np.diff(y), found["booked"][1:]
+        h = np.diff(found["time"])
+        dq = np.diff(q, axis=0)
+        dy = np.diff(y)
+        booked = found["booked"][1:]
         by_spring = p.damping * dy**2 / h
         taken = alpha * np.sum(dq * (d.K @ dq.T).T, axis=1) / h + by_spring
         e_spring = 0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4
@@ -289,7 +314,8 @@ class _Algorithm:
             "e_injected_beam": total(booked * overwritten),
             "e_injected_spring": total(booked * (np.diff(e_spring) - worked)),
         }
-        predicted, joined = self.iterations["predicted"], self.iterations["joined"]
+        predicted = self.iterations["predicted"]
+        joined = self.iterations["joined"]
         solves = {"predicted": predicted, "joined": joined, "spring": predicted + joined}
         newton = {name: float(np.mean(counts)) if counts else 0.0 for name, counts in solves.items()}
         summary: dict[str, Any] = {

@@ -47,7 +47,8 @@ def refuse(scene: Scene) -> None:
 
 def steps(scene: Scene) -> Iterator[tuple[float, float]]:
     """Yield the end [s] and the size [s] of each step of h_t = ``coupling.macro_step``; the last one may be shorter."""
-    start, h = scene.contact_time or 0.0, scene.coupling.H
+    start = scene.contact_time or 0.0
+    h = scene.coupling.H
     whole, rest = scene.equal_steps
     for number in range(1, whole + 1):
         yield start + number * h, h

@@ -20,7 +20,8 @@ from .panels import positions
 from .timeline import STYLE, line_style, paint, shade
 
 SUFFIXES = (".gif", ".mp4")
-_SIZE, _DPI = (8.0, 5.0), 100
+_SIZE = (8.0, 5.0)
+_DPI = 100
 
 
 class AnimationError(RuntimeError):
@@ -92,7 +93,8 @@ class _Picture:
     """The figure, and what moves in it."""
 
     def __init__(self, trajectory: Trajectory, frames: Frames) -> None:
-        self.trajectory, self.frames = trajectory, frames
+        self.trajectory = trajectory
+        self.frames = frames
         self.figure = Figure(figsize=_SIZE, dpi=_DPI, layout="constrained")
         above, below = self.figure.subplots(2, 1, height_ratios=[2.0, 1.0])
         self._moving: list[tuple[Line2D, Part, float]] = []

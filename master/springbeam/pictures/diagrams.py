@@ -16,8 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Letters of a title, and inches of an entry of the key, to an inch of a figure.
-_LETTERS, _ENTRY = 9, 2.4
-_MARKERS, _DASHES = "os^DvPX*<", ("-", "--", ":")
+_LETTERS = 9
+_ENTRY = 2.4
+_MARKERS = "os^DvPX*<"
+_DASHES = ("-", "--", ":")
 #: A curve of more points than this has no markers.
 _MARKED = 60
 
@@ -38,13 +40,16 @@ def draw_diagrams(
 ) -> Figure:
     """Return a figure of diagrams of ``size`` [inch], ``wide`` of them side by side; names have one look in all."""
     figure, axes = figure_with(len(diagrams), wide, size, title)
-    names, key = list(dict.fromkeys(name for diagram in diagrams for name in diagram.curves)), {}
+    names = list(dict.fromkeys(name for diagram in diagrams for name in diagram.curves))
+    key = {}
     for ax, diagram in zip(axes, diagrams, strict=True):
         scale = "log" if diagram.log else "linear"
         ax.set(title=diagram.title, xlabel=diagram.across, ylabel=diagram.up, xscale=scale, yscale=scale)
         ax.grid(alpha=0.3)
         for name, curve in diagram.curves.items():
-            k, dots, points = names.index(name), name in diagram.dots, np.reshape(np.array(curve, float), (-1, 2))
+            k = names.index(name)
+            dots = name in diagram.dots
+            points = np.reshape(np.array(curve, float), (-1, 2))
             seen = points[np.all(points > 0.0, axis=1)] if diagram.log else points
             marker = "." if dots else _MARKERS[k % len(_MARKERS)] if len(seen) <= _MARKED else ""
             (key[name],) = ax.plot(*seen.T, color=f"C{k % 10}", marker=marker, markersize=4.0, linewidth=1.1,

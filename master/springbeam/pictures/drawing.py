@@ -14,9 +14,16 @@ from ..motion.events import EventKind
 from ..results.trajectory import PHASES, Trajectory
 from ..scene import Scene
 
-BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
-YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
-GREY, STONE = "#777777", "#B8B8B8"
+BLACK = "#000000"
+ORANGE = "#E69F00"
+SKY = "#56B4E9"
+GREEN = "#009E73"
+YELLOW = "#F0E442"
+BLUE = "#0072B2"
+VERMILLION = "#D55E00"
+PURPLE = "#CC79A7"
+GREY = "#777777"
+STONE = "#B8B8B8"
 #: Of curves of one kind, in turn.
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 
@@ -253,6 +260,7 @@ def near_levels(scene: Scene, moving: Sequence[np.ndarray]) -> dict[str, float]:
         heights["Ψ"] = scene.spring.equilibrium
     if scene.stop is not None:
         heights["φ"] = scene.stop.position
-    low, high = min(float(np.min(part)) for part in moving), max(float(np.max(part)) for part in moving)
+    low = min(float(np.min(part)) for part in moving)
+    high = max(float(np.max(part)) for part in moving)
     reach = 1.5 * (high - low)
     return {symbol: height for symbol, height in heights.items() if low - reach <= height <= high + reach}

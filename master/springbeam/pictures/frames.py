@@ -31,14 +31,18 @@ Part = Literal["beam", "coil", "top"]
 MOST_FRAMES = 600
 _TURNS = 6
 #: Room around what moves, and height of a coil that nothing carries, as parts of the range of motion.
-_ROOM, _COIL = 0.08, 0.4
+_ROOM = 0.08
+_COIL = 0.4
 #: A coil of unit height and half-width, from its foot up; only the heights follow the spring.
 _COIL_ACROSS = np.array([0.0, 0.0, *(-1.0, 1.0) * _TURNS, 0.0, 0.0])
 #: Half-widths of coil and stop, as parts of the beam's length.
-_COIL_WIDTH, _STOP_WIDTH = 0.035, 0.08
+_COIL_WIDTH = 0.035
+_STOP_WIDTH = 0.08
 #: The contact is drawn once more where its heights are a smaller part than this of the whole picture's, with as much
 #: room around; from so far along the beam.
-_SMALL, _ROOM_AROUND, _NEAR_TIP = 0.2, 0.3, 0.8
+_SMALL = 0.2
+_ROOM_AROUND = 0.3
+_NEAR_TIP = 0.8
 COIL_HEIGHTS = np.array([0.0, 0.12, *np.linspace(0.12, 0.92, 2 * _TURNS + 2)[1:-1], 0.92, 1.0])
 
 
@@ -114,7 +118,8 @@ def _contact_heights(trajectory: Trajectory, frames: Frames) -> tuple[float, flo
     heights = [trajectory[name][touching] for name in present(trajectory, POSITIONS)]
     if len(heights) < 2 or not touching.any():
         return None
-    low, high = min(float(part.min()) for part in heights), max(float(part.max()) for part in heights)
+    low = min(float(part.min()) for part in heights)
+    high = max(float(part.max()) for part in heights)
     room = _ROOM_AROUND * (high - low)
     return (low - room, high + room) if 0.0 < high - low < _SMALL * (frames.high - frames.low) else None
 
@@ -123,18 +128,24 @@ def _sketch(
     name: str, heading: str, trajectory: Trajectory, frames: Frames, heights: tuple[float, float], begin: float = -0.02
 ) -> Sketch:
     """Return what there is between ``heights`` [m], from ``begin`` (a part of the beam's length) on."""
-    unit, (along, length) = readable_unit([np.array(heights)], "m"), length_along(trajectory.scene)
-    low, high = unit.factor * heights[0], unit.factor * heights[1]
-    ends, half, strokes = length * np.array([1.0 - _STOP_WIDTH, 1.0 + _STOP_WIDTH]), _COIL_WIDTH * length, []
+    unit = readable_unit([np.array(heights)], "m")
+    along, length = length_along(trajectory.scene)
+    low = unit.factor * heights[0]
+    high = unit.factor * heights[1]
+    ends = length * np.array([1.0 - _STOP_WIDTH, 1.0 + _STOP_WIDTH])
+    half = _COIL_WIDTH * length
+    strokes = []
     if frames.y is not None:
         strokes.append(Stroke(Look(VERMILLION, "spring", Line(1.2)), length + half * _COIL_ACROSS, part="coil"))
         across = length + 1.6 * half * np.array([-1.0, 1.0])
         strokes.append(Stroke(Look(VERMILLION, "its top y", Line(3.5)), across, part="top"))
     if frames.deflection is not None:
         strokes.append(Stroke(Look(BLUE, "beam u", Line(3.0)), length * SHAPE_POINTS, part="beam"))
-    begin_at, end_at = begin * length, 1.12 * length
+    begin_at = begin * length
+    end_at = 1.12 * length
     if trajectory.scene.beam is None:
-        begin_at, end_at = 0.5 * length, 1.5 * length
+        begin_at = 0.5 * length
+        end_at = 1.5 * length
     else:
         strokes.append(Stroke(Look(STONE, "clamp", Line(7.0)), np.zeros(2), np.array([low, high])))
         strokes.append(Stroke(Look(GREY, "undeformed", Line(0.6, dashed=True)), np.array([0.0, length]), np.zeros(2)))
@@ -149,7 +160,8 @@ def _sketch(
 def frames_of(trajectory: Trajectory) -> Frames | None:
     """Return the frames of a run; ``None`` if it has fewer than two."""
     rows = trajectory["time"]
-    time, deflection = rows, None
+    time = rows
+    deflection = None
     if trajectory.shapes is not None:
         time, deflection = trajectory.shapes
     elif trajectory.scene.beam is not None:
@@ -163,13 +175,15 @@ def frames_of(trajectory: Trajectory) -> Frames | None:
     some = np.arange(len(known))
     if len(known) > MOST_FRAMES:
         some = np.unique(np.searchsorted(known, np.linspace(known[0], known[-1], MOST_FRAMES)))
-    time, deflection = time[some], None if deflection is None else deflection[some]
+    time = time[some]
+    deflection = None if deflection is None else deflection[some]
     row = np.searchsorted(rows, time, side="right") - 1
     y = trajectory["y"][row] if "y" in trajectory.columns else None
     moving = [part for part in (deflection, y) if part is not None]
     near = near_levels(trajectory.scene, moving)
     heights = np.concatenate([*(part.ravel() for part in moving), list(near.values())])
-    low, high = float(np.min(heights)), float(np.max(heights))
+    low = float(np.min(heights))
+    high = float(np.max(heights))
     span = high - low or 1.0
     foot = low - _COIL * span if y is not None else low - 2.0 * _ROOM * span
     return Frames(time, row, deflection, y, near, foot, high + _ROOM * span, foot)

@@ -135,12 +135,14 @@ def enlarged(trajectory: Trajectory) -> Panel:
 
 def forces(trajectory: Trajectory) -> Panel:
     """Return the forces that are not zero throughout, in the words of the run's law, and the largest mean."""
-    contact, summary = trajectory.scene.contact, trajectory.summary
+    contact = trajectory.scene.contact
+    summary = trajectory.summary
     legend = contact.legend + contact.damper * contact.damped
     looks = FORCES | {"compliance_force": FORCES["compliance_force"]._replace(words=legend)}
     curves = _not_zero(_curves(trajectory, looks))
     if "contact_force_max_time" in summary and curves and curves[0].name == "contact_force":
-        begin, peak = float(summary["contact_force_max_time"]), float(summary["contact_force_max"])
+        begin = float(summary["contact_force_max_time"])
+        peak = float(summary["contact_force_max"])
         window = np.array([begin, begin + float(summary["contact_force_window"])])
         clock = readable_unit([np.diff(window)], "s")
         words = f"largest mean, over {clock.factor * np.diff(window)[0]:.3g}\u00a0{clock.name}"
@@ -175,7 +177,8 @@ def impulses(trajectory: Trajectory) -> Panel:
     """Return the impulses of the events, on a logarithmic axis where a linear one would not show them all."""
     panel = Panel("impulses", "Impulses", "impulse", "N·s", _stems(trajectory, IMPULSES), 1.2)
     sizes = [curve.values for curve in panel.curves]
-    least, most = min(map(np.min, sizes), default=0.0), max(map(np.max, sizes), default=0.0)
+    least = min(map(np.min, sizes), default=0.0)
+    most = max(map(np.max, sizes), default=0.0)
     if 0.0 < 30.0 * least < most:
         # Impulses of rounding size would stretch the axis over the ones that matter.
         panel.logarithmic = 0.3 * max(least, 1e-8 * most), 3.0 * most
@@ -221,10 +224,12 @@ def compared(runs: Mapping[str, Trajectory]) -> list[Panel]:
     for quantity, unit, columns in _COMPARED:
         panel = Panel(quantity, quantity, quantity, unit, [])
         for number, (name, run) in enumerate(runs.items()):
-            colour, size = COLOURS[number % len(COLOURS)], max(7.0 - 1.5 * number, 2.5)
+            colour = COLOURS[number % len(COLOURS)]
+            size = max(7.0 - 1.5 * number, 2.5)
             for column, line in zip(columns, _COMPARED_LINES, strict=False):
                 words = f"{name}: {(POSITIONS | VELOCITIES)[column].words}" if len(columns) > 1 else name
-                look, marker = Look(colour, words, line), Marker("○", "o", "circle-open", size)
+                look = Look(colour, words, line)
+                marker = Marker("○", "o", "circle-open", size)
                 if column in IMPULSES:
                     panel.curves += _stems(run, {column: look._replace(marker=marker)})
                 else:
@@ -236,7 +241,8 @@ def compared(runs: Mapping[str, Trajectory]) -> list[Panel]:
 
 def _curves(trajectory: Trajectory, looks: Mapping[str, Look], rows: np.ndarray | None = None) -> list[Curve]:
     """Return lines of those columns of ``looks`` that the run has, at ``rows`` or thinned."""
-    time, found = trajectory["time"], []
+    time = trajectory["time"]
+    found = []
     for column in present(trajectory, looks):
         values = trajectory[column]
         drawn = decimated(time, values) if rows is None else rows

@@ -33,7 +33,8 @@ from .drawing import (
 from .panels import panels
 from .timeline import COMPRESSION, DPI, REMARK, STYLE, figure_for, line_style, timeline
 
-_SHAPES_EARLY, _SHAPES_LATER = 20, 24
+_SHAPES_EARLY = 20
+_SHAPES_LATER = 24
 #: Of the heights of panels, in the overview.
 _ON_ONE_PAGE = 0.75
 #: Early to late, dark to light, but not so light that a line is lost on paper.
@@ -99,10 +100,12 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
     times, since = _since_contact(trajectory)
     if len(times) < 2 or trajectory.shapes is None:
         return None
-    times, shapes = times[:_SHAPES_EARLY], trajectory.shapes[1][since][:_SHAPES_EARLY]
+    times = times[:_SHAPES_EARLY]
+    shapes = trajectory.shapes[1][since][:_SHAPES_EARLY]
     steps = np.diff(times)
     some = steps > 1e-6 * np.max(steps)  # between rows of one event Δu is rounding
-    middles, velocities = 0.5 * (times[1:] + times[:-1])[some], np.diff(shapes, axis=0)[some] / steps[some, None]
+    middles = 0.5 * (times[1:] + times[:-1])[some]
+    velocities = np.diff(shapes, axis=0)[some] / steps[some, None]
     drawn = {"deflection u": ("m", times, shapes), "mean velocity Δu/Δt": ("m/s", middles, velocities)}
     return _side_by_side(trajectory, "(A) The beam right after first contact", drawn)[0]
 
@@ -132,7 +135,8 @@ def _later(trajectory: Trajectory, title: str, quantities: Mapping[str, tuple[st
     for ax, (_, values) in zip(axes, quantities.values(), strict=True):
         found = values[since]
         ends = np.transpose([found.max(axis=0), found.min(axis=0)])
-        factor, x = readable_unit([found[some]], "").factor, length_along(trajectory.scene)[1] * SHAPE_POINTS
+        factor = readable_unit([found[some]], "").factor
+        x = length_along(trajectory.scene)[1] * SHAPE_POINTS
         ax.plot(x, factor * ends, color=BLACK, lw=0.8, ls=":")
         ax.set_title("dotted: envelope of all", **REMARK)
     return figure
@@ -154,7 +158,8 @@ def _curves(
     ax: Axes, trajectory: Trajectory, times: np.ndarray, curves: np.ndarray, what: str, unit: str
 ) -> LineCollection:
     """Draw curves over x, coloured from early (dark) to late; beside deflections [m] the levels that are near."""
-    readable, clock = readable_unit([curves], unit), readable_unit([times], "s")
+    readable = readable_unit([curves], unit)
+    clock = readable_unit([times], "s")
     along, length = length_along(trajectory.scene)
     segments = [np.column_stack([length * SHAPE_POINTS, readable.factor * curve]) for curve in curves]
     label = f"time t [{clock.name}]"

@@ -49,13 +49,22 @@ REMARK: dict[str, Any] = {"fontsize": 7.0, "style": "italic", "color": GREY}
 DPI = 120
 #: Of the PNGs: four times as fast as by default, and a few percent larger.
 COMPRESSION = {"compress_level": 2}
-_TITLE_WIDTH, _BESIDE_MARK = 105, 60  # characters
+_TITLE_WIDTH = 105  # characters
+_BESIDE_MARK = 60
 _KEY_COLUMNS = 4
 #: Of a figure, and of what surrounds its panels [inch]: labels to the left, keys to the right; between two panels; the
 #: labels of the time axis; a row of a title or of the key; a row of marks of events; free room.
-_WIDTH, _LEFT, _RIGHT, _GAP, _AXIS, _LINE, _MARK_ROW, _ROOM = 8.2, 0.75, 1.85, 0.12, 0.45, 0.19, 0.11, 0.12
+_WIDTH = 8.2
+_LEFT = 0.75
+_RIGHT = 1.85
+_GAP = 0.12
+_AXIS = 0.45
+_LINE = 0.19
+_MARK_ROW = 0.11
+_ROOM = 0.12
 #: Most characters in a line of a key beside a panel, and the height of a line [inch].
-_KEY_WIDTH, _KEY_LINE = 24, 0.16
+_KEY_WIDTH = 24
+_KEY_LINE = 0.16
 
 
 def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Figure:
@@ -88,7 +97,8 @@ def _painted(panels: Sequence[Panel], clock: Unit, above: float, below: float) -
     figure = Figure(figsize=(_WIDTH, height))
     FigureCanvasAgg(figure)
     axes = list[Axes]()
-    top, across = height - above, _WIDTH - _LEFT - _RIGHT
+    top = height - above
+    across = _WIDTH - _LEFT - _RIGHT
     for panel, own in zip(panels, heights, strict=True):
         top -= own
         place = (_LEFT / _WIDTH, top / height, across / _WIDTH, own / height)

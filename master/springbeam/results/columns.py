@@ -36,7 +36,9 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
         The first record of the run, shape (1,).
     """
     u, v, y, z = (steps[f"{name}_after"] for name in ("u_tip", "v_tip", "y", "z"))
-    apart, rigid, zeros = ~joined(steps), scene.contact.rigid, np.zeros(len(steps))
+    apart = ~joined(steps)
+    rigid = scene.contact.rigid
+    zeros = np.zeros(len(steps))
     contact = steps["contact_force_after"]
     if rigid:
         v, z = (np.where(apart, own, common(steps, steps["phase"] >= 3.0, "v_tip_after", "z_after")) for own in (v, z))
@@ -76,7 +78,8 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
 
 def _acceleration(scene: Scene, spring: Spring, found: Mapping[str, np.ndarray], steps: np.ndarray) -> np.ndarray:
     """Return ÿ [m/s²] of the spring's top under the forces of its row, 0 while it is seated."""
-    y, z = found["y"], found["z"]
+    y = found["y"]
+    z = found["z"]
     force = spring.external_force - spring.damping * z - (spring.linear_stiffness + spring.cubic_stiffness * y**2) * y
     for i, load in enumerate(scene.loads):
         if load.on in ("spring", "base"):
@@ -137,7 +140,8 @@ def ledger(steps: np.ndarray, received: Collection[str] = ()) -> dict[str, np.nd
         stored = steps[f"{body}_kinetic"] + steps[f"{body}_potential"]
         return stored, steps[f"{body}_dissipated"], steps[f"{body}_load"]
 
-    (e_beam, lost_beam, load_beam), (e_spring, lost_spring, load_spring) = account("beam"), account("spring")
+    e_beam, lost_beam, load_beam = account("beam")
+    e_spring, lost_spring, load_spring = account("spring")
     found = {
         "e_beam": e_beam,
         "e_spring": e_spring,

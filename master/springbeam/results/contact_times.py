@@ -157,7 +157,8 @@ def _contacts_and_strokes(run: Trajectory, end: float) -> Iterator[tuple[list[In
     Beside them are times [s] and the impulse passed on up to each since the one before, without its sign [N·s]; none
     if it is not known.
     """
-    times, passed = np.empty(0), np.empty(0)
+    times = np.empty(0)
+    passed = np.empty(0)
     if run.steps is not None:
         times = run.steps["time"]
         passed = np.abs(impulse(run.steps)) + np.abs(kicks(times, run.events))

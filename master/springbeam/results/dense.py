@@ -54,7 +54,8 @@ _BERNSTEIN = np.array(
     [[comb(i, k) / comb(_DEGREE, k) if k <= i else 0.0 for k in range(_DEGREE + 1)] for i in range(_DEGREE + 1)]
 )
 #: Positions and velocities of both ends.
-_PLACES, _SPEEDS = ("u_tip", "y"), ("v_tip", "z")
+_PLACES = ("u_tip", "y")
+_SPEEDS = ("v_tip", "z")
 #: Share of the largest position that the rounding of a step's moments may add to its curve.
 _ROUNDING = 1e-13
 #: Values that differ by less than this share of the largest one are alike: well above what rounding leaves.
@@ -91,7 +92,8 @@ def rows_at(run: Trajectory, times: Any) -> Trajectory:
     row = np.searchsorted(known, wanted, side="right") - 1
     records = steps[row]
     between = np.flatnonzero(wanted > known[row])
-    before, after = records[between], steps[row[between] + 1]
+    before = records[between]
+    after = steps[row[between] + 1]
     records[between] = _between(run.scene, before, after, run.events, wanted[between])
     made = columns(run.scene, records, steps[:1])
     return Trajectory(run.scene, made, list(run.events), summary=dict(run.summary))
@@ -115,7 +117,8 @@ class Extremes(NamedTuple):
     @classmethod
     def of_rows(cls, times: np.ndarray, values: np.ndarray) -> Extremes:
         """Return those of ``values`` at ``times`` [s], shapes (n,)."""
-        low, high = int(np.argmin(values)), int(np.argmax(values))
+        low = int(np.argmin(values))
+        high = int(np.argmax(values))
         return cls(float(values[low]), float(times[low]), float(values[high]), float(times[high]))
 
 
@@ -176,7 +179,8 @@ def motion(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
     """
     found: dict[str, np.ndarray] = {}
     size: Any = steps["size"]
-    together, held = scene.contact.rigid & joined(before), before["phase"] >= 3.0
+    together = scene.contact.rigid & joined(before)
+    held = before["phase"] >= 3.0
 
     def of(end: int, records: np.ndarray, field: str) -> Any:
         """Return a field of an end; of ends that are together what they have in common."""
@@ -207,10 +211,13 @@ def forces(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
     μ g̈, whose parts up to degree 3 follow from the rates and the moments of the gap. The parts of the next two degrees
     bring both forces to what they are at the ends of the step. Between two exchanges of values they are linear.
     """
-    size, together = steps["size"], joined(before) & (steps["reduced_mass"] > 0.0)
+    size = steps["size"]
+    together = joined(before) & (steps["reduced_mass"] > 0.0)
     found = {}
     for name in ("contact_force", "foundation_force"):
-        c, dc, ddc = steps[name], size * steps[f"{name}_rate"], size**2 * steps[f"{name}_rate_2"]
+        c = steps[name]
+        dc = size * steps[f"{name}_rate"]
+        ddc = size**2 * steps[f"{name}_rate_2"]
         series = np.zeros((6, len(steps)))
         if scene.coupling.scheme == "energy":
             series[:3] = c + dc / 2.0 + ddc / 6.0, dc / 2.0 + ddc / 4.0, ddc / 12.0
@@ -218,7 +225,8 @@ def forces(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
             first = np.where(together, 4, steps["degree"].astype(int) + 1)
         else:
             first = np.zeros(len(steps), int)
-        signs, each = (-1.0) ** np.arange(6), np.arange(len(steps))
+        signs = (-1.0) ** np.arange(6)
+        each = np.arange(len(steps))
         at_start = signs[first] * (before[f"{name}_after"] - signs @ series)
         at_end = steps[f"{name}_end"] - series.sum(axis=0)
         series[first, each] += 0.5 * (at_end + at_start)
@@ -229,10 +237,13 @@ def forces(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
 
 def _turning(before: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Return μ g̈ [N] of ends that are joined, by parts: Legendre coefficients of degrees 0 to 3, shape (4, n)."""
-    size, mass = steps["size"], reduced_mass(before)
-    rate, rate_after = before["v_tip_after"] - before["z_after"], steps["v_tip"] - steps["z"]
+    size = steps["size"]
+    mass = reduced_mass(before)
+    rate = before["v_tip_after"] - before["z_after"]
+    rate_after = steps["v_tip"] - steps["z"]
     once, twice = (steps[f"u_tip_{name}"] - steps[f"y_{name}"] for name in ("integral", "integral_2"))
-    even, odd = 0.5 * size * (rate_after - rate), 0.5 * size * (rate_after + rate)
+    even = 0.5 * size * (rate_after - rate)
+    odd = 0.5 * size * (rate_after + rate)
     moments = [even, odd, even + 6.0 * once / size, odd + 30.0 * (once - 2.0 * twice / size) / size]
     return np.array([mass / size**2 * (4.0 * k + 2.0) * moment for k, moment in enumerate(moments)])
 
@@ -283,9 +294,12 @@ def _lowest(powers: np.ndarray, below: float) -> tuple[float, int, float]:
     below
         A value that is known.
     """
-    best, step, share = below, -1, 0.0
+    best = below
+    step = -1
+    share = 0.0
     enclosing = _BERNSTEIN @ powers
-    floors, tolerance = enclosing.min(axis=0), _ALIKE * float(np.abs(enclosing).max(initial=0.0))
+    floors = enclosing.min(axis=0)
+    tolerance = _ALIKE * float(np.abs(enclosing).max(initial=0.0))
     for i in np.argsort(floors).tolist():
         if floors[i] >= best - tolerance:
             break
@@ -294,5 +308,7 @@ def _lowest(powers: np.ndarray, below: float) -> tuple[float, int, float]:
         for s in (*sign_changes(derivative(path), 0.0, 1.0), 1.0):
             there = value(path, s)
             if there < best - tolerance:
-                best, step, share = there, i, s
+                best = there
+                step = i
+                share = s
     return best, step, share

@@ -106,7 +106,8 @@ def read_run(run: RunDirectory) -> Trajectory:
         steps = steps_of(run.steps.read_bytes() if run.steps.exists() else b"")
     except (OSError, ValueError) as error:
         raise ResultsUnreadable(f"{run.steps}: {error}") from error
-    events, shapes = load_events(run.path), None
+    events = load_events(run.path)
+    shapes = None
     if run.shapes.exists():
         shapes = _read_table(run.shapes, SHAPE_COLUMNS).view("f8").reshape(-1, len(SHAPE_COLUMNS))
     if len(steps) == 0 and run.trajectory.exists():  # it left no records: a reference
@@ -138,7 +139,8 @@ def load_summary(directory: str | Path) -> dict[str, Any]:
 
 def load_events(directory: str | Path) -> list[Event]:
     """Read ``events.csv`` of a run directory. Raises ResultsUnreadable."""
-    path, events = RunDirectory(directory).events, []
+    path = RunDirectory(directory).events
+    events = []
     for number, line in enumerate(_complete_lines(path, EVENT_COLUMNS)[1:], start=2):
         try:
             fields = zip(EVENT_COLUMNS, line.split(","), strict=True)

@@ -31,7 +31,8 @@ class MemoryRecorder:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self._steps, self._shapes = [np.empty(0, STEP)], [np.empty((0, len(SHAPE_COLUMNS)))]
+        self._steps = [np.empty(0, STEP)]
+        self._shapes = [np.empty((0, len(SHAPE_COLUMNS)))]
         self._events: list[Event] = []
         self._summary: dict[str, Any] = {}
 
@@ -94,7 +95,9 @@ class FileRecorder(AbstractContextManager["FileRecorder"]):
     """
 
     def __init__(self, scene: Scene, directory: RunDirectory, interval: float | None = None) -> None:
-        self.scene, self.directory, self.interval = scene, directory, interval
+        self.scene = scene
+        self.directory = directory
+        self.interval = interval
         #: The first line of each file that grows, in the order in which they do.
         self._headers = {directory.events: lines([EVENT_COLUMNS]), directory.steps: b""}
         if scene.beam is not None:

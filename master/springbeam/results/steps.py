@@ -43,7 +43,8 @@ STEP_COLUMNS = (
 #: The contact force of a step: C and its two derivatives at the step's start.
 FORCE_COLUMNS = ("contact_force", "contact_force_rate", "contact_force_rate_2")
 #: In ``told``: the record holds what the beam tells; the lower body is the spring of the scene.
-BEAM_TELLS, SPRING_TELLS = 1, 2
+BEAM_TELLS = 1
+SPRING_TELLS = 2
 #: Little-endian doubles, on every machine.
 STEP = np.dtype([(name, "<f8") for name in STEP_COLUMNS])
 #: Bytes of a record from its numbers.

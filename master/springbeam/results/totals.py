@@ -86,7 +86,8 @@ def totals(scene: Scene, steps: np.ndarray, events: Iterable[Event], window: flo
     """
     events = list(events)
     found: dict[str, float | int] = {}
-    beam, spring = scene.upper is not None, scene.lower is not None
+    beam = scene.upper is not None
+    spring = scene.lower is not None
     stop = scene.stop is not None and not scene.elastic_stop
     if scene.coupled or (beam and stop):
         found |= _contact(scene, steps, events, window)
@@ -112,7 +113,9 @@ def shortest_contact(scene: Scene, steps: np.ndarray, events: Iterable[Event], b
     Those are left out whose force passes on no more than ``least`` [N·s], and those that have not ended by the last
     row. Other parameters as of `totals`.
     """
-    events, time, found = list(events), steps["time"], inf
+    events = list(events)
+    time = steps["time"]
+    found = inf
     if len(steps) == 0:
         return inf
     held = [*tip_contacts(events, inf, free_at_end=_apart(steps[-1])), *touches(events)]
@@ -185,7 +188,8 @@ def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tu
     with np.errstate(divide="ignore", invalid="ignore"):
         root = 2.0 * c / (np.sqrt(b**2 - 2.0 * twice_a * c) - b)
     inside = np.where(np.abs(root) < half, middle + root, edges[:-1])
-    first, last = np.concatenate([rows - window, rows, inside]), np.concatenate([rows, rows + window, inside + window])
+    first = np.concatenate([rows - window, rows, inside])
+    last = np.concatenate([rows, rows + window, inside + window])
     found = np.maximum(upto(last, "left"), upto(last, "right")) - np.minimum(upto(first, "left"), upto(first, "right"))
     largest = found.max()
     since = first[found >= largest - _ALIKE * np.abs(passed[0]).max()].min()  # of a constant force all are alike

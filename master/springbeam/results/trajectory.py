@@ -78,7 +78,9 @@ def columns_of(scene: Scene) -> dict[str, str]:
     They are `COLUMNS` without those of absent bodies, its loads: ``load_0`` for ``loads.0``, and `BODY_COLUMNS` without
     those of bodies that are not our own. ``gap`` is u_tip − y of a pair, u_tip − φ of a beam above a stop.
     """
-    beam, spring, stop = scene.upper is not None, scene.lower is not None, scene.stop is not None
+    beam = scene.upper is not None
+    spring = scene.lower is not None
+    stop = scene.stop is not None
     there = {
         "": True,
         "beam": beam,
@@ -175,11 +177,13 @@ class Trajectory:
 
         Forces in clamp and sections at that instant grow with the number of elements and has gone by the next row.
         """
-        beam, later = self.scene.beam, self.time > self.time[:1]
+        beam = self.scene.beam
+        later = self.time > self.time[:1]
         leans = beam is not None and (beam.initial_deflection_slope, beam.initial_velocity_slope) != (0.0, 0.0)
         if not leans or not later.any():
             return self
-        columns, table = {name: values[later] for name, values in self.columns.items()}, self.shape_table
+        columns = {name: values[later] for name, values in self.columns.items()}
+        table = self.shape_table
         return replace(self, columns=columns, shape_table=None if table is None else table[table[:, 0] > self.time[0]])
 
     def to_pandas(self) -> DataFrame:

@@ -23,7 +23,8 @@ def slowest_frequency(beam: Beam) -> float:
 
 def joined_frequency(scene: Scene) -> float:
     """Return the frequency of the spring and a beam without inertia together [rad/s]; 0 if none holds the mass."""
-    beam, spring = scene.beam, scene.spring
+    beam = scene.beam
+    spring = scene.spring
     if beam is None or spring is None:
         return 0.0
     return sqrt(max(spring_stiffness(scene) + 1.0 / tip_compliance(beam), 0.0) / spring.mass)
@@ -67,7 +68,8 @@ def _gradient(beam: Beam) -> float:
 
     With the averaged mass it is 6/h² for p = 1, and less than this for higher degrees.
     """
-    h, p = beam.length / beam.n_elements, beam.element_degree
+    h = beam.length / beam.n_elements
+    p = beam.element_degree
     if p == 1 and beam.mass_matrix == "averaged":
         return 6.0 / h**2
     return p * (p + 1) * (p + 2) * (p + 3) / (2.0 * h**2)
@@ -79,7 +81,8 @@ def modes_below(beam: Beam, omega: float) -> int:
     Wave numbers k of the Timoshenko beam, k² = ω² (a + b)/2 ± ω √(ω² (a − b)²/4 + ρA/EI) with a = ρ/E, b = ρ/KG; the
     second is real above √(KAG/ρI).
     """
-    a, b = beam.density / beam.young_modulus, beam.density / (beam.shear_coefficient * beam.shear_modulus)
+    a = beam.density / beam.young_modulus
+    b = beam.density / (beam.shear_coefficient * beam.shear_modulus)
     middle = 0.5 * omega**2 * (a + b)
     apart = omega * sqrt((0.5 * omega * (a - b)) ** 2 + beam.density * beam.area / bending_stiffness(beam))
     number = beam.length / pi * (sqrt(middle + apart) + sqrt(max(middle - apart, 0.0)))

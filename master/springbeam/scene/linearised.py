@@ -64,7 +64,8 @@ def spring_stiffness(scene: Scene) -> float:
     """
     spring = scene.spring
     assert spring is not None
-    k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
+    k1 = spring.linear_stiffness
+    k2 = spring.cubic_stiffness
     if k2 <= 0.0:
         y = 0.0
     elif scene.stop is not None:
@@ -86,7 +87,8 @@ def spring_frequency(scene: Scene) -> float:
 
 def _potential(spring: Spring, y: float) -> float:
     """Return the potential of the spring and its load at ``y`` [J]."""
-    k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
+    k1 = spring.linear_stiffness
+    k2 = spring.cubic_stiffness
     return y * (y * (0.5 * k1 + 0.25 * k2 * y * y) - spring.external_force)
 
 

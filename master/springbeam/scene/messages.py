@@ -217,7 +217,8 @@ def key_kind(table: str, key: str) -> type:
 
 def explain(error: Any) -> str:
     """Return a line ``[table] key = value: what is wrong and what would be allowed`` for one of pydantic's errors."""
-    kind, value = error["type"], error["input"]
+    kind = error["type"]
+    value = error["input"]
     table, *keys = map(str, error["loc"])
     choice = VARIANTS.get(table)
     if keys and table == "loads":
@@ -229,9 +230,12 @@ def explain(error: Any) -> str:
     name = keys[0] if keys else table
     said = there.get(name, {"type": "table"})
     if kind == "union_tag_invalid" and choice is not None:
-        keys, value, said = [choice.name], value[choice.name], {"enum": choice.named}
+        keys = [choice.name]
+        value = value[choice.name]
+        said = {"enum": choice.named}
     if name == "parameters" and len(keys) > 1:
-        keys, said = keys[:2], {"type": "parameter"}
+        keys = keys[:2]
+        said = {"type": "parameter"}
     place = one_line(f"[{table}] {'.'.join(keys)}" if keys else table)
     given = f"{place} = {toml_of(value)}"
     chosen = f'{choice.name} = "{variant}"' if choice is not None and variant in choice.named else ""

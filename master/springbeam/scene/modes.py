@@ -23,9 +23,12 @@ def tip_modes(beam: Beam) -> tuple[np.ndarray, np.ndarray]:
     """
     linear = beam.element_degree == 1 and beam.mass_matrix == "consistent"
     n = min(beam.n_elements, _ELEMENTS) if linear else _ELEMENTS
-    h, none = beam.length / n, np.zeros((n, n))
-    rise, mean = np.eye(n) - np.eye(n, k=-1), 0.5 * (np.eye(n) + np.eye(n, k=-1))  # over an element, from the clamp on
-    bending, shear = bending_stiffness(beam) / h, shear_stiffness(beam) * h
+    h = beam.length / n
+    none = np.zeros((n, n))
+    rise = np.eye(n) - np.eye(n, k=-1)  # over an element, from the clamp on
+    mean = 0.5 * (np.eye(n) + np.eye(n, k=-1))
+    bending = bending_stiffness(beam) / h
+    shear = shear_stiffness(beam) * h
     if linear and not beam.reduced_integration:  # it locks
         bending += shear * (beam.length / (beam.n_elements * h)) ** 2 / 12.0
     strain = np.block([[none, bending**0.5 * rise], [shear**0.5 / h * rise, -(shear**0.5) * mean]])
@@ -38,6 +41,7 @@ def tip_modes(beam: Beam) -> tuple[np.ndarray, np.ndarray]:
         start = to_strain[:, :n] @ np.arange(1.0, n + 1.0)
         shapes = np.array([of_strain[n - 1], mean.sum(axis=0) @ of_strain[:n], start])
         space = np.linalg.qr(np.vstack([np.linalg.svd(speeds)[2][: beam.n_modes], shapes]).T)[0]
-        speeds, of_strain = speeds @ space, of_strain @ space
+        speeds = speeds @ space
+        of_strain = of_strain @ space
     periods, modes = np.linalg.svd(speeds)[1:]
     return 1.0 / periods, modes @ of_strain[n - 1] / periods

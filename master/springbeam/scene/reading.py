@@ -33,7 +33,8 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy
     SceneError
         If the file cannot be read or the scene cannot be run.
     """
-    path, overrides = _scene_file(path_or_name), list(overrides)
+    path = _scene_file(path_or_name)
+    overrides = list(overrides)
     try:
         data = tables_of(path)
     except (OSError, ValueError, RecursionError) as error:

@@ -141,10 +141,12 @@ class Recorded:
 
     def _values(self, k: int, wanted: str) -> np.ndarray:
         """Return column ``k`` in the unit ``wanted``, as it is without any; NaN where a value is missing."""
-        label, cells = f"column {self._labels[k]}", [cell.strip() for cell in self._cells[k]]
+        label = f"column {self._labels[k]}"
+        cells = [cell.strip() for cell in self._cells[k]]
         values = np.array([self._number(cell) for cell in cells])
         for row in np.flatnonzero(~np.isfinite(values)):
-            place, cell = f"line {self._numbers[row]}, {label}", cells[row]
+            place = f"line {self._numbers[row]}, {label}"
+            cell = cells[row]
             if cell.lower() not in _NOTHING:
                 remedy = "leave the line out, or begin it with #"
                 if "," in cell:
@@ -196,7 +198,8 @@ class Recorded:
 
     def _interpolated(self, values: np.ndarray) -> np.ndarray:
         """Return ``values`` with those that are missing on the line between their neighbours; lines beyond go."""
-        times, filled = values[0], [values[0]]
+        times = values[0]
+        filled = [values[0]]
         for column in values[1:]:
             known = np.isfinite(column)
             filled.append(np.interp(times, times[known], column[known], left=nan, right=nan) if known.any() else column)

@@ -35,14 +35,17 @@ LAG = 0.015
 #: Share of its way that an end may be from where the law of the contact would have it, by degree of the force: a soft
 #: law, a tie. At degree 0 it is mostly known to some tenths of itself; it leaves out what the force of a higher degree
 #: feels of the fastest waves, and what ends that part decide from one step to the next.
-MISPLACED, MISPLACED_TIED = (0.006, 0.002, 0.001), (0.0025, 0.002, 0.001)
+MISPLACED = (0.006, 0.002, 0.001)
+MISPLACED_TIED = (0.0025, 0.002, 0.001)
 #: Share of its way by which what the steps leave out of measured loads may move an end; that is known to a factor of 3.
 LEFT_OUT = 0.01
 #: Share of its way by which an end may be off between the rows, as `springbeam.results.dense.between_rows` tells it.
 BETWEEN_ROWS = 0.01
 #: By which angle the midpoint rule may let waves lag at the end of the run [rad]: the fastest ones that an impact sets
 #: off; where nothing strikes, those of a few times the beam's lowest frequency, or of a load, which move the tip more.
-WAVE_LAG, SMOOTH_LAG, SMOOTH_WAVES = 1.0, 0.01, 5.0
+WAVE_LAG = 1.0
+SMOOTH_LAG = 0.01
+SMOOTH_WAVES = 5.0
 #: Energy of a start that is bent enough to count, over that of its velocity.
 BENT = 1e-4
 #: Macro steps that a contact must last for its end not to be decided by the force of one or two of them.
@@ -130,7 +133,8 @@ def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
     Waves that the steps do not follow let ``misplaced`` fall with the square of H only, and unevenly: the step that is
     named is half of what the square asks for.
     """
-    limits, coupling = MISPLACED_TIED if scene.contact.rigid else MISPLACED, scene.coupling
+    limits = MISPLACED_TIED if scene.contact.rigid else MISPLACED
+    coupling = scene.coupling
     excess = seen.misplaced / limits[_force_degree(scene)]
     if excess <= 1.0:
         return {}
@@ -143,7 +147,9 @@ def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
 
 def _lags(scene: Scene, seen: _Seen) -> dict[str, Any]:
     """Return by how much steps make spring and massless beam together late, nothing if they follow them."""
-    omega, degree, H = joined_frequency(scene), _force_degree(scene), scene.coupling.H
+    omega = joined_frequency(scene)
+    degree = _force_degree(scene)
+    H = scene.coupling.H
     lag = omega * scene.duration * lateness(scene, omega * H)
     return (
         {}
@@ -173,11 +179,15 @@ def _waves_lag(scene: Scene, seen: _Seen) -> dict[str, Any]:
     if beam is None or scene.massless or beam.integrator == "modal":
         return {}
     H = seen.H or scene.coupling.H
-    waves, omega, limit = "the fastest waves that an impact or a bent start sets off", impact_frequency(beam), WAVE_LAG
+    waves = "the fastest waves that an impact or a bent start sets off"
+    omega = impact_frequency(beam)
+    limit = WAVE_LAG
     bent = not scene.static and bent_energy(scene, beam) > BENT * initial_kinetic_energy(beam)
     if not (bent or (scene.contact.rigid and _struck(scene))):
         omega = max(SMOOTH_WAVES * slowest_frequency(beam), *(load.rate for load in scene.loads), 0.0)
-        waves, omega, limit = f"waves of {omega:.3g} rad/s", min(omega, lasting_frequency(beam)), SMOOTH_LAG
+        waves = f"waves of {omega:.3g} rad/s"
+        omega = min(omega, lasting_frequency(beam))
+        limit = SMOOTH_LAG
     lag = scene.duration / H * (omega * H) ** 3 / 12.0
     return {"waves": waves, "lag": lag, "size": _rounded_down(H * sqrt(limit / lag))} if lag > limit else {}
 
@@ -209,7 +219,8 @@ def _settling(scene: Scene) -> dict[str, float]:
 def slow_oscillations(scene: Scene) -> list[tuple[str, float, str]]:
     """Return (name, frequency [rad/s], what else would help) of each of our bodies and of each load that oscillates."""
     found = []
-    beam, spring = scene.beam, scene.spring
+    beam = scene.beam
+    spring = scene.spring
     if beam is not None and beam.fidelity == "dynamic":
         omega = slowest_frequency(beam)
         found.append(("beam", omega, 0.5 * beam.alpha_b * omega))

@@ -14,7 +14,8 @@ from .partners import LOWER, UPPER, ForeignFmu, Partner
 from .tables import ORDINARY_SCHEMES, Beam, Coupling, Spring, Stop, Table, Time, key
 
 #: Times closer than the first of these fractions of H are one; a step shorter than the second would drown in rounding.
-SAME, SHORTEST_STEP = 1e-9, 1e-6
+SAME = 1e-9
+SHORTEST_STEP = 1e-6
 
 
 class StartHeight(NamedTuple):
@@ -163,7 +164,8 @@ class Scene(Table):
     @property
     def initial_clearance(self) -> float | None:
         """Height [m] of the upper end above `tip_target` at the start, 0 where only rounding separates them."""
-        tip, target = self.at_start("beam"), self.tip_target
+        tip = self.at_start("beam")
+        target = self.tip_target
         if tip is None or target is None:
             return None
         return 0.0 if math.isclose(tip.value, target.value, rel_tol=1e-12) else tip.value - target.value
@@ -190,7 +192,8 @@ class Scene(Table):
 
         A remainder that is next to nothing joins the step before it.
         """
-        H, span = self.coupling.H, self.duration
+        H = self.coupling.H
+        span = self.duration
         whole = math.floor(span / H * (1.0 + 1e-12))
         rest = span - whole * H
         if rest <= SAME * H:

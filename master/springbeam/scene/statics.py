@@ -22,7 +22,8 @@ from .tables import Beam, Spring
 SHAPE_POINTS = np.linspace(0.0, 1.0, 21)
 
 #: Gauss–Legendre on [0, 1], exact to degree 7: M² has degree 6.
-_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2
+_NODES = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2
+_WEIGHTS = np.polynomial.legendre.leggauss(4)[1] / 2
 _RITZ_DEGREE = 6
 
 
@@ -51,7 +52,8 @@ def tip_inertia(beam: Beam) -> float:
     """Return the tip mass [kg] of a beam that moves in the shape of a tip force (Rayleigh): 33/140 ρAL if slender."""
     x = beam.length * _NODES
     turn = (beam.length * x - x**2 / 2.0) / bending_stiffness(beam)
-    shape, inertia = tip_force_shape(beam, _NODES), beam.second_moment_of_area / beam.area
+    shape = tip_force_shape(beam, _NODES)
+    inertia = beam.second_moment_of_area / beam.area
     density = beam.density * beam.area * (shape**2 + inertia * turn**2)
     return beam.length * float(_WEIGHTS @ density) / tip_compliance(beam) ** 2
 
@@ -70,13 +72,17 @@ def lowest_frequency(beam: Beam) -> float:
     """
     nodes, weights = np.polynomial.legendre.leggauss(_RITZ_DEGREE + 2)  # exact for their products
     x = 0.5 * (nodes[:, None] + 1.0)
-    L, n = beam.length, np.arange(1, _RITZ_DEGREE + 1)
+    L = beam.length
+    n = np.arange(1, _RITZ_DEGREE + 1)
     zero = np.zeros((len(x), _RITZ_DEGREE))
     # The strains are scaled so that their energy is that of the rotations.
     small = np.sqrt(bending_stiffness(beam) / shear_stiffness(beam)) / L
-    u, theta = np.hstack([L * x ** (n + 1) / (n + 1), small * L * x**n]), np.hstack([x**n, zero])
-    curvature, strain = np.hstack([n * x ** (n - 1) / L, zero]), np.hstack([zero, small * n * x ** (n - 1)])
-    area, inertia = beam.density * beam.area, beam.density * beam.second_moment_of_area
+    u = np.hstack([L * x ** (n + 1) / (n + 1), small * L * x**n])
+    theta = np.hstack([x**n, zero])
+    curvature = np.hstack([n * x ** (n - 1) / L, zero])
+    strain = np.hstack([zero, small * n * x ** (n - 1)])
+    area = beam.density * beam.area
+    inertia = beam.density * beam.second_moment_of_area
     rows = ((area, u), (inertia, theta)), ((bending_stiffness(beam), curvature), (shear_stiffness(beam), strain))
     mass, stiffness = (sum(c * (B.T * weights) @ B for c, B in energy) for energy in rows)
     # By numpy: scipy takes longer to load than all else that reads a scene.
@@ -106,7 +112,9 @@ def load_energy(beam: Beam) -> float:
 
 def load_forces(beam: Beam, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return (Q, M) of the loads at the distances ``t`` from the tip [N, N·m]."""
-    f, c, h = beam.distributed_load, beam.tip_load_coefficient, beam.length / beam.n_elements
+    f = beam.distributed_load
+    c = beam.tip_load_coefficient
+    h = beam.length / beam.n_elements
     s = np.minimum(t, h)
     force = c * (s - s**2 / (2.0 * h))
     return f * t + force, f * t**2 / 2.0 + c * (s**2 / 2.0 - s**3 / (6.0 * h)) + c * h / 2.0 * (t - s)
@@ -114,10 +122,12 @@ def load_forces(beam: Beam, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _work(beam: Beam, start: float, virtual: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> float:
     """Return ∫ M m/EI + Q q/KAG dt from ``start`` to the clamp; ``virtual`` gives q and m at the distances t."""
-    h, total = beam.length / beam.n_elements, 0.0
+    h = beam.length / beam.n_elements
+    total = 0.0
     for a, b in ((start, max(start, h)), (max(start, h), beam.length)):
         t = a + (b - a) * _NODES
-        (Q, M), (q, m) = load_forces(beam, t), virtual(t)
+        (Q, M) = load_forces(beam, t)
+        q, m = virtual(t)
         density = M * m / bending_stiffness(beam) + Q * q / shear_stiffness(beam)
         total += (b - a) * float(_WEIGHTS @ density)
     return total
@@ -138,7 +148,8 @@ def resting_height(spring: Spring, force: float) -> float | None:
 
     Of several places it is the stable one nearest to Ψ; ``None`` if there is none.
     """
-    k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
+    k1 = spring.linear_stiffness
+    k2 = spring.cubic_stiffness
     roots = np.roots([k2, 0.0, k1, -force])
     stable = [y for y in roots.real[roots.imag == 0.0].tolist() if k1 + 3.0 * k2 * y**2 > 0.0]
     return min(stable, key=lambda y: abs(y - spring.equilibrium), default=None)
@@ -148,7 +159,9 @@ def locking(beam: Beam) -> float:
     """Return the static tip stiffness of a fully integrated mesh over that of the beam (model.md, "Locking")."""
     if beam.fidelity == "quasi_static" or beam.reduced_integration or beam.element_degree > 2:
         return 1.0
-    bending, shear, h = bending_stiffness(beam), shear_stiffness(beam), beam.length / beam.n_elements
+    bending = bending_stiffness(beam)
+    shear = shear_stiffness(beam)
+    h = beam.length / beam.n_elements
     if beam.element_degree == 1:
         return 1.0 + shear * h**2 / (12.0 * bending)
     compliance = tip_compliance(beam)

@@ -63,7 +63,8 @@ def _material(key: str, unit: str, bounds: tuple[float, float], known: str, othe
 
 def _of_beam(scene: Scene) -> dict[str, Any]:
     """Return what follows from our beam, for the texts of rules."""
-    beam, spring = scene.beam, scene.spring
+    beam = scene.beam
+    spring = scene.spring
     assert beam is not None
     mass = beam.density * beam.area * beam.length
     slenderness = beam.length / math.sqrt(beam.second_moment_of_area / beam.area)

@@ -43,7 +43,8 @@ MOST_ELEMENTS = 1_000_000
 
 
 #: An option of the command, and what Python calls it where that is not its own name.
-_OPTION, _ARGUMENTS = re.compile(r"(?<!\S)--([a-z]+)"), {"set": "overrides", "map": "names"}
+_OPTION = re.compile(r"(?<!\S)--([a-z]+)")
+_ARGUMENTS = {"set": "overrides", "map": "names"}
 
 
 class SceneError(ValueError):
@@ -146,7 +147,8 @@ class Table(BaseModel):
     @model_serializer(mode="wrap")
     def _as_given(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out what follows from other keys: neither given nor the default."""
-        fields, given = type(self).model_fields, self.model_fields_set
+        fields = type(self).model_fields
+        given = self.model_fields_set
         followed = {name for name in fields.keys() - given if getattr(self, name) != fields[name].default}
         return {name: value for name, value in handler(self).items() if name not in followed and value not in ((), [])}
 
@@ -349,7 +351,8 @@ class Stop(Table):
 
 
 #: Keys that set the length of macro steps: the one, or the others.
-STEP_KEY, TOLERANCE_KEYS = "macro_step", ("relative_tolerance", "absolute_tolerance")
+STEP_KEY = "macro_step"
+TOLERANCE_KEYS = ("relative_tolerance", "absolute_tolerance")
 #: H [s] of a scene that gives neither: that of Ahn & Tate's section 6.
 DEFAULT_STEP = 0.004
 #: What ``accuracy`` picks, by table: it takes the place of these keys.

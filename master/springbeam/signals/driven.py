@@ -18,7 +18,8 @@ from .curves import signal
 #: A motion has settled where its points repeat themselves within this share of the range of the motion …
 _ALIKE = 0.01
 #: … for so many periods of the motion, each of at most so many periods of the drive.
-_PERIODS, _LONGEST = 8, 8
+_PERIODS = 8
+_LONGEST = 8
 #: Periods of a chirp over which the range of its response is taken.
 _OF_CHIRP = 2
 

@@ -33,8 +33,10 @@ class Measured(NamedTuple):
 
         Points nearer to the ends of the run than its share ``margin`` do not.
         """
-        begin, end = float(run.time[0]), float(run.time[-1])
-        off, times = margin * (end - begin), self.time + shift
+        begin = float(run.time[0])
+        end = float(run.time[-1])
+        off = margin * (end - begin)
+        times = self.time + shift
         return np.asarray((times >= begin + off) & (times <= end - off))
 
 
@@ -68,7 +70,8 @@ def read_measured(
 
     Raises SceneError, which names file, line and column, and what would be allowed.
     """
-    path, units = Path(path), columns_of(scene)
+    path = Path(path)
+    units = columns_of(scene)
     try:
         return _read(Recorded(path, reading), units, names or {})
     except OSError as error:
@@ -133,15 +136,21 @@ def time_shifts(run: Trajectory, measured: Measured) -> tuple[list[float], float
 
     They are found by correlation at equal steps [s]. Half of the shorter record takes part at least.
     """
-    begin, end = float(run.time[0]), float(run.time[-1])
-    first, last = float(measured.time[0]), float(measured.time[-1])
+    begin = float(run.time[0])
+    end = float(run.time[-1])
+    first = float(measured.time[0])
+    last = float(measured.time[-1])
     step = max(float(np.median(np.diff(measured.time))), (end - begin + last - first) / _MOST)
-    ours, theirs = np.arange(begin, end, step), np.arange(first, last, step)
-    found, total = rows_at(run, ours), np.zeros(len(ours) + len(theirs) - 1)
-    one, other = np.ones(len(ours)), np.ones(len(theirs))
+    ours = np.arange(begin, end, step)
+    theirs = np.arange(first, last, step)
+    found = rows_at(run, ours)
+    total = np.zeros(len(ours) + len(theirs) - 1)
+    one = np.ones(len(ours))
+    other = np.ones(len(theirs))
     common = np.maximum(correlate(one, other), 1.0)
     for what, values in measured.values.items():
-        a, b = signal(found, what), np.interp(theirs, measured.time, values)
+        a = signal(found, what)
+        b = np.interp(theirs, measured.time, values)
         square = correlate(a**2, other) - 2.0 * correlate(a, b) + correlate(one, b**2)
         total = total + square / common / (float(np.var(b)) or 1.0)
     total = np.where(common >= 0.5 * min(len(ours), len(theirs)), total, np.inf)
@@ -153,7 +162,8 @@ def time_shifts(run: Trajectory, measured: Measured) -> tuple[list[float], float
 
 def model(run: Trajectory, measured: Measured, shift: float = 0.0) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return which points of the measurement the run covers, shape (n,), and its curves at these."""
-    times, covered = measured.time + shift, measured.covered(run, shift)
+    times = measured.time + shift
+    covered = measured.covered(run, shift)
     if covered.sum() < 2:
         raise SceneError(
             f"the run is known from {run.time[0]:g} s to {run.time[-1]:g} s, the measurement from {times[0]:g} s to "
@@ -166,10 +176,12 @@ def model(run: Trajectory, measured: Measured, shift: float = 0.0) -> tuple[np.n
 def residuals(run: Trajectory, measured: Measured, shift: float = 0.0) -> list[Residual]:
     """Return how far the run is from each measured curve; the clock of the measurement is moved by ``shift`` [s]."""
     covered, curves = model(run, measured, shift)
-    times, found = measured.time[covered] + shift, []
+    times = measured.time[covered] + shift
+    found = []
     for what, curve in curves.items():
         off = curve - measured.values[what][covered]
-        rms, at = float(np.sqrt(np.mean(off**2))), int(np.argmax(np.abs(off)))
+        rms = float(np.sqrt(np.mean(off**2)))
+        at = int(np.argmax(np.abs(off)))
         scale = float(np.std(measured.values[what][covered])) or 1.0
         found.append(Residual(what, len(off), rms, rms / scale, float(abs(off[at])), float(times[at])))
     return found

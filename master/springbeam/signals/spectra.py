@@ -36,7 +36,8 @@ _ACCELERATIONS = {"a_tip": "v_tip", "a_y": "z"}
 #: Oscillators of a shock spectrum in an octave.
 _PER_OCTAVE = 12
 #: Macro steps in a period of the fastest oscillator, and periods of the slowest in the run.
-_STEPS, _PERIODS = 20.0, 1.0
+_STEPS = 20.0
+_PERIODS = 1.0
 
 
 def sampled(
@@ -47,7 +48,8 @@ def sampled(
     They are ``step`` [s] long; without that there are as many as rows. Values lie on the curve of the run between its
     rows (`springbeam.Trajectory.at`). Raises SceneError where there is nothing to sample.
     """
-    begin, end = float(run.time[0]) if since is None else since, float(run.time[-1])
+    begin = float(run.time[0]) if since is None else since
+    end = float(run.time[-1])
     if not begin < end:
         raise SceneError(f"from {begin:g} s: the run ends at {end:g} s")
     count = int(np.count_nonzero(run.time >= begin)) if step is None else int((end - begin) / step * (1 + 1e-12)) + 1
@@ -173,7 +175,8 @@ def largest_jump(run: Trajectory, column: str) -> float:
     """Return the largest jump of a velocity at an event [m/s], 0 if there is none to speak of."""
     if (steps := run.steps) is None:
         return 0.0
-    before, after = steps[column], steps[f"{column}_after"]
+    before = steps[column]
+    after = steps[f"{column}_after"]
     ending = (steps["size"] > 0.0) & (np.diff(steps["events"], prepend=0.0) > 0.0)
     jumps = np.abs(after - before)[ending | (steps["size"] == 0.0)]
     largest = float(jumps.max(initial=0.0))
@@ -247,7 +250,9 @@ def spectra(
     """
     if run.steps is None:
         raise SceneError("the run left no steps: it is by a reference, and has no curve to sample")
-    duration, tail, drive = float(run.time[-1] - run.time[0]), settled(run), drive_of(run)
+    duration = float(run.time[-1] - run.time[0])
+    tail = settled(run)
+    drive = drive_of(run)
     low = _PERIODS / duration if low is None else low
     high = max(2.0 * low, (len(run) - 1) / duration / _STEPS) if high is None else high
     if not 0.0 < low < high:

@@ -26,7 +26,8 @@ def beside_one_another(names: list[str], runs: list[Trajectory]) -> Findings:
 
         return draw_compared(dict(zip(names, runs, strict=True)))
 
-    keys, results = differing_keys([run.scene for run in runs]), results_of(runs)
+    keys = differing_keys([run.scene for run in runs])
+    results = results_of(runs)
     titles = {"keys that differ": keys, "results": results}
     columns = ("", *(f"{name}:.5g" for name in names))
     shown = [table(columns, [(name, *of) for name, of in found.items()], title) for title, found in titles.items()]
@@ -40,7 +41,8 @@ def beside_measured(run: Trajectory, file: Path, names: list[str], shift: float 
     found = residuals(run, measured, moved)
 
     covered, curves = model(run, measured, moved)
-    time, diagrams = measured.time[covered] + moved, []
+    time = measured.time[covered] + moved
+    diagrams = []
     for name, curve in curves.items():
         both = {"measured": measured.values[name][covered], "run": curve}
         points = {which: np.column_stack([time, values]) for which, values in both.items()}

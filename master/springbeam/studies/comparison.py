@@ -42,7 +42,8 @@ _SAFETY = 4.0
 #: Least relative error of a step, where IDA's tolerance is not a looser one.
 _LEAST = 1e-12
 #: Relative change of the initial velocity that shows how fast two solutions separate, and how far that may grow.
-PERTURBATION, _GROWTH = 1e-7, 1e4
+PERTURBATION = 1e-7
+_GROWTH = 1e4
 #: Intervals of contact shorter than this many macro steps are no evidence either way.
 SHORT = 2.0
 #: The same where nothing has macro steps, as a share of the time.
@@ -98,7 +99,8 @@ def _beside_event_driven(scene: Scene, found: Row) -> tuple[Trajectory, ...]:
     """Compare a run with the event-driven reference, by bounds from a run at half its macro step."""
     event_driven.refuse(scene)
     size = scene.coupling.H
-    coarse, fine = simulate(scene), simulate(with_changes(scene, coupling={"macro_step": 0.5 * size}))
+    coarse = simulate(scene)
+    fine = simulate(with_changes(scene, coupling={"macro_step": 0.5 * size}))
     found["horizon"] = _same_story_until(coarse, fine)
     if found["horizon"] <= found["from"]:
         said = [warning for warning in coarse.summary["warnings"] if warning.startswith("not resolved")]
@@ -143,7 +145,8 @@ def _same_story_until(coarse: Trajectory, fine: Trajectory) -> float:
     That is the same events, a run that does not call itself unresolved, and displacements and velocities, away from
     events, that halving hardly changes.
     """
-    times, size = macro_points(coarse.scene), coarse.scene.coupling.H
+    times = macro_points(coarse.scene)
+    size = coarse.scene.coupling.H
     if not coarse.summary["resolved"]:
         return float(times[0])
     changes, others = (contact_changes(run, SHORT * size) for run in (coarse, fine))
@@ -188,7 +191,8 @@ def _agree_until(first: list[ContactChange], second: list[ContactChange], start:
 def _compare_events(
     scene: Scene, found: Row, coarse: list[ContactChange], fine: list[ContactChange], reference: list[ContactChange]
 ) -> None:
-    size, start = scene.coupling.H, found["from"]
+    size = scene.coupling.H
+    start = found["from"]
     moved = 0.0
     for i, (kind, time) in enumerate(change for change in reference if change.time <= found["horizon"]):
         row: dict[str, Any] = {"kind": kind, "time": None, "reference": time, "bound": 0.0, "passed": False}
@@ -218,7 +222,8 @@ def perturbed(scene: Scene, share: float, **options: Any) -> Iterator[Trajectory
     change = share * initial_speed(scene)
     yield event_driven.integrate(scene, velocity_perturbation=change, **options)
     if scene.spring is not None and scene.beam is not None:
-        start, speed = scene.spring.initial_velocity, change * scene.beam.length
+        start = scene.spring.initial_velocity
+        speed = change * scene.beam.length
         for velocity in (start - speed, start + speed):
             with suppress(SceneError):  # a spring that is kept still until the tip has come
                 pushed = with_changes(scene, spring={"initial_velocity": velocity})
@@ -247,7 +252,9 @@ def comparable_until(scene: Scene) -> float:
 
 def macro_points(scene: Scene) -> np.ndarray:
     """Return the times of the macro grid of ``scene`` [s]."""
-    start, H, end = scene.contact_time or 0.0, scene.coupling.H, scene.time.t_end
+    start = scene.contact_time or 0.0
+    H = scene.coupling.H
+    end = scene.time.t_end
     return np.minimum(start + H * np.arange(np.floor((end - start) / H * (1.0 + 1e-9)) + 1.0), end)
 
 
@@ -266,7 +273,8 @@ def quantities(scene: Scene) -> list[str]:
 
 def sample(run: Trajectory, times: np.ndarray, name: str) -> np.ndarray:
     """Return a quantity at macro points [s]."""
-    H, rows = run.scene.coupling.H, run.time
+    H = run.scene.coupling.H
+    rows = run.time
     nearest = rows[np.searchsorted(rows, times - 1e-9 * H).clip(max=len(rows) - 1)]  # what is known at rows alone
     wanted = np.where(np.abs(nearest - times) <= 1e-9 * H, nearest, times)
     found = run.at(np.minimum(wanted, rows[-1]))[name]

@@ -32,7 +32,8 @@ QUANTITIES = (
 #: Factor from one level to the next.
 _RATIO = 2
 #: Values that converge more slowly have no limit that one would trust; faster ones are as good as there.
-_LEAST_ORDER, _MOST_ORDER = 0.5, 20.0
+_LEAST_ORDER = 0.5
+_MOST_ORDER = 20.0
 #: Changes below this part of the value are rounding.
 _ROUNDING = 1e-12
 
@@ -88,7 +89,8 @@ def converge(scene: Scene, *, levels: int = 4, metric: Sequence[str] = ()) -> Fi
     SceneError
         If the scene has no beam with a mesh, or a quantity is unknown.
     """
-    metrics, rows = metrics_of(metric or QUANTITIES), dict[str, Row]()
+    metrics = metrics_of(metric or QUANTITIES)
+    rows = dict[str, Row]()
     for name, mesh in meshes(scene, levels).items():
         began = perf_counter()
         record = measured(partial(with_keys, scene, mesh), metrics)
@@ -127,8 +129,10 @@ def judged(scene: Scene, rows: Sequence[Row], metric: Sequence[str] = ()) -> Fin
     In the table errors are from the limits of a sequence. All modes of a mesh are its solution: no mode lies beyond
     the last.
     """
-    beam, document = scene.beam, dict[str, Any]()
-    made, diagrams = list[Row](), list[Diagram]()
+    beam = scene.beam
+    document = dict[str, Any]()
+    made = list[Row]()
+    diagrams = list[Diagram]()
     shown: list[Any] = [Text(scene.title or "(untitled scene)", style="bold")]
     given = rows[0]
     names = [name for name in metrics_of(metric or QUANTITIES) if metric or given[name] is not None]

@@ -34,7 +34,8 @@ def crosscheck(scene: Scene, *, quick: bool = False) -> Findings:
     `compare`.
     """
     event_driven.refuse(scene)
-    start, end = scene.contact_time or 0.0, scene.time.t_end
+    start = scene.contact_time or 0.0
+    end = scene.time.t_end
     record = compare(with_changes(scene, time={"t_end": start + 0.25 * (end - start)}) if quick else scene)
     units = columns_of(scene)
     shown: list[Any] = [*record["notes"]]
@@ -92,16 +93,20 @@ def orders(scene: Scene, *, quick: bool = False) -> Findings:
         If the reference stops early.
     """
     event_driven.refuse(scene)
-    H, halvings = scene.coupling.H, range(_HALVINGS + 1 - quick)
+    H = scene.coupling.H
+    halvings = range(_HALVINGS + 1 - quick)
     sizes = {f"H/{2**k}" if k else "H": H / 2**k for k in halvings}
     reference = event_driven.integrate(scene, sample_times=macro_points(scene))
-    found, stopped = dict[str, list[Row]](), dict[str, str]()
+    found = dict[str, list[Row]]()
+    stopped = dict[str, str]()
     for step, size in sizes.items():
         try:
             found[step] = _errors(scene, simulate(with_changes(scene, coupling={"macro_step": size})), reference)
         except RunStopped as error:
             stopped[step] = str(error)
-    rows, cells, curves = list[Row](), list[tuple[Any, ...]](), dict[str, dict[str, Any]]()
+    rows = list[Row]()
+    cells = list[tuple[Any, ...]]()
+    curves = dict[str, dict[str, Any]]()
     for several in zip(*found.values(), strict=True):
         errors = dict(zip(found, (row["error"] for row in several), strict=True))
         observed = {
@@ -132,7 +137,8 @@ def orders(scene: Scene, *, quick: bool = False) -> Findings:
 
 def _errors(scene: Scene, run: Trajectory, reference: Trajectory) -> list[Row]:
     """Return a row per quantity between two changes of contact, with the largest error."""
-    times, H = macro_points(scene), scene.coupling.H
+    times = macro_points(scene)
+    H = scene.coupling.H
     names = [name for name in quantities(scene) if name not in ("e_beam", "e_spring")]
     off = {name: np.abs(sample(run, times, name) - reference[name]) for name in names}
     changes = [change.time for change in contact_changes(reference, SHORT * H)]

@@ -92,9 +92,11 @@ def parse_axis(text: str) -> Axis:
                 raise _wrong(text, f"{value!r} is no value of {split[1]}; a list is 1,2,5, a range LOW:HIGH:COUNT")
         return Axis(target, listed)
     log = parts[-1] == "log"
-    ends, counted = parts[:2], parts[2 : len(parts) - log]
+    ends = parts[:2]
+    counted = parts[2 : len(parts) - log]
     try:
-        (low, high), count = map(float, ends), int(*counted)
+        low, high = map(float, ends)
+        count = int(*counted)
         possible = low != high and math.isfinite(high - low) and (not log or min(low, high) > 0.0)
     except (ValueError, TypeError):
         possible = False

@@ -28,7 +28,8 @@ Report = Callable[[Row], None]
 #: ``keep(name, record)``, called for each record that is new and whole.
 Keep = Callable[[str, Row], None]
 #: Cases under way: on a cluster, and for each process here.
-_AHEAD_ON_CLUSTER, _AHEAD = 256, 2
+_AHEAD_ON_CLUSTER = 256
+_AHEAD = 2
 #: The matrices are small: more threads of a worker only wait for each other.
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
@@ -108,7 +109,8 @@ def _as_done(
     submit: Callable[..., Future[Row]], measure: Measure, todo: Mapping[str, Row], ahead: int, died: type[Exception]
 ) -> Iterator[tuple[str, Row | None]]:
     """Yield records as they come, from cases of which at most ``ahead`` are under way; one that died is tried again."""
-    waiting, again = iter(todo.items()), set()
+    waiting = iter(todo.items())
+    again = set()
     running: dict[Future[Row], str] = {}
     while True:
         for name, case in islice(waiting, ahead - len(running)):
@@ -132,7 +134,8 @@ def _refuse_unguarded(workers: int) -> None:
     Each process runs the script again up to there, and would ask for processes as well.
     """
     main = sys.modules["__main__"]
-    path, frame = getattr(main, "__file__", None), inspect.currentframe()
+    path = getattr(main, "__file__", None)
+    frame = inspect.currentframe()
     while frame is not None and (frame.f_code.co_filename, frame.f_code.co_name) != (path, "<module>"):
         frame = frame.f_back
     if frame is None or path is None or getattr(main.__spec__, "name", "").endswith("__main__"):

@@ -87,7 +87,9 @@ def _settled(column: str) -> Callable[[Trajectory], float | None]:
 
 
 def _stroboscopic(run: Trajectory) -> list[float] | None:
-    load, begin, end = drive_of(run), float(run.time[0]), float(run.time[-1])
+    load = drive_of(run)
+    begin = float(run.time[0])
+    end = float(run.time[-1])
     if load is None or run.steps is None:
         return None
     tail = settled(run)

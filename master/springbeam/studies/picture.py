@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 Rows = Sequence[Mapping[str, Any]]
 #: Values of an axis that are named on it, and columns of small multiples.
-_FEW, _MOST = 8, 6
+_FEW = 8
+_MOST = 6
 #: Values are named on an axis if the range is less than so many times the least distance of two of them.
 _APART = 5.0
 

@@ -117,7 +117,8 @@ class Records:
     """
 
     def __init__(self, study: Study, directory: Path, *, replace: bool = False) -> None:
-        self._settings, self.path = study.settings(), directory / FILE
+        self._settings = study.settings()
+        self.path = directory / FILE
         settings, self.by_name, self._whole = ({}, {}, 0) if replace else _read(self.path)
         if settings not in ({}, self._settings):
             raise ResultsExist(f"{directory}: holds another study, or one of another springbeam or FMU ({FILE})")

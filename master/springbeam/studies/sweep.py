@@ -93,7 +93,9 @@ class Sweep(Study):
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Count the rows by status; show the first values of metrics that were asked for, and the damage boundary."""
-        rows, critical, shown = self.rows(records), list[Row](), list[Any]()
+        rows = self.rows(records)
+        critical = list[Row]()
+        shown = list[Any]()
         counts = Counter(row["status"] for row in rows)
         document: dict[str, Any] = {"runs": {status: counts[status] for status in STATUSES}}
         shown.append(f"runs      {', '.join(f'{counts[status]} {status}' for status in STATUSES if counts[status])}")
@@ -166,8 +168,12 @@ class Sweep(Study):
         A critical pulse has its ``duration`` [s], its ``peak``, in the load's unit, and its ``velocity_change``, the
         integral of the load.
         """
-        pulse, (metric, limit), found = self._pulse, self._limit, []
-        amplitude, duration, load = f"{pulse}.amplitude", f"{pulse}.duration", self._load(pulse)
+        pulse = self._pulse
+        metric, limit = self._limit
+        found = []
+        amplitude = f"{pulse}.amplitude"
+        duration = f"{pulse}.duration"
+        load = self._load(pulse)
         known = [row for row in rows if row[metric] is not None]
         for length in sorted({row[duration] for row in known}):
             pairs = sorted((abs(row[amplitude]), abs(row[metric])) for row in known if row[duration] == length)

@@ -45,7 +45,8 @@ _NO_RESULT = 0.1
 
 #: Macro steps are the scene's times these, where a run has this many of them.
 _STEPS = tuple(2.0**k for k in range(6, -3, -1))
-_FEWEST_STEPS, _MOST_STEPS = 4, 20_000
+_FEWEST_STEPS = 4
+_MOST_STEPS = 20_000
 _ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 #: Steps that follow from tolerances resolve the motion: with more turns of the slowest mode [rad] that takes too many.
 _MOST_RESOLVED = 2000.0
@@ -108,7 +109,9 @@ class Tradeoff(Study):
 
     def record(self, case: Row) -> Row:
         """Run, time and judge a configuration: ``cost_wall_time`` [s] is the median of ``times``, without set-up."""
-        began, times, found = perf_counter(), list[float](), Row()
+        began = perf_counter()
+        times = list[float]()
+        found = Row()
         try:
             while not times or (len(times) < self.repeats and not self.quick and times[-1] <= _TIMED_ONCE):
                 found = self._measured(case)
@@ -118,7 +121,8 @@ class Tradeoff(Study):
         return {"status": "done", "error": "", **found, "cost_wall_time": statistics.median(times), "times": times}
 
     def _measured(self, case: Row) -> Row:
-        limit, began = _LIMIT, perf_counter()
+        limit = _LIMIT
+        began = perf_counter()
 
         def limited(time: float, phase: str, macro_steps: int) -> None:
             if perf_counter() - began > limit:
@@ -147,8 +151,10 @@ class Tradeoff(Study):
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Name the cheapest configurations, and those that nothing beats."""
-        rows, until = self.rows(records), self.scene.time.t_end
-        best, front = cheapest(rows), pareto(rows)
+        rows = self.rows(records)
+        until = self.scene.time.t_end
+        best = cheapest(rows)
+        front = pareto(rows)
         cells = [(target, *_shown(row)) for target, row in zip(TARGETS, best, strict=True)]
         on_front = [
             (
@@ -200,7 +206,8 @@ def _errors(run: Trajectory, exact: Trajectory) -> Row:
 
 def pareto(rows: Iterable[Row]) -> list[Row]:
     """Return the Pareto front, the cheapest first: no other row is both quicker and more accurate."""
-    best, front = _NO_RESULT, []
+    best = _NO_RESULT
+    front = []
     for row in sorted((row for row in rows if row["status"] == "done"), key=lambda row: row["cost_wall_time"]):
         if row["error_motion"] < best:
             best = row["error_motion"]

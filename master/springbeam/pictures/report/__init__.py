@@ -57,7 +57,8 @@ def page(trajectory: Trajectory) -> str:
         Any run, also one that stopped early or has no rows: then only what is there is shown.
     """
     time = trajectory.columns["time"]
-    over_time, frames = charts(trajectory), frames_of(trajectory)
+    over_time = charts(trajectory)
+    frames = frames_of(trajectory)
     shown = [] if frames is None else sketches(trajectory, frames)
     moving = [] if frames is None else [moving_chart(sketch, frames) for sketch in shown]
     environment = jinja2.Environment(
@@ -177,7 +178,10 @@ def _as_script(data: dict[str, Any] | None) -> str:
 
 def described(scene: Scene) -> Iterator[tuple[str, str]]:
     """Return what each part of the scene is, in the order of the drawing from above."""
-    beam, spring, stop, contact = scene.beam, scene.spring, scene.stop, scene.contact
+    beam = scene.beam
+    spring = scene.spring
+    stop = scene.stop
+    contact = scene.contact
     if beam is not None:
         mesh = "no inertia" if beam.fidelity == "quasi_static" else f"{beam.n_elements} elements"
         if beam.fidelity == "dynamic" and beam.n_modes:

@@ -29,7 +29,8 @@ _FINE = 1e-3
 #: Pixels of the page for a point of the pictures.
 _PIXELS = 1.8
 #: Pixels of a chart's height: for each inch of its picture, and for what stands around it.
-_PIXELS_PER_INCH, _PIXELS_BESIDE = 82, 110
+_PIXELS_PER_INCH = 82
+_PIXELS_BESIDE = 110
 #: Of a sketch [inch].
 _SKETCH_HEIGHT = 3.0
 
@@ -72,7 +73,8 @@ def backdrop(trajectory: Trajectory) -> list[dict[str, Any]]:
 def _of_panel(trajectory: Trajectory, panel: Panel) -> Chart:
     """Draw a panel."""
     figure = _over_time(trajectory, _height_of(panel.height))
-    clock, factor = time_unit(trajectory).factor, panel.unit.factor
+    clock = time_unit(trajectory).factor
+    factor = panel.unit.factor
     for curve in panel.curves:
         figure.add_scatter(
             x=_single(clock * curve.time),
@@ -149,7 +151,8 @@ def _height_of(inches: float) -> int:
 
 def _over_time(trajectory: Trajectory, height: int) -> go.Figure:
     """Return a figure of ``height`` [px] without curves over the run's time."""
-    unit, time = time_unit(trajectory), trajectory["time"]
+    unit = time_unit(trajectory)
+    time = trajectory["time"]
     figure = go.Figure(layout=_layout(height))
     ends = [unit.factor * float(time[0]), unit.factor * float(time[-1])]
     return figure.update_xaxes(range=ends, title_text=f"time t [{unit.name}]")
