@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from .results import dense, recording, totals
+from .results import recording, totals
 from .results.files import load_trajectory as load
 from .results.trajectory import Trajectory
 from .run.accuracy import simulate
@@ -20,17 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["RunStopped", "Simulation", "Trajectory", "load", "simulate"]
-
-
-def _at(run: Trajectory, times: Any) -> Trajectory:
-    """Return the run at any ``times`` [s], shape (n,), with the same columns (`springbeam.results.dense`).
-
-    Between rows y and u_tip follow the polynomial of order 6 that has the step's ends and moments, the contact
-    force is the polynomial applied, energies are linear; shapes, moments and shear forces along the beam are linear
-    between those of the run, some 400, and less accurate. Raises ValueError for times outside of the run, and for a
-    run that left no steps.
-    """
-    return dense.at(run, times)
 
 
 def _plot(run: Trajectory, picture: str = "positions") -> Figure:
@@ -65,5 +54,5 @@ def _html(run: Trajectory) -> str:
     return f"<table><caption>{escape(run.scene.title or 'a run')}</caption>{body}</table>"
 
 
-for _name, _method in {"at": _at, "plot": _plot, "save": _save, "_repr_html_": _html}.items():
+for _name, _method in {"plot": _plot, "save": _save, "_repr_html_": _html}.items():
     setattr(Trajectory, _name, _method)

@@ -18,6 +18,7 @@ from springbeam.pictures.drawing import (
     NOT_RESOLVED,
     decimated,
     phase_intervals,
+    power_of_ten,
     readable_unit,
 )
 from springbeam.pictures.frames import frames_of, sketches
@@ -30,6 +31,17 @@ DRAWN = {
     **dict.fromkeys(("all", "no stop", "no spring", "beam"), (OVERVIEW, A, B, C, D, E, F, G)),
     **dict.fromkeys(("no beam", "spring"), (OVERVIEW, C, D, E, F)),
 }  # fmt: skip
+
+
+def test_the_overview_is_drawn_without_a_formula(tmp_path, monkeypatch):
+    """A formula takes as long as all other texts together."""
+    monkeypatch.setattr(matplotlib.mathtext.MathTextParser, "parse", None)
+    assert plot_run(a_trajectory(events=EVERY_EVENT), tmp_path)
+
+
+@pytest.mark.parametrize(("value", "text"), [(1e-12, "10⁻¹²"), (1.0, "10⁰"), (1e3, "10³")])
+def test_a_power_of_ten_is_plain_text(value, text):
+    assert power_of_ten(value) == text
 
 
 @pytest.mark.parametrize("has", SCENES)

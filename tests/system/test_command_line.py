@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from commands import COMMAND, HANGS, printed, refused
+from commands import COMMAND, HANGS, printed, ran, refused, swept
 from typer.testing import CliRunner
 
 from springbeam.cli import app
@@ -220,3 +220,14 @@ def test_an_output_that_is_closed_is_no_success(line):
     os.close(sender)
     assert done.returncode == 3
     assert done.stderr.decode() == "error: standard output: closed before all was written\n"
+
+
+def test_a_function_of_the_callers_gets_a_run_with_its_methods(tmp_path):
+    """In a process of its own: here the tests have loaded all there is."""
+    (tmp_path / "mine.py").write_text("def height(run):\n    return float(run.at([0.1])['y'][0])\n")
+    springbeam = (sys.executable, "-m", "springbeam")
+    line = ("sweep", "duffing", "--no-plots", "--set", "time.t_end=0.2", "--vary", "spring.mass=1,2")
+    ran(*springbeam, *line, "--metric", "high=mine:height", "--out", "s", cwd=tmp_path)
+    assert min(swept(tmp_path / "s")["high"]) > 0.0
+    line = ("crosscheck", "duffing", "--no-plots", "--set", "time.t_end=0.2")
+    assert "agrees" in ran(*springbeam, *line, cwd=tmp_path)

@@ -120,6 +120,7 @@ LEVELS = {
 }
 #: Columns of pixels of a time axis, roughly; more points than a few per column cannot be seen.
 PIXEL_COLUMNS = 1000
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Unit(NamedTuple):
@@ -136,6 +137,11 @@ def readable_unit(values: Iterable[np.ndarray], unit: str) -> Unit:
         return Unit(1.0, unit)
     power = min(max(int(np.floor(np.log10(largest) / 3.0)), -4), 4)
     return Unit(10.0 ** (-3 * power), f"{'pnµm kMGT'[power + 4].strip()}{unit}")
+
+
+def power_of_ten(value: float) -> str:
+    """Return a power of ten as plain text, 1e-3 as 10⁻³: a formula takes matplotlib as long as all other texts."""
+    return "10" + f"{round(np.log10(value))}".translate(_RAISED)
 
 
 def decimated(time: np.ndarray, values: np.ndarray, columns: int = PIXEL_COLUMNS) -> np.ndarray:

@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from ..results.trajectory import Trajectory
 from .drawing import (
@@ -25,6 +25,7 @@ from .drawing import (
     Unit,
     event_marks,
     mark,
+    power_of_ten,
     shaded_phases,
     time_unit,
 )
@@ -174,6 +175,7 @@ def paint(ax: Axes, panel: Panel, clock: Unit) -> None:
         ax.set(yscale="log", ylim=panel.logarithmic)
         ax.yaxis.set_major_locator(LogLocator(numticks=6))
         ax.yaxis.set_minor_locator(NullLocator())
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
     elif np.any(below):
         ax.set_ylim(bottom=0.0)
     elif ax.get_ylim()[0] < 0.0 < ax.get_ylim()[1]:

@@ -65,8 +65,10 @@ _ALIKE = 1e-13
 def at(run: Trajectory, times: Any) -> Trajectory:
     """Return ``run`` at ``times`` [s], in any order, shape (n,): columns and shapes there, events and summary.
 
-    Before its first shape and after its last one the beam has these. Raises ValueError for times outside of those that
-    are known, and for a run that has no steps.
+    Between rows y and u_tip follow the polynomial of order 6 that has the step's ends and moments, the contact
+    force is the polynomial applied, energies are linear; shapes, moments and shear forces along the beam are linear
+    between those of the run, some 400, and less accurate; before the first shape and after the last one the beam has
+    these. Raises ValueError for times outside of those that are known, and for a run that has no steps.
     """
     found = rows_at(run, times)
     table = run.shape_table
@@ -75,6 +77,10 @@ def at(run: Trajectory, times: Any) -> Trajectory:
     there = np.column_stack([np.interp(found.time, table[:, 0], column) for column in table.T])
     there[:, 0] = found.time
     return replace(found, shape_table=there)
+
+
+# Also for functions of the caller's that a command gives a run. Not by assignment, which a type checker refuses.
+setattr(Trajectory, at.__name__, at)
 
 
 def rows_at(run: Trajectory, times: Any) -> Trajectory:

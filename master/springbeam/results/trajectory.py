@@ -106,8 +106,8 @@ def rounded(value: float, scale: float) -> str:
 class Trajectory:
     """Columns as numpy arrays under the names of `COLUMNS`: ``trajectory["y"]`` or ``trajectory.y``.
 
-    ``shape_table`` has the numbers of `SHAPE_COLUMNS`, shape (n, 64); it is ``None`` without a beam. `springbeam.api`
-    attaches the methods that need more than the data: ``at``, ``plot`` and ``save``.
+    ``shape_table`` has the numbers of `SHAPE_COLUMNS`, shape (n, 64); it is ``None`` without a beam. ``at`` is
+    `springbeam.results.dense.at`; `springbeam.api` attaches ``plot`` and ``save``, which need rooms above.
     """
 
     scene: Scene

@@ -277,5 +277,5 @@ def sample(run: Trajectory, times: np.ndarray, name: str) -> np.ndarray:
     rows = run.time
     nearest = rows[np.searchsorted(rows, times - 1e-9 * H).clip(max=len(rows) - 1)]  # what is known at rows alone
     wanted = np.where(np.abs(nearest - times) <= 1e-9 * H, nearest, times)
-    found = run.at(np.minimum(wanted, rows[-1]))[name]
+    found = at(run, np.minimum(wanted, rows[-1]))[name]
     return np.where(wanted <= rows[-1], found, np.nan)
