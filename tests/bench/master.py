@@ -137,7 +137,7 @@ def profile(effort):
     def recorded(number):
         for _ in range(number):
             master._record(step, end)
-        master.hand_over()
+        master.flush()
 
     def stepped(body):
         body.rewind()

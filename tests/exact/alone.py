@@ -21,7 +21,7 @@ from scipy.special import ellipk
 from springbeam.bodies.fmu_bodies import FmuBeam
 from springbeam.bodies.protocol import NO_FORCE, StepRefused
 from springbeam.run.outcome import RunStopped
-from springbeam.run.runner import simulate
+from springbeam.run.runner import run_in_memory
 from springbeam.scene import Beam, Scene, Spring, scene_from_dict
 from springbeam.studies.tables import difference
 
@@ -116,7 +116,7 @@ def static_deflection(kag: float, variant: str) -> Iterator[Check]:
         "factorisation of N = 2n unknowns"
     )
     name, pull = f"KAG/EI {kag:g}: {variant}", {"on": "tip", "amplitude": 1.0}
-    deflection = float(simulate(scene_of(200.0, 1.0, [pull], beam=beam)).u_tip[-1])
+    deflection = float(run_in_memory(scene_of(200.0, 1.0, [pull], beam=beam)).u_tip[-1])
     yield Check(name, share, deflection / true, (2 * n) ** 2 * EPS * share, reason)
 
 
@@ -229,7 +229,7 @@ def duffing(k1: float, k2: float, amplitude: float) -> Iterator[Check]:
     period = duffing_period(k1, k2, amplitude)
     spring = Spring.with_ones(linear_stiffness=k1, cubic_stiffness=k2, equilibrium=amplitude)
     name, relative = f"({k1:g}, {k2:g}, {amplitude:g})", ida_error(2.0 * pi)
-    run = simulate(scene_of(period, period / 20.0, spring=spring))
+    run = run_in_memory(scene_of(period, period / 20.0, spring=spring))
     yield Check(f"{name}: y(T) [m]", amplitude, float(run.y[-1]), relative * amplitude, IDA)
     yield Check(f"{name}: ẏ(T) [m/s]", 0.0, float(run.z[-1]), relative * amplitude * 2.0 * pi / period, IDA)
 

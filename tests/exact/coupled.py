@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from scipy.special import ai_zeros, itairy, spherical_jn
 
 from springbeam.bodies.fmu_bodies import FmuSpring
-from springbeam.run.runner import simulate
+from springbeam.run.runner import run_in_memory
 from springbeam.scene import Beam, Coupling, Scene, Spring, Time, load_scene, with_changes
 
 from .alone import (
@@ -100,7 +100,7 @@ def energy_scheme(kappa: float, size: float, degree: int, integrator: str, alpha
         spring=spring,
         coupling=Coupling(scheme="energy", degree=degree, macro_step=size),
     )
-    run = simulate(scene)
+    run = run_in_memory(scene)
     stiffness = spring.linear_stiffness + 3.0 * spring.cubic_stiffness * float(np.abs(run["y"]).max()) ** 2
     bound = 2.0 * steps * scene.coupling.tolerance + ida_error(sqrt(stiffness / spring.mass) * steps * size)
     drift = float(run.summary["max_energy_residual"]) if np.all(run["phase"] == "tied") else nan
@@ -122,7 +122,7 @@ def bar_impact(n: int) -> Iterator[Check]:
     """
     h = 1.0 / n
     scene = with_changes(load_scene("bar-impact"), beam={"n_elements": n}, coupling={"macro_step": 0.5 * h})
-    run = simulate(scene)
+    run = run_in_memory(scene)
     begins = [event.time for event in run.events if event.kind == "seated"]
     ends = [event.time for event in run.events if event.kind == "separation"]
     begin, end = (begins[0], ends[-1]) if begins and ends else (nan, nan)
@@ -186,7 +186,7 @@ def resonance(factor: float) -> Iterator[Check]:
     # The slowest transient, e^{−α_b ω₁² t/2}, is below rounding of the amplitude.
     periods = int(40.0 / (0.5 * alpha * first**2) * w / (2.0 * pi)) + 1
     drive = {"on": "tip", "signal": "harmonic", "frequency": w / (2.0 * pi)}
-    run = simulate(scene_of(periods * per_period * H, H, [drive], beam=_beam(alpha_b=alpha)))
+    run = run_in_memory(scene_of(periods * per_period * H, H, [drive], beam=_beam(alpha_b=alpha)))
     last = slice(-per_period, None)
     found = 2j * np.mean(run.u_tip[last] * np.exp(-1j * w * run.time[last]))
     exact = _tip_receptance(w, alpha)
@@ -216,7 +216,7 @@ def pulse() -> Iterator[Check]:
     y = -scale * r * sin(w * duration) / (1.0 - r * r)
     z = scale * rate * (-1.0 - cos(w * duration)) / (1.0 - r * r)
     shock = {"on": "spring", "signal": "half_sine", "amplitude": force, "start": start, "duration": duration}
-    run = simulate(
+    run = run_in_memory(
         scene_of(start + duration + 1.25, 0.01, [shock], spring=Spring.with_ones(linear_stiffness=stiffness))
     )
     at = int(np.argmin(np.abs(run.time - start - duration)))
@@ -250,7 +250,7 @@ def slow_ramp(name: str, load: dict[str, Any], exact: float) -> Iterator[Check]:
     ∫ f (ξ²(3 − ξ)/6EI + ξ/KAG) dx, exact on any mesh that holds the static shape of a tip force.
     """
     ramp = {**load, "signal": "ramp", "duration": 3.0}
-    run = simulate(scene_of(200.0, 1.0, [ramp], beam=_beam(alpha_b=1.0)))
+    run = run_in_memory(scene_of(200.0, 1.0, [ramp], beam=_beam(alpha_b=1.0)))
     yield Check(
         f"{name}: u_tip [m]", exact, float(run.u_tip[-1]), _N**2 * EPS, "rounding: ε N², N unknowns of the beam"
     )
@@ -267,7 +267,7 @@ def moving_base() -> Iterator[Check]:
         {**signal, "on": "spring", "amplitude": -5.0 * 0.7},
     ]
     runs = [
-        simulate(scene_of(0.2, 1e-3, loads, beam=beam, spring=spring))
+        run_in_memory(scene_of(0.2, 1e-3, loads, beam=beam, spring=spring))
         for loads in ([{**signal, "on": "base"}], equivalent)
     ]
     reason = "rounding of the modes and IDA's tolerance, 200 steps"

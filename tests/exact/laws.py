@@ -21,7 +21,7 @@ from scipy.linalg import block_diag, expm
 from scipy.special import beta, lambertw, spherical_jn
 
 from springbeam.results.trajectory import Trajectory
-from springbeam.run.runner import simulate
+from springbeam.run.runner import run_in_memory
 from springbeam.scene import Beam, Scene, scene_from_dict
 
 from .alone import IDA, Check, ida_error, section
@@ -120,7 +120,7 @@ def _halving(
     solver: float,
 ) -> Iterator[Check]:
     """Yield checks of what a run at H = ``size``/2 gives, bounded by its change from H = ``size``."""
-    coarse, fine = simulate(scene(macro_step=size)), simulate(scene(macro_step=0.5 * size))
+    coarse, fine = run_in_memory(scene(macro_step=size)), run_in_memory(scene(macro_step=0.5 * size))
     for name, value, of in quantities:
         bound = abs(of(fine) - of(coarse)) + solver * abs(value)
         yield Check(name, value, of(fine), bound, f"{_HALVED}; and {IDA}")
@@ -148,12 +148,12 @@ def compliant_impact(q: float) -> Iterator[Check]:
     if q == 1.0:
         for degree in (0, 1, 2):
             bound = whole * (_phase(degree, pi / steps) + solver)
-            lasts = _duration(simulate(scene(macro_step=whole / steps, degree=degree)))
+            lasts = _duration(run_in_memory(scene(macro_step=whole / steps, degree=degree)))
             yield Check(f"q = 1, degree {degree}: lasts [s]", whole, lasts, bound, f"{_PROJECTED}; and {IDA}")
     else:
         quantity = (f"q = {q:g}, degree 2: lasts [s]", whole, _duration)
         yield from _halving((quantity,), scene, 2.0 * whole / steps, solver)
-    run = simulate(scene(macro_step=whole / 10.0))
+    run = run_in_memory(scene(macro_step=whole / 10.0))
     tolerance = 15.0 * run.scene.coupling.tolerance
     reason = f"H a tenth of the contact: no energy lost but coupling.tolerance of each of 15 steps; and {IDA}"
     yield Check(f"q = {q:g}: part at [m/s]", 1.0, _parting(run), tolerance + solver, reason)
@@ -192,7 +192,7 @@ def link(degree: int, size: float) -> Iterator[Check]:
 
     The link has 8/9 of the stiffness of the fast mode and none of the slow one's.
     """
-    run = simulate(_linked_masses(0.0, macro_step=size, degree=degree))
+    run = run_in_memory(_linked_masses(0.0, macro_step=size, degree=degree))
     exact = linked(run.scene, _M, _K, np.ones(1), np.zeros(1), run["time"])
     error = float(np.max(np.abs(np.column_stack([run["u_tip"], run["y"]]) - exact)))
     bound = 0.5 * 6.0 * pi * 8.0 / 9.0 * _phase(degree, 6.0 * pi * size) + ida_error(6.0 * pi)

@@ -76,7 +76,7 @@ def test_the_window_of_its_peak_force_and_its_frequency_are_its_own():
     assert upper.inertia == pytest.approx(tip_inertia(scene.beam), rel=1e-3)
     masses = 1.0 / upper.inertia + 1.0 / scene.spring.mass
     window = WINDOW * 2.0 * np.pi / np.sqrt(slope * masses)
-    run = runner.simulate(scene, upper=upper, lower=DuffingBody())
+    run = runner.run_in_memory(scene, upper=upper, lower=DuffingBody())
     assert run.summary["contact_force_window"] == pytest.approx(window, rel=1e-12)
     # The law's peak, not a mean over a fiftieth of the beam's period.
     assert run.summary["contact_force_max"] == pytest.approx(np.max(run.contact_force), rel=0.02)

@@ -443,7 +443,7 @@ def test_a_run_is_handed_over_up_to_where_it_goes_wrong():
         log.events += events
         log.shapes += list(shapes)
         with pytest.raises(RunStopped, match="z = nan at t = ") if begin else nullcontext():
-            log.hand_over()
+            log.flush()
     kept = recorder.trajectory()
     assert (len(kept), len(kept.events), len(kept.shape_table)) == (47, kept.steps["events"][-1], 47)
     assert judged == [(30, [0.0]), (17, [0.0])]

@@ -53,13 +53,13 @@ LAWS = [exact.compliant_impact, exact.hunt_crossley, exact.link, exact.damped_li
 def test_the_reference_meets_the_exact_solutions_of_a_run(section, share, monkeypatch):
     """The bounds of laws are errors of a coupling and of IDA, of which the reference has neither."""
     for module in (laws, coupled):
-        monkeypatch.setattr(module, "simulate", event_driven.integrate)
+        monkeypatch.setattr(module, "run_in_memory", event_driven.integrate)
     for check in section():
         assert abs(check.error or 0.0) <= share * check.bound, check
 
 
 def test_the_reference_of_a_bar_on_a_stop_approaches_the_exact_impact(monkeypatch):
-    monkeypatch.setattr(coupled, "simulate", event_driven.integrate)
+    monkeypatch.setattr(coupled, "run_in_memory", event_driven.integrate)
     assert [check.quantity for check in exact.bar_impact.solution(10) if not check.passed] == []
 
 

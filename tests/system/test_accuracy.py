@@ -82,7 +82,7 @@ def test_steps_are_halved_until_the_estimate_of_each_error_does(apart, runs, mon
             raise error
         return run
 
-    monkeypatch.setattr(search.runner, "simulate", made)
+    monkeypatch.setattr(search.runner, "run_in_memory", made)
     monkeypatch.setattr(search, "distance", lambda *_: Distance(**{**SAME, **next(given)}))
     found = search.pick(scene)
     assert len(sizes) == runs
@@ -223,7 +223,7 @@ def test_an_accuracy_that_is_not_reached_says_how_far_it_was(monkeypatch):
         error.run = run
         raise error
 
-    run = search.runner.simulate(with_changes(scene, accuracy=None))
-    monkeypatch.setattr(search.runner, "simulate", stops)
+    run = search.runner.run_in_memory(with_changes(scene, accuracy=None))
+    monkeypatch.setattr(search.runner, "run_in_memory", stops)
     with pytest.raises(RunStopped, match="diverges"):
         search.pick(scene)

@@ -9,7 +9,7 @@ import pytest
 
 from springbeam.monolithic import event_driven
 from springbeam.motion.events import EventKind
-from springbeam.run.runner import simulate
+from springbeam.run.runner import run_in_memory
 from springbeam.scene import scene_from_dict
 from springbeam.scene.statics import tip_compliance
 
@@ -69,7 +69,7 @@ CASES = {
 def test_ends_that_touch_stay_at_rest_under_the_force_of_statics(name):
     tables, k, stiffness, phase = CASES[name]
     what = scene(**tables)
-    run = simulate(what)
+    run = run_in_memory(what)
     C, columns = pressed(what.beam, k, stiffness), run.columns
     u = hanging(what.beam) + tip_compliance(what.beam) * C
     assert columns["u_tip"][0] == pytest.approx(u, rel=1e-9, abs=1e-9 * -hanging(what.beam))
@@ -86,16 +86,16 @@ def test_ends_that_touch_stay_at_rest_under_the_force_of_statics(name):
 def test_a_shock_on_a_linear_pair_at_rest_is_the_shock_alone_beside_its_statics():
     shock = {"on": "base", "signal": "half_sine", "amplitude": 300.0, "duration": 5e-3}
     tie = {"spring": SPRING, "contact": {"law": "tie"}}
-    both = simulate(scene(**tie, loads=[WEIGHT, shock])).columns["u_tip"]
-    alone = simulate(scene(**tie, loads=[shock])).columns["u_tip"]
-    at_rest = simulate(scene(**tie)).columns["u_tip"]
+    both = run_in_memory(scene(**tie, loads=[WEIGHT, shock])).columns["u_tip"]
+    alone = run_in_memory(scene(**tie, loads=[shock])).columns["u_tip"]
+    at_rest = run_in_memory(scene(**tie)).columns["u_tip"]
     np.testing.assert_allclose(both, alone + at_rest, atol=1e-12 * np.abs(alone).max())
 
 
 def test_a_beam_without_inertia_starts_where_it_rests():
     beam = {**BEAM, "fidelity": "quasi_static", "distributed_load": -5.0, "alpha_b": 0.01}
     what = scene(beam=beam, spring=SPRING, loads=None)
-    run = simulate(what)
+    run = run_in_memory(what)
     columns, loaded = run.columns, what.beam
     EI = loaded.young_modulus * loaded.second_moment_of_area
     KAG = 5 / 6 * loaded.area * loaded.shear_modulus
@@ -108,7 +108,7 @@ def test_a_beam_without_inertia_starts_where_it_rests():
 
 def test_a_spring_under_a_wall_is_pressed_down_to_it():
     upper = {"element": "rigid_wall", "position": -0.01}
-    columns = simulate(scene(beam=upper, spring=SPRING, loads=None)).columns
+    columns = run_in_memory(scene(beam=upper, spring=SPRING, loads=None)).columns
     np.testing.assert_allclose(columns["y"], -0.01, rtol=1e-12)
     np.testing.assert_allclose(columns["contact_force"], 0.01 * K1, rtol=1e-10)
 
@@ -125,14 +125,14 @@ def test_a_reference_of_its_own_starts_at_the_same_rest(tables):
     beam = {**BEAM, "alpha_b": 1e-5, "n_modes": 2}
     steps = {"coupling": {"macro_step": 5e-5, "degree": 2}, "time": {**TIME, "t_end": 2.5e-3}}
     what = scene(**tables, **steps, beam=beam, loads=[WEIGHT, shock])
-    run, reference = simulate(what), event_driven.integrate(what, sample_times=[0.0, 2.5e-3])
+    run, reference = run_in_memory(what), event_driven.integrate(what, sample_times=[0.0, 2.5e-3])
     assert reference.columns["u_tip"][0] == pytest.approx(run.columns["u_tip"][0], rel=1e-11)
     assert reference.columns["u_tip"][-1] == pytest.approx(run.columns["u_tip"][-1], rel=1e-7)
     assert reference.columns["y"][-1] == pytest.approx(run.columns["y"][-1], rel=1e-7)
 
 
 def test_a_contact_that_is_closed_at_the_start_is_told():
-    columns = simulate(scene(spring=SPRING, **link("compliance", exponent=1.0)))
+    columns = run_in_memory(scene(spring=SPRING, **link("compliance", exponent=1.0)))
     assert [(event.kind, event.time) for event in columns.events] == [(EventKind.IMPACT, 0.0)]
 
 
@@ -161,7 +161,7 @@ def test_a_spring_may_start_on_its_stop(force, velocity, events):
             "coupling": {"macro_step": 0.01},
         }
     )  # fmt: skip
-    run, exact = simulate(scene), event_driven.integrate(scene)
+    run, exact = run_in_memory(scene), event_driven.integrate(scene)
     # Bounces that die out end at another one where each counts them by rounding.
     for found in (run, exact):
         assert [event.kind.value for event in found.events][:10] == events

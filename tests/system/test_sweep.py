@@ -13,7 +13,7 @@ from commands import HANGS, command, swept
 from runs import a_trajectory
 
 from springbeam.motion.events import Event, EventKind
-from springbeam.run.runner import simulate
+from springbeam.run.runner import run_in_memory
 from springbeam.scene import load_scene, scene_from_dict, with_changes
 from springbeam.studies import picture, study, sweep
 from springbeam.studies.design import design, parse_axis, with_keys
@@ -102,7 +102,7 @@ def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
             assert "[spring] mass = -1" in rows["error"][k]
             assert rows["y_min"][k] is None
             continue
-        run = simulate(with_keys(plan.scene, values))
+        run = run_in_memory(with_keys(plan.scene, values))
         assert rows["y_min"][k] == run.y.min()
         assert rows["energy_residual"][k] == run.summary["max_energy_residual"]
         assert rows["first_stop_impact"][k] == next(e.time for e in run.events if e.kind == "stop_impact")

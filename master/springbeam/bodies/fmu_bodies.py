@@ -26,9 +26,9 @@ from .protocol import (
     Body,
     BodyFailed,
     Energies,
-    Felt,
     FmuError,
     Force,
+    InnerForces,
     Modes,
     Motion,
     StepRefused,
@@ -41,8 +41,8 @@ _INSTANT = 1e-8
 _INTEGRATORS = {"modal": 1, "midpoint": 2}
 _MASS_MATRICES = {"consistent": 1, "averaged": 2}
 _AT_REST = 2
-#: What tells `Felt`, and `BeamBody.shape`: variables, and how many numbers each has.
-_FELT = ("tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
+#: What tells `InnerForces`, and `BeamBody.shape`: variables, and how many numbers each has.
+_INNER_FORCES = ("tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
 _ALONG, _POINTS = ("deflection", "bending_moment", "shear_force"), len(SHAPE_POINTS)
 _SHAPE_3, _SHAPE_2 = (_ALONG, _POINTS), (tuple(f"{name}[{i}]" for name in _ALONG for i in range(1, _POINTS + 1)), 1)
 
@@ -365,7 +365,7 @@ class FmuBeam(OwnBody, BeamBody):
                 for name, share in self._inputs_of(load) if load.on != "spring" else ():
                     parameters[name] = parameters.get(name, 0.0) + share * float(load.value(start_time))
         super().__init__(parameters, start_time)
-        self._felt = self.fmu.once(Fmu.reading, _FELT)
+        self._inner_forces = self.fmu.once(Fmu.reading, _INNER_FORCES)
         # FMI 2.0 knows no arrays.
         self._shape = self.fmu.once(Fmu.reading, *(_SHAPE_2 if self.fmu.version == "2.0" else _SHAPE_3))
 
@@ -394,8 +394,8 @@ class FmuBeam(OwnBody, BeamBody):
         omega, tip = tip_modes(self._beam)
         return omega**2, self._beam.alpha_b * omega**2, tip
 
-    def felt(self) -> Felt:
-        return made_of(Felt, self._felt())
+    def inner_forces(self) -> InnerForces:
+        return made_of(InnerForces, self._inner_forces())
 
     def shape(self) -> np.ndarray:
         """See `BeamBody.shape`."""

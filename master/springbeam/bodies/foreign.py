@@ -78,7 +78,7 @@ class ForeignPort(Port):
     """A `Port` of a foreign FMU, through which all goes in SI units."""
 
     def __init__(self, fmu: Fmu, spec: ForeignFmu, found: Findings) -> None:
-        told, abilities = _told(spec, found), found.abilities
+        told, abilities = _outputs(spec, found), found.abilities
         impulse = () if spec.impulse is None else (spec.impulse,)
         # Derivatives of one step may act in the next if they are not set again.
         always = {"always": True, "repeats": abilities.state}
@@ -126,7 +126,7 @@ def _acceleration(spec: ForeignFmu, fmu: Fmu, units: dict[str, Unit]) -> dict[st
     return {}
 
 
-def _told(spec: ForeignFmu, found: Findings) -> dict[str, str]:
+def _outputs(spec: ForeignFmu, found: Findings) -> dict[str, str]:
     """Return the names of what an FMU tells after a step by their keys: first of its motion, then of its energies."""
     keys = (*spec.MOTION, *(spec.ENERGIES if found.abilities.energies else ()))
     names = {key: name for key, name in spec.named.items() if key in keys}
@@ -168,7 +168,7 @@ class ForeignBody(FmuBody, EndLoaded):
         self._port = RemotePort(spec.fmu, self.PATIENCE, self.OCCASION, opened, spec, times, found)
         self.found: Findings = self._port.found
         self.abilities, self._spec, self._upward = self.found.abilities, spec, 1.0 if upper else -1.0
-        self._keys = tuple(_told(spec, self.found))
+        self._keys = tuple(_outputs(spec, self.found))
         self._n_motion = len({*self._keys} & {*spec.MOTION})
         self.state = ForeignState(Motion(0.0, 0.0, 0.0, 0.0), time=times[0])
         try:

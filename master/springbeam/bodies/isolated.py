@@ -32,7 +32,7 @@ _FAREWELL = 2.0
 #: Most processes that wait for another body of their FMU.
 _MOST_IDLE = 4
 #: A method and its arguments.
-Call = tuple[Any, ...]
+Request = tuple[Any, ...]
 
 
 class FmuProcess:
@@ -71,7 +71,7 @@ class FmuProcess:
                 return process
         return cls(path)
 
-    def ask(self, calls: Sequence[Call], doing: str, patience: float | None) -> Any:
+    def ask(self, calls: Sequence[Request], doing: str, patience: float | None) -> Any:
         """Make ``calls``; return what the last one returns.
 
         Raises
@@ -183,7 +183,7 @@ class RemotePort(Port):
         self, path: str, patience: float, occasion: str, make: Callable[..., tuple[Port, Any]], *arguments: Any
     ) -> None:
         self.path, self.patience, self._occasion = Path(path), patience, occasion
-        self._waiting: list[Call] = []
+        self._waiting: list[Request] = []
         self._process: FmuProcess | None = FmuProcess.of(path)
         try:
             self.found = self._ask("initialisation", "make", make, *arguments)

@@ -63,7 +63,7 @@ class Energies(NamedTuple):
     load_potential: float
 
 
-class Felt(NamedTuple):
+class InnerForces(NamedTuple):
     """What happens inside a beam at the end of its last step, under the forces that act there."""
 
     acceleration: float  #: of its tip [m/s²]
@@ -228,9 +228,9 @@ class Body:
         """Return what the body stores and has dissipated; a body that cannot tell stores nothing."""
         return Energies(0.0, 0.0, 0.0, 0.0)
 
-    def felt(self) -> Felt:
+    def inner_forces(self) -> InnerForces:
         """Return what a beam that `tells` feels, asked once a step."""
-        raise NotImplementedError(f"{type(self).__name__} has no felt, and says that it tells")
+        raise NotImplementedError(f"{type(self).__name__} has no inner_forces, and says that it tells")
 
     def apply_impulse(self, impulse: float) -> None:
         """Change the velocity of the end at once by an upward impulse [N·s].

@@ -35,7 +35,7 @@ from .drawing import (
 )
 
 #: Name, heading, quantity, unit, columns and height of the panels that show what the bodies feel.
-_FELT: tuple[tuple[str, str, str, str, dict[str, Look], float], ...] = (
+_ON_BODIES: tuple[tuple[str, str, str, str, dict[str, Look], float], ...] = (
     ("accelerations", "Accelerations", "acceleration", "m/s²", ACCELERATIONS, 1.6),
     ("clamp-force", "Force of the clamp", "force", "N", {"clamp_force": Look(BLUE, "of the clamp, upward")}, 1.2),
     ("clamp-moment", "Moment of the clamp", "moment", "N·m",
@@ -169,7 +169,7 @@ def inside(trajectory: Trajectory) -> list[Panel]:
     run = trajectory.without_start()
     return [
         Panel(name, heading, quantity, unit, _curves(run, looks), height)
-        for name, heading, quantity, unit, looks, height in _FELT
+        for name, heading, quantity, unit, looks, height in _ON_BODIES
     ]
 
 

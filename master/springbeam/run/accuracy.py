@@ -69,7 +69,7 @@ def simulate(
     """
     scene = as_scene(scene)
     if scene.accuracy is None or upper is not None or lower is not None:
-        return runner.simulate(scene, progress, upper=upper, lower=lower)
+        return runner.run_in_memory(scene, progress, upper=upper, lower=lower)
     return pick(scene)
 
 
@@ -96,7 +96,7 @@ def pick(scene: Scene) -> Trajectory:
         prepared = _prepared(scene, scene.duration / steps)
         steps *= 2.0
         try:
-            fine = runner.simulate(prepared)
+            fine = runner.run_in_memory(prepared)
         except RunStopped as error:
             if steps > _MOST or error.run is None:
                 raise
@@ -112,7 +112,7 @@ def pick(scene: Scene) -> Trajectory:
             agrees = _SAFETY * max(errors.values()) <= asked
             # Where a body turns too far in a step, one more halving shows whether the runs agreed by chance.
             if agrees and (agreed or fine.summary["resolved"]):
-                return _told(fine, asked, errors, pilots)
+                return _with_errors(fine, asked, errors, pilots)
             agreed = agrees
         pilots.append(fine)
         coarse = fine
@@ -178,7 +178,7 @@ def _prepared(scene: Scene, macro_step: float) -> Scene:
     return with_changes(scene, accuracy=None, coupling=coupling, spring=ida)
 
 
-def _told(run: Trajectory, asked: float, errors: dict[str, float], pilots: list[Trajectory]) -> Trajectory:
+def _with_errors(run: Trajectory, asked: float, errors: dict[str, float], pilots: list[Trajectory]) -> Trajectory:
     """Return ``run`` with what was picked and found in its summary.
 
     What a scheme has changed of the energy is a doubt about the motion; runs that agree have settled it.

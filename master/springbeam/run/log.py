@@ -36,7 +36,7 @@ class Log:
         self._first = np.empty(0, STEP)  #: record of the run
         self.due = monotonic() + _WAITS  #: when the next records are handed on, however few [s]
 
-    def hand_over(self) -> None:
+    def flush(self) -> None:
         """Check the records and hand them to the recorder.
 
         Raises RunStopped where one shows that the run has gone wrong; what came after it is dropped.

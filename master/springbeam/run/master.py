@@ -30,7 +30,7 @@ from .stepping import Pair, Present, State
 
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
-_NOTHING_FELT = (0.0, 0.0, 0.0, 0.0)
+_NO_INNER_FORCES = (0.0, 0.0, 0.0, 0.0)
 #: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
 _SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
 
@@ -98,17 +98,17 @@ class Master:
             if not self.done:
                 self._step()
             if len(self._log.records) >= TOGETHER or monotonic() >= self._log.due or self.done:
-                self.hand_over()
+                self.flush()
         except (BodyFailed, OverflowError, RunStopped) as failed:
             cause = cause_of(failed)
-            self.hand_over()  # where an earlier step was wrong, that is why it stops
+            self.flush()  # where an earlier step was wrong, that is why it stops
             if isinstance(failed, RunStopped):
                 raise
             raise RunStopped(cause, self.state.time) from failed
 
-    def hand_over(self) -> None:
-        """Give the recorder the records that it does not have yet; see `Log.hand_over`."""
-        self._log.hand_over()
+    def flush(self) -> None:
+        """Give the recorder the records that it does not have yet; see `Log.flush`."""
+        self._log.flush()
 
     def _step(self) -> None:
         state = self.state
@@ -279,7 +279,7 @@ class Master:
                 pair.lower.received or 0.0,
                 state.energy_at_start,
             ),
-            *(pair.upper.felt() if self._told & BEAM_TELLS else _NOTHING_FELT),
+            *(pair.upper.inner_forces() if self._told & BEAM_TELLS else _NO_INNER_FORCES),
             *(self._told, pair.joined.degree, pair.tip_share, pair.turned_mass),
         )
 

@@ -112,7 +112,7 @@ class Simulation(AbstractContextManager["Simulation"]):
         Raises RunStopped if the steps since the last check have gone wrong, which ends the run.
         """
         with self._ending():
-            self._master.hand_over()
+            self._master.flush()
         found = self.recorder.trajectory()
         found.summary = found.summary if self._summary else self._summed_up({"status": "running"})
         return found
@@ -177,7 +177,7 @@ class Simulation(AbstractContextManager["Simulation"]):
     def _end(self, status: dict[str, Any]) -> dict[str, Any]:
         if not self._summary:
             with suppress(RunStopped):  # the run ends for another reason
-                self._master.hand_over()
+                self._master.flush()
             self._summary = self._summed_up(status)
             self.recorder.finish(self._summary)
         return self._summary
@@ -229,7 +229,7 @@ def run(
         return simulation.finish(progress)
 
 
-def simulate(
+def run_in_memory(
     scene: Scene, progress: Progress | None = None, *, upper: Body | None = None, lower: Body | None = None
 ) -> Trajectory:
     """Co-simulate ``scene``, which asks for no accuracy, and return the trajectory; see `run`."""

@@ -29,7 +29,7 @@ from ..results.contact_times import ContactChange, contact_changes
 from ..results.dense import at
 from ..results.distance import apart
 from ..results.trajectory import BODY_COLUMNS, Trajectory, columns_of
-from ..run.runner import simulate
+from ..run.runner import run_in_memory
 from ..scene import Scene, SceneError, with_changes
 from ..scene.frequencies import mesh_frequency, slowest_frequency
 from .tables import Row
@@ -99,8 +99,8 @@ def _beside_event_driven(scene: Scene, found: Row) -> tuple[Trajectory, ...]:
     """Compare a run with the event-driven reference, by bounds from a run at half its macro step."""
     event_driven.refuse(scene)
     size = scene.coupling.H
-    coarse = simulate(scene)
-    fine = simulate(with_changes(scene, coupling={"macro_step": 0.5 * size}))
+    coarse = run_in_memory(scene)
+    fine = run_in_memory(with_changes(scene, coupling={"macro_step": 0.5 * size}))
     found["horizon"] = _same_story_until(coarse, fine)
     if found["horizon"] <= found["from"]:
         said = [warning for warning in coarse.summary["warnings"] if warning.startswith("not resolved")]

@@ -102,7 +102,7 @@ class Sweep(Study):
         tables = {self.kind: rows}
         if self.boundary:
             document["boundary"] = critical = self._critical(rows)
-            shown += _told(critical, self.boundary, self._exceeded(rows))
+            shown += _in_words(critical, self.boundary, self._exceeded(rows))
         if critical:
             tables["sweep-boundary"] = critical
         if self.metric:
@@ -197,7 +197,7 @@ def _varies(values: np.ndarray) -> bool:
     return found.size > 1 and bool(np.ptp(found) > _ROUNDING * np.abs(found).max())
 
 
-def _told(found: Sequence[Mapping[str, float]], limit: str, exceeded: bool) -> list[str]:
+def _in_words(found: Sequence[Mapping[str, float]], limit: str, exceeded: bool) -> list[str]:
     """Return what the boundary says: both of its sides, or that there is none."""
     if exceeded:
         return [f"boundary  none: {limit} is reached without the pulse; raise the limit"]

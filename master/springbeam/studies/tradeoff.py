@@ -22,7 +22,7 @@ from ..results.dense import at
 from ..results.distance import distance
 from ..results.trajectory import Trajectory
 from ..run.outcome import RunStopped
-from ..run.runner import simulate
+from ..run.runner import run_in_memory
 from ..scene import Scene, SceneError, with_changes
 from ..scene.frequencies import slowest_frequency
 from .comparison import SHORT_SHARE, comparable_until
@@ -128,7 +128,7 @@ class Tradeoff(Study):
             if perf_counter() - began > limit:
                 raise RunStopped(f"takes more than {limit:g} s", time)
 
-        run = simulate(with_keys(self.scene, case), limited)
+        run = run_in_memory(with_keys(self.scene, case), limited)
         done = perf_counter()
         at(run, self.times)
         return {
