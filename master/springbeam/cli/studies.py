@@ -151,9 +151,9 @@ def carry_out(study: Study, scene: str | None, frame: Frame) -> Findings:
     """
     from ..studies.study import troubles
 
-    study.cases()
+    total = study.expected
     records = _opened(study, study.kind if scene is None else f"{Path(scene).stem}-{study.kind}", frame)
-    with _going_on(records, len(study.cases())):
+    with _going_on(records, total):
         computed = _computed(study, records, frame)
         found = study.findings(computed).written(records.path.parent, pictures=not frame.no_plots)
     return replace(found, shown=[*study.remarks, *found.shown, *troubles(computed)])
@@ -193,9 +193,8 @@ def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
 
     from ..studies.engine import dask_cluster
 
-    total = len(study.cases())
-    there = len(records.by_name)
-    if there == total:
+    total, there = study.expected, len(records.by_name)
+    if there == len(study.cases()) == total:
         return study.computed(records)
     silent = frame.quiet or frame.as_json
     known = f"\n{there} of {total} records are there" * bool(there)
@@ -204,7 +203,12 @@ def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
     task = bar.add_task("", total=total, completed=there)
     processes = (frame.workers or os.cpu_count() or 1) if study.parallel else 0
     with records, dask_cluster(frame.scheduler) if frame.scheduler else nullcontext() as cluster, bar:
-        return study.computed(records, processes, cluster, lambda record: bar.advance(task))
+
+        def report(_: Row) -> None:
+            done = len(records.by_name)
+            bar.update(task, completed=done, total=max(total, done))
+
+        return study.computed(records, processes, cluster, report)
 
 
 # -- the commands ---------------------------------------------------------------------------------------------------
@@ -279,7 +283,7 @@ def fit(
         typer.Option(
             "--vary",
             metavar="KEY=GUESS",
-            help="A key to find, and where to begin; may be repeated.",
+            help="A key to find, and its rough size, or a range LOW:HIGH; may be repeated.",
             autocompletion=complete_key,
         ),
     ] = None,
@@ -289,21 +293,28 @@ def fit(
         float | None,
         typer.Option("--shift", metavar="SECONDS", help="Move the clock of the measurement by this. Default: found."),
     ] = None,
+    repeat: Annotated[
+        Path | None,
+        typer.Option("--repeat", metavar="FILE", help="The same, measured once more: how large the noise is."),
+    ] = None,
     settings: SettingsOption = None,
-) -> Once:
+) -> Study:
     """Find keys of a scene by measured curves, with confidence intervals. Exit code 1 if the data does not
     determine them.
 
     Example: springbeam fit soft measured.csv --vary spring.linear_stiffness=3 --vary spring.damping=0.1
     """
-    from ..studies.fit import asked
-    from ..studies.fit import fit as find_keys
+    from ..studies.fit import Fit
 
-    what = scenes.load_scene(scene, settings or ())
-    announced = "some 25 runs for each key, five times as many where the clock is to be found"
-    asked(what, measured, vary or (), names or (), read or ())
-    find = partial(find_keys, what, measured, vary or (), names=names or (), read=read or (), shift=shift)
-    return Once("fit", announced, find)
+    return Fit(
+        scene=scenes.load_scene(scene, settings or ()),
+        file=measured,
+        vary=tuple(vary or ()),
+        names=tuple(names or ()),
+        read=tuple(read or ()),
+        shift=shift,
+        repeat=repeat,
+    )
 
 
 @study_command()

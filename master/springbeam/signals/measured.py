@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
+from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
-from scipy.signal import argrelextrema, correlate, correlation_lags
 
 from ..results.dense import rows_at
 from ..results.trajectory import Trajectory, columns_of
@@ -17,8 +18,14 @@ from ..scene import ArgumentError, Scene, SceneError
 from ..scene.recorded import Reading, Recorded
 from .curves import check, signal
 
-#: Most samples of a correlation.
-_MOST = 200_000
+#: Most steps of a correlation, and fewest in the run.
+_MOST, _FEWEST = 200_000, 2_000
+#: Peaks of a correlation that are refined, and steps by Newton's method after that.
+_PEAKS, _NEWTON = 6, 2
+#: Mean square over the spread that is none.
+_ALIKE = 1e-12
+#: Half of the difference that gives a derivative by time, as a share of the run.
+_DIFFERENCE = 1e-6
 
 
 class Measured(NamedTuple):
@@ -38,6 +45,10 @@ class Measured(NamedTuple):
         off = margin * (end - begin)
         times = self.time + shift
         return np.asarray((times >= begin + off) & (times <= end - off))
+
+    def spread(self, what: str) -> float:
+        """Return the standard deviation of a curve, 1 of one that is constant."""
+        return float(np.std(self.values[what])) or 1.0
 
 
 class Residual(NamedTuple):
@@ -115,49 +126,129 @@ def reading_of(texts: Sequence[str]) -> Reading:
         raise ArgumentError(f"--read {key}={given[key]}: {first['msg'].lower()}") from None
 
 
-def time_shift(run: Trajectory, measured: Measured) -> float:
-    """Return by how much [s] the clock of the measurement is to be moved onward, so that its curves fit the run.
+class Aligned(NamedTuple):
+    """A run beside a measurement whose clock is moved to where they fit best."""
 
-    Where the mean square between them is least: the first of `time_shifts`, refined.
+    shift: float  #: [s]
+    off: dict[str, np.ndarray]  #: run less measurement, NaN outside of the run, shapes (n,)
+    slope: dict[str, np.ndarray]  #: derivative of ``off`` by the shift, shapes (n,)
+    others: list[tuple[float, float]]  #: other shifts [s], each a least mean square nearby, which follows
+
+
+def time_shift(run: Trajectory, measured: Measured) -> float:
+    """Return by how much [s] the clock of the measurement is to be moved onward, so that its curves fit the run."""
+    return aligned(run, measured).shift
+
+
+def aligned(run: Trajectory, measured: Measured, lowest: float = -math.inf, highest: float = math.inf) -> Aligned:
+    """Return ``run`` beside the measurement, its clock moved to where the mean square between them is least.
+
+    Curves are weighed by the spread of what was measured. Periods of an oscillation are nearly alike, so the `_PEAKS`
+    best shifts of a correlation are refined, and the best of these is taken. Half of the points that the run can
+    cover take part at least.
+
+    Parameters
+    ----------
+    run, measured
+        What is compared.
+    lowest, highest
+        Limits of the shift [s].
     """
-    (coarse, *_), step = time_shifts(run, measured)
+    others = list[tuple[float, float]]()
+    if lowest < highest:
+        found, step = _correlated(run, measured, lowest, highest)
+        moved = found[0][0]
+        others = found[1:]
+        lowest, highest = max(moved - step, lowest), min(moved + step, highest)
+        for _ in range(_NEWTON):
+            here = at_shift(run, measured, moved)
+            off, slope = (weighed(part, measured) for part in (here.off, here.slope))
+            turned = float(slope @ slope)
+            moved = float(np.clip(moved - off @ slope / turned, lowest, highest)) if turned else moved
+    else:
+        moved = lowest
+    return at_shift(run, measured, moved)._replace(others=others)
+
+
+def weighed(curves: Mapping[str, np.ndarray], measured: Measured) -> np.ndarray:
+    """Return curves over the spread of what was measured, one after the other, 0 where they are NaN."""
+    return np.concatenate([np.nan_to_num(curve) / measured.spread(what) for what, curve in curves.items()])
+
+
+def at_shift(run: Trajectory, measured: Measured, shift: float) -> Aligned:
+    """Return ``run`` beside the measurement whose clock is moved by ``shift`` [s]."""
+    begin, end = float(run.time[0]), float(run.time[-1])
+    covered = measured.covered(run, shift)
+    times, half = measured.time[covered] + shift, _DIFFERENCE * (end - begin)
+    before, after = np.clip([times - half, times + half], begin, end)
+    here, earlier, later = (rows_at(run, several) for several in (times, before, after))
+    off, slope = {}, {}
+    for what, values in measured.values.items():
+        off[what], slope[what] = np.full_like(values, np.nan), np.zeros_like(values)
+        off[what][covered] = signal(here, what) - values[covered]
+        slope[what][covered] = (signal(later, what) - signal(earlier, what)) / (after - before)
+    return Aligned(shift, off, slope, [])
+
+
+def _correlated(
+    run: Trajectory, measured: Measured, lowest: float, highest: float
+) -> tuple[list[tuple[float, float]], float]:
+    """Return shifts [s] within limits with the mean squares there, best first, and the step at which they were sought.
+
+    Between steps they are found by splines.
+    """
+    begin, end = float(run.time[0]), float(run.time[-1])
+    first, last = float(measured.time[0]), float(measured.time[-1])
+    finest = (end - begin + last - first) / _MOST
+    step = max(min(float(np.median(np.diff(measured.time))), (end - begin) / _FEWEST), finest)
+    times = begin + step * np.arange(int((end - begin) / step) + 1)
+    found = rows_at(run, times)
+    curves = {what: signal(found, what) for what in measured.values}
+    # Each point of the measurement stands at the nearest step.
+    cells = np.rint((measured.time - first) / step).astype(int)
+    one, points = np.ones(len(times)), np.bincount(cells).astype(float)
+    number = np.rint(correlated(one, points))
+    total = np.zeros(len(number))
+    for what, values in measured.values.items():
+        a, sums, squares = curves[what], np.bincount(cells, values), np.bincount(cells, values**2)
+        square = correlated(a**2, points) - 2.0 * correlated(a, sums) + correlated(one, squares)
+        total += square / measured.spread(what) ** 2
+    shifts = begin - first + step * (np.arange(len(number)) - len(points) + 1.0)
+    allowed = (number >= 0.5 * number.max()) & (shifts >= lowest) & (shifts <= highest)
+    total = np.where(allowed, (total / number.clip(1.0) + _ALIKE) / number.clip(1.0), np.inf)
+    if not allowed.any():
+        return [(0.5 * (lowest + highest), math.inf)], highest - lowest
+    padded = np.pad(total, 1, constant_values=np.inf)
+    lows = np.flatnonzero(np.isfinite(total) & (total <= padded[:-2]) & (total <= padded[2:]))
+    splines = {what: CubicSpline(times, curve) for what, curve in curves.items()}
 
     def misfit(shift: float) -> float:
-        return sum(residual.relative**2 for residual in residuals(run, measured, shift))
+        moved = measured.time + shift
+        inside = (moved >= begin) & (moved <= end)
+        off = {what: splines[what](moved[inside]) - values[inside] for what, values in measured.values.items()}
+        if not inside.any():
+            return math.inf
+        # Of periods that fit as well, the one that covers more of the measurement.
+        return (float(np.mean(weighed(off, measured) ** 2)) + _ALIKE) / float(inside.mean())
 
-    fine = minimize_scalar(
-        misfit, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": 1e-6 * step}
-    )
-    return float(fine.x)
+    refined = [
+        minimize_scalar(
+            misfit,
+            bounds=(max(shifts[k] - step, lowest), min(shifts[k] + step, highest)),
+            method="bounded",
+            options={"xatol": 1e-4 * step},
+        )
+        for k in lows[np.argsort(total[lows])][:_PEAKS]
+    ]
+    return sorted(((float(at.x), float(at.fun)) for at in refined), key=lambda pair: pair[1]), step
 
 
-def time_shifts(run: Trajectory, measured: Measured) -> tuple[list[float], float]:
-    """Return shifts [s] at which the mean square between the curves is least nearby, best first, and their step.
-
-    They are found by correlation at equal steps [s]. Half of the shorter record takes part at least.
-    """
-    begin = float(run.time[0])
-    end = float(run.time[-1])
-    first = float(measured.time[0])
-    last = float(measured.time[-1])
-    step = max(float(np.median(np.diff(measured.time))), (end - begin + last - first) / _MOST)
-    ours = np.arange(begin, end, step)
-    theirs = np.arange(first, last, step)
-    found = rows_at(run, ours)
-    total = np.zeros(len(ours) + len(theirs) - 1)
-    one = np.ones(len(ours))
-    other = np.ones(len(theirs))
-    common = np.maximum(correlate(one, other), 1.0)
-    for what, values in measured.values.items():
-        a = signal(found, what)
-        b = np.interp(theirs, measured.time, values)
-        square = correlate(a**2, other) - 2.0 * correlate(a, b) + correlate(one, b**2)
-        total = total + square / common / (float(np.var(b)) or 1.0)
-    total = np.where(common >= 0.5 * min(len(ours), len(theirs)), total, np.inf)
-    (lowest,) = argrelextrema(total, np.less_equal)
-    lowest = lowest[np.isfinite(total[lowest])]
-    lags = correlation_lags(len(ours), len(theirs))[lowest[np.argsort(total[lowest])]]
-    return (begin - first + step * lags).tolist(), step
+def correlated(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return Σ one[k + j] other[k] at all lags j from 1 − len(other) to len(one) − 1."""
+    size = len(one) + len(other) - 1
+    length = 1 << size.bit_length()
+    found = np.fft.irfft(np.fft.rfft(one, length) * np.conj(np.fft.rfft(other, length)), length)
+    return np.roll(found, len(other) - 1)[:size]
 
 
 def model(run: Trajectory, measured: Measured, shift: float = 0.0) -> tuple[np.ndarray, dict[str, np.ndarray]]:

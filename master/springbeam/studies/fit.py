@@ -1,153 +1,481 @@
-"""Find keys of a scene by measured curves: least squares over runs, with confidence intervals.
+"""Find keys of a scene by measured curves: least squares over runs, with confidence intervals and a verdict.
 
-The unknowns are logarithms of the keys over their guesses, so that a key keeps its sign. Curves of different units are
-weighed by their spread, and then by what is left of each. An interval holds if what is left is noise that has the same
-size along a curve and does not remember its past. The clock of the measurement may be off by a shift, which is one
-unknown more unless it is given.
+Curves of different units are weighed by their spread, and then by what is left of each. The clock of the measurement
+may be off by a shift, which is eliminated inside each residual (`studies/least.py`) unless it is given. Runs all over
+the range of the keys show where searches begin: a wrong minimum looks like a right one from inside.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import hashlib
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from rich.text import Text
-from scipy.optimize import least_squares
-from scipy.stats import t as student
+from scipy.special import chdtri, fdtri, stdtrit
 
-from ..results.dense import at
 from ..run.accuracy import simulate
 from ..run.outcome import RunStopped
 from ..scene import ArgumentError, Scene, SceneError, key_kind
 from ..scene.scene import split_key
-from ..signals.curves import signal
-from ..signals.measured import Measured, read_measured, reading_of, time_shifts
-from .design import design, parse_axis, with_keys
+from ..signals.measured import Measured, aligned, correlated, read_measured, reading_of
+from .design import parse_axis, with_keys
+from .engine import Report, record_all
+from .least import SHIFT, Minimum, Search
+from .study import Records, Study
 from .tables import Findings, Row, table
 
-_STOPPED = 3
-#: The unknown that moves the clock of the measurement [s], beside keys.
-SHIFT = "shift"
-#: Share of the run by which the clock may move from where a search begins before points leave the run.
-_MARGIN = 0.02
-#: Places at which the clock is tried, and evaluations of each such trial.
-_TRIED, _FIRST_LOOK = 4, 8
-#: Relative steps of the derivatives, and where the search ends.
-_STEP, _TOLERANCE = 1e-4, 1e-12
-#: Share of a residual that a run which cannot be made counts, so that the search turns back.
-_REFUSED = 1e3
-#: A combination of keys that changes the curves less than this, beside the others, is not determined by them.
-_UNDETERMINED = 1e-5
+_DISAGREES, _STOPPED = 1, 3
+#: The range of a key goes from its guess over this to its guess times this.
+_RANGE = 3.0
+#: Runs all over the range, and searches from the best of them; the second time if what is left is no noise.
+_STARTS, _LOOKS = (16, 64), (2, 4)
+#: Runs of a first look by a search, beside its first derivatives, and of the search that goes on.
+_FIRST_LOOK, _MOST = 5, 40
+#: A search that ends at a cost so many times that of the best one goes on as well.
+_RIVAL = 4.0
 _CONFIDENCE = 0.95
+#: Chance that what is called no noise is noise.
+_CHANCE = 1e-3
+#: Lags of the autocorrelation that are judged, and the fewest points of which they can be.
+_LAGS, _FEWEST = 20, 12
+#: What is left of a curve, over its spread: no more than this is no error of the run, no less than that is no fit.
+_EXACT, _APART = 1e-4, 0.5
+#: Share of the run within which shifts of the clock belong together.
+_NEAR = 0.01
+#: Unknowns are alike that differ by no more, relative to the keys.
+_SAME = 1e-4
+#: A key is not determined if its interval is wider than this factor to each side.
+_WIDE = 2.0
 
 
-def fit(
-    scene: Scene,
-    file: Path,
-    vary: Sequence[str],
-    *,
-    names: Sequence[str] = (),
-    read: Sequence[str] = (),
-    shift: float | None = None,
-) -> Findings:
-    """Find the keys that make runs of ``scene`` agree with a measurement, with their intervals.
+class Left(NamedTuple):
+    """What is left of a curve at the values found."""
 
-    The table has a row per run: the keys, and the root mean square of what is left of each curve. The exit code is 1 if
-    the data does not determine the keys. A search that is interrupted has the rows so far, and exit code 3.
+    off: np.ndarray  #: run less measurement, shape (n,)
+    rms: float
+    share: float  #: ``rms`` over the spread of what was measured
+    noise: float | None = None  #: rms of the noise, by a measurement that was repeated
+    free: float = 1.0  #: how many independent points of noise there are
 
-    Parameters
-    ----------
-    scene
-        What is run.
-    file
-        The measured columns, time first.
-    vary
-        ``KEY=GUESS`` each.
-    names
-        ``NAME=COLUMN`` each: which column of a run a measured one is.
-    read
-        ``KEY=VALUE`` each: how the file is read.
-    shift
-        By which the clock of the measurement is moved [s]; found if it is left out.
 
-    Raises
-    ------
-    SceneError
-        For keys, guesses or columns that are not there, and for too few points.
-    RunStopped
-        If the run with the guesses stops early.
-    OSError
-        If the file cannot be read.
+class Found(NamedTuple):
+    """The values found, and what tells whether the data determines them."""
+
+    keys: list[Row]  #: ``key``, ``value``, ``low`` and ``high`` of its interval
+    ranges: Mapping[str, tuple[float, float]]  #: in which keys were sought
+    left: Mapping[str, Left]  #: by curve
+    alike: Sequence[str]  #: which unknowns change nothing, or the curves in the same way
+    rivals: Sequence[Row]  #: values elsewhere in the ranges that fit as well
+
+
+def undetermined(found: Found) -> list[str]:
+    """Return why keys are not determined by the data; nothing if they are.
+
+    They are determined if what is left of every curve is noise (no more than half of its spread, and white, or as large
+    as the noise of a repeated measurement), no other start in their ranges has led to values that fit as well, and
+    every interval lies inside its range and within a factor of two of its value.
     """
-    guesses, data = asked(scene, file, vary, names, read)
-    runs = list[Row]()
-    try:
-        record = _found(scene, data, guesses, shift, runs, str(file))
-    except KeyboardInterrupt:
-        return Findings({}, code=_STOPPED, error=f"interrupted after {len(runs)} runs", tables={"fit": runs})
-    keys = [(row["key"], row["value"], row["low"], row["high"]) for row in record["keys"]]
-    left = [(name, rms, share) for name, (rms, share) in record["left"].items()]
-    shown: list[Any] = [
-        table(("key", "value:.8g", "95 % from:.6g", "to:.6g"), keys),
-        table(("curve", "left, rms:.4g", "of its spread:.2%"), left),
-        f"{len(runs)} runs; {record['message']}",
-    ]
-    shown += [Text(f"not determined: {why}", style="bold red") for why in record["undetermined"]]
-    told = {name: record[name] for name in ("keys", "left", "undetermined")}
-    return Findings(told, shown, code=1 if record["undetermined"] else 0, tables={"fit": runs})
-
-
-def asked(
-    scene: Scene, file: Path, vary: Sequence[str], names: Sequence[str], read: Sequence[str]
-) -> tuple[dict[str, float], Measured]:
-    """Return where a search begins and what is measured, both checked; parameters and errors as of `fit`."""
-    guesses = _guesses(vary)
-    with_keys(scene, guesses)
-    return guesses, read_measured(str(file), scene, mapping(names), reading_of(read))
-
-
-def _guesses(vary: Sequence[str]) -> dict[str, float]:
-    """Return the keys and where the search begins."""
-    axes = [parse_axis(text) for text in vary]
-    (values, *more), names = design(axes, 0, 0, "random"), [axis.name for axis in axes]
-    for name, guess in zip(names, values, strict=True):
-        key = split_key(name)
-        if key is None or key_kind(*key) is not float:
-            raise ArgumentError(f"--vary {name}: takes no real numbers, and cannot be fitted")
-        if more or guess == 0.0:
-            raise ArgumentError(
-                f"--vary {name}: a guess is one value that has the sign and roughly the size of what is sought, as in "
-                "spring.linear_stiffness=800; 0 has none"
+    why = [f"{name}: {doubt}" for name, left in found.left.items() if (doubt := no_noise(left))]
+    why += found.alike
+    for rival in found.rivals:
+        values = ", ".join(f"{name} = {value:.5g}" for name, value in rival.items())
+        why.append(f"{values} fits as well; measure another curve, or give a narrower range")
+    for row in found.keys:
+        name, value, low, high = row.values()
+        if low is None or name == SHIFT:
+            continue
+        least, most = found.ranges[name]
+        if max(abs(high), abs(low)) > _WIDE * abs(value) or min(abs(high), abs(low)) < abs(value) / _WIDE:
+            why.append(f"{name} may be anything from {low:.3g} to {high:.3g}")
+        elif low <= least or high >= most:
+            why.append(
+                f"{name}: its interval reaches the end of the range from {least:g} to {most:g}; give another range, "
+                f"as --vary {name}={least:g}:{most:g}"
             )
-    return dict(zip(names, map(float, values), strict=True))
+    return why
 
 
-def _found(
-    scene: Scene, data: Measured, guesses: Mapping[str, float], shift: float | None, runs: list[Row], file: str
-) -> Row:
-    """Return the values found and their intervals; each run on the way is added to ``runs``."""
-    free = shift is None
-    run = simulate(with_keys(scene, guesses))
-    # While keys are wrong the curves may fit best a period too late: a few places are tried.
-    starts = time_shifts(run, data)[0][:_TRIED] if shift is None else [shift]
-    starts += [0.0] * int(free and data.covered(run).mean() > 0.5)
-    parts = {start: data.covered(run, start, _MARGIN * free) for start in starts}
-    parts = {start: part for start, part in parts.items() if part.sum() > len(guesses) + free}
-    if not parts:
-        raise ArgumentError(
-            f"{file}: fewer of its points lie in the run than are needed to find {', '.join(guesses)}"
-            f"{' and the shift of its clock' * free}; make time.t_end longer, give more points, or another --shift"
+def no_noise(left: Left) -> str:
+    """Return why what is left of a curve is no noise; nothing if it is, or too small to be an error of the run."""
+    if left.share <= _EXACT:
+        return ""
+    if left.noise is not None:
+        if left.rms**2 <= left.noise**2 * float(fdtri(left.free, left.free, 1.0 - _CHANCE)):
+            return ""
+        return f"what is left is {left.rms / left.noise:.3g} times the noise of the repeated measurement"
+    if left.share > _APART:
+        return f"what is left is {left.share:.0%} of its spread; the curves do not agree"
+    if len(left.off) < _FEWEST:
+        return f"{len(left.off)} points are too few to tell whether what is left is noise; --repeat a measurement"
+    if not is_white(left.off):
+        return (
+            f"what is left ({left.share:.2g} of its spread) is no noise: it remembers its past; something else in the "
+            "scene is wrong, or --repeat shows that the noise does so"
         )
-    searches = [
-        _Search(scene, data, part, {**guesses, SHIFT: start} if free else guesses, start, runs)
-        for start, part in parts.items()
-    ]
-    record = min(searches, key=lambda search: search.least(most=_FIRST_LOOK).cost).found()
-    if record["undetermined"] and 0.0 in parts:  # the keys alone may be
-        record = _Search(scene, data, parts[0.0], guesses, 0.0, runs).found()
-    return record
+    return ""
+
+
+def is_white(off: np.ndarray) -> bool:
+    """Return whether a series does not remember its past, by Ljung and Box (1978) at a level of 1e-3.
+
+    A short series is not called white.
+    """
+    if len(off) < _FEWEST:
+        return False
+    lags = min(_LAGS, len(off) // 4)
+    size = len(off) - 1.0 - np.arange(lags)
+    statistic = len(off) * (len(off) + 2.0) * float(np.sum(_autocorrelation(off)[1 : lags + 1] ** 2 / size))
+    return statistic <= float(chdtri(lags, _CHANCE))
+
+
+def remembered(off: np.ndarray) -> float:
+    """Return how many points of a series count as one: 1 + 2 Σ ρ up to the first ρ that is not positive."""
+    past = _autocorrelation(off)[1:]
+    end = int(np.argmax(past <= 0.0)) if (past <= 0.0).any() else len(past)
+    return 1.0 + 2.0 * float(past[:end].sum())
+
+
+def _autocorrelation(off: np.ndarray) -> np.ndarray:
+    centred = off - off.mean()
+    found = correlated(centred, centred)[len(off) - 1 :]
+    return np.asarray(found / max(float(found[0]), 1e-300))
+
+
+class Fit(Study):
+    """What is sought by which measurement."""
+
+    kind: ClassVar[str] = "fit"
+    announced: ClassVar[str] = "about {} runs"
+
+    scene: Scene
+    file: Path  #: the measured columns, time first
+    vary: tuple[str, ...]  #: ``KEY=GUESS`` or ``KEY=LOW:HIGH`` each
+    names: tuple[str, ...] = ()  #: ``NAME=COLUMN`` each: which column of a run a measured one is
+    read: tuple[str, ...] = ()  #: ``KEY=VALUE`` each: how the file is read
+    shift: float | None = None  #: by which the clock of the measurement is moved [s]; found if it is left out
+    repeat: Path | None = None  #: a second measurement of the same, which shows the noise
+
+    @cached_property
+    def data(self) -> Measured:
+        """What is measured. Raises SceneError if the file cannot be used."""
+        return read_measured(self.file, self.scene, mapping(self.names), reading_of(self.read))
+
+    @cached_property
+    def repeated(self) -> Measured | None:
+        """The second measurement."""
+        if self.repeat is None:
+            return None
+        return read_measured(self.repeat, self.scene, mapping(self.names), reading_of(self.read))
+
+    @cached_property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """From where to where each key is sought."""
+        found = dict[str, tuple[float, float]]()
+        for text in self.vary:
+            axis = parse_axis(text)
+            key = split_key(axis.name)
+            if key is None or key_kind(*key) is not float:
+                raise ArgumentError(f"--vary {axis.name}: takes no real numbers, and cannot be fitted")
+            if axis.name in found:
+                raise ArgumentError(f"--vary {axis.name}: given twice")
+            low, high = (axis.low, axis.high) if not axis.values else (min(axis.values), max(axis.values))
+            if len(axis.values) > 1 or low * high <= 0.0:
+                raise ArgumentError(
+                    f"--vary {axis.name}: a guess is one value that has the sign and roughly the size of what is "
+                    "sought, as in spring.linear_stiffness=800, or a range of one sign, as 500:1200; 0 has no size"
+                )
+            low, high = (low / _RANGE, low * _RANGE) if axis.values else (low, high)
+            found[axis.name] = (min(low, high), max(low, high))
+        if not found:
+            raise ArgumentError("--vary: nothing varies; give at least one KEY=GUESS")
+        return found
+
+    @property
+    def _logarithms(self) -> tuple[np.ndarray, np.ndarray]:
+        """The ranges of the unknowns: 1 + ln of a key over its smaller end."""
+        wide = [abs(math.log(high / low)) for low, high in self.ranges.values()]
+        return np.ones(len(wide)), 1.0 + np.array(wide)
+
+    def _values(self, unknowns: np.ndarray) -> Row:
+        """Return the keys at ``unknowns``."""
+        return {
+            name: min(ends, key=abs) * math.exp(x - 1.0)
+            for (name, ends), x in zip(self.ranges.items(), unknowns.tolist(), strict=True)
+        }
+
+    def _starts(self) -> list[np.ndarray]:
+        """Return unknowns all over the ranges, the middle (a guess) first: the R sequence (Roberts 2018)."""
+        low, high = self._logarithms
+        golden = 2.0
+        for _ in range(50):  # the root of x^(k+1) = x + 1
+            golden = (1.0 + golden) ** (1.0 / (len(low) + 1.0))
+        turn = golden ** -(1.0 + np.arange(len(low)))
+        return [low + (high - low) * ((0.5 + k * turn) % 1.0) for k in range(_STARTS[-1])]
+
+    def cases(self) -> dict[str, Row]:
+        """Return the runs with which the search begins. Raises SceneError if nothing can be found."""
+        cases = [self._values(start) for start in self._starts()[: _STARTS[0]]]
+        with_keys(self.scene, cases[0])
+        data, free = self.data, self.shift is None
+        begin, end = self.scene.contact_time or 0.0, self.scene.time.t_end
+        inside = int(np.sum((data.time + (self.shift or 0.0) >= begin) & (data.time + (self.shift or 0.0) <= end)))
+        if free:
+            last = np.searchsorted(data.time, data.time + (end - begin), side="right")
+            inside = int(np.max(last - np.arange(len(last))))
+        if inside <= len(self.ranges) + free:
+            raise ArgumentError(
+                f"{self.file}: fewer of its points lie in the run than are needed to find {', '.join(self.ranges)}"
+                f"{' and the shift of its clock' * free}; make time.t_end longer, give more points, or another --shift"
+            )
+        _ = self.repeated
+        return {_name(case): case for case in cases}
+
+    @property
+    def expected(self) -> int:
+        """Number of runs if the first look finds what is left to be noise."""
+        keys = len(self.ranges)
+        return len(self.cases()) + _LOOKS[0] * (_FIRST_LOOK - 1 + keys) + 2 * keys + 3
+
+    def settings(self) -> dict[str, Any]:
+        """Return what tells one fit from another, the measurements by what they hold."""
+        several = [data for data in (self.data, self.repeated) if data is not None]
+        held = [hashlib.sha256(part.tobytes()) for data in several for part in (data.time, *data.values.values())]
+        return super().settings() | {"measured": [part.hexdigest() for part in held]}
+
+    def record(self, case: Row) -> Row:
+        """Run one case; return what is left of the curves at the shift that fits best, or why it cannot be run."""
+        keys = {name: case[name] for name in self.ranges}
+        try:
+            run = simulate(with_keys(self.scene, keys))
+        except (RunStopped, SceneError) as refused:
+            return {**keys, "error": str(refused)}
+        data = self.repeated if case.get("repeat") else self.data
+        assert data is not None
+        given = (-math.inf, math.inf) if self.shift is None else (self.shift, self.shift)
+        found = aligned(run, data, case.get("lowest", given[0]), case.get("highest", given[1]))
+        left = {f"left_{name}": rms(off) for name, off in found.off.items()}
+        ends = {"begin": float(run.time[0]), "end": float(run.time[-1])}
+        return {
+            **keys,
+            SHIFT: found.shift,
+            **left,
+            "error": "",
+            **ends,
+            "off": found.off,
+            "slope": found.slope,
+            "others": found.others,
+        }
+
+    def computed(
+        self,
+        records: Records | None = None,
+        workers: int = 0,
+        cluster: Executor | None = None,
+        report: Report = lambda record: None,
+    ) -> dict[str, Row]:
+        """Search; each run that ``records`` lacks is made and kept there. Return them all."""
+        known = {} if records is None else records.by_name
+        keep = known.__setitem__ if records is None else records.add
+
+        def trial(case: Row) -> Row:
+            return record_all({_name(case): case}, self.record, known, keep, report=report)[_name(case)]
+
+        self._found(trial)
+        return known
+
+    def findings(self, records: Mapping[str, Row]) -> Findings:
+        """Return the values found with their intervals, and why the data does not determine them (exit code 1)."""
+        found = self._found(lambda case: records[_name(case)])
+        kept = ("off", "slope", "others", "begin", "end")
+        runs = [{name: value for name, value in row.items() if name not in kept} for row in records.values()]
+        if found is None:
+            first = next(iter(records.values()))["error"]
+            error = f"none of {len(runs)} runs in the range could be made; the first: {first}"
+            return Findings({"keys": []}, code=_STOPPED, error=error, tables={self.kind: runs})
+        why = undetermined(found)
+        left = {name: (left.rms, left.share) for name, left in found.left.items()}
+        shown: list[Any] = [
+            table(("key", "value:.8g", "95 % from:.6g", "to:.6g"), [list(row.values()) for row in found.keys]),
+            table(("curve", "left, rms:.4g", "of its spread:.2%"), [(name, *sizes) for name, sizes in left.items()]),
+            f"{len(runs)} runs",
+            *(Text(f"not determined: {doubt}", style="bold red") for doubt in why),
+        ]
+        document = {"keys": found.keys, "left": left, "undetermined": why}
+        return Findings(document, shown, code=_DISAGREES * bool(why), tables={self.kind: runs})
+
+    # Search
+
+    def _found(self, trial: Callable[[Row], Row]) -> Found | None:
+        """Search from the best of runs all over the ranges; return what was found, ``None`` if nothing can be run."""
+        starts = self._starts()
+        begun = list[Search]()
+        looked = list[Search]()
+        chosen = list[Search]()
+        found: Found | None = None
+        done = 0
+        for until, looks in zip(_STARTS, _LOOKS, strict=True):
+            begun += [search for at in starts[done:until] if (search := self._begun(trial, at)) is not None]
+            waiting = sorted((search for search in begun if search not in chosen), key=partial(_promise, begun))
+            first = waiting[: looks - 1]
+            looked += [search.least(_FIRST_LOOK) for search in first]
+            other = self._elsewhere(trial, begun, min(looked, key=_cost)) if looked else None
+            second = [other] if other is not None else waiting[looks - 1 : looks]
+            looked += [search.least(_FIRST_LOOK) for search in second]
+            looked.sort(key=_cost)
+            chosen += first + second
+            done = until
+            if looked:
+                found = self._judged(trial, looked)
+                if not any(map(no_noise, found.left.values())):
+                    break
+        return found
+
+    def _begun(
+        self, trial: Callable[[Row], Row], at: np.ndarray, shifts: Mapping[str, float] | None = None
+    ) -> Search | None:
+        """Return the search from a run, ``None`` if it cannot be made or covers too few points."""
+        free = self.shift is None
+
+        def run(unknowns: np.ndarray, lowest: float, highest: float) -> Row:
+            return trial(self._values(unknowns) | ({"lowest": lowest, "highest": highest} if free else {}))
+
+        row = trial(self._values(at) | dict(shifts or {}))
+        if row["error"]:
+            return None
+        search = Search(run, self.data, self._logarithms, at, row, free=free)
+        return search if search.part.sum() > len(at) + free else None
+
+    def _elsewhere(self, trial: Callable[[Row], Row], begun: Sequence[Search], last: Search) -> Search | None:
+        """Return the best of searches that begins with another shift of the clock than ``last``, if there is one.
+
+        Keys can make up for a clock that is a period late, as a damping for a decay. ``last`` is where
+        the best has led so far.
+        """
+        turns = [rms(last.row["slope"][name]) / self.data.spread(name) for name in self.data.values]
+        period = 2.0 * math.pi / max(*turns, 1e-300)
+        several = [
+            (misfit, k, shift)
+            for k, search in enumerate(begun)
+            for shift, misfit in [(search.row[SHIFT], search.cost), *search.row["others"]]
+            if abs(shift - last.row[SHIFT]) > 0.4 * period
+        ]
+        near = 0.1 * period
+        for _, k, shift in sorted(several):
+            if found := self._begun(trial, begun[k].at, {"lowest": shift - near, "highest": shift + near}):
+                return found
+        return None
+
+    def _judged(self, trial: Callable[[Row], Row], looked: Sequence[Search]) -> Found:
+        """Go on with the best of searches and with those that may end as well; return what tells how good the best is.
+
+        ``looked`` are sorted by their costs.
+        """
+        minima = [self._ended(looked[0])]
+        minima += [
+            self._ended(other)
+            for other in looked[1:]
+            if other.cost <= _RIVAL * minima[0].cost and (_apart(other.at, minima[0]) or _moved(other.row, minima[0]))
+        ]
+        best = min(minima, key=_cost)
+        # What noise can make of one cost: the F test of all unknowns (Bates & Watts 1988, section 1.3).
+        size = best.derivatives.shape[1]
+        chance = float(fdtri(size, best.freedom, _CONFIDENCE)) * size / best.freedom
+        as_well = [other for other in minima if other.cost <= (1.0 + chance) * best.cost and _apart(other.at, best)]
+        left = self._left(best)
+        if self.repeated is not None:
+            left = {name: self._beside_noise(trial, best, name, part) for name, part in left.items()}
+        names = [*self.ranges, *[SHIFT] * (self.shift is None)]
+        alike = best.alike(names, float(np.ptp(self.data.time)))
+        # Points that remember their past count as fewer.
+        counted = max(1.0 if is_white(part.off) else remembered(part.off) for part in left.values())
+        half = [math.inf] * size if alike else (math.sqrt(counted) * _half(best)).tolist()
+        keys = self._intervals(best, half)
+        return Found(keys, self.ranges, left, alike, [self._values(other.at) for other in as_well])
+
+    def _left(self, at: Search | Minimum) -> dict[str, Left]:
+        """Return what is left of the curves, by their names."""
+        found = {}
+        for name, curve in at.row["off"].items():
+            off = np.array(curve, float)[at.part]
+            found[name] = Left(off, rms(off), rms(off) / self.data.spread(name))
+        return found
+
+    def _ended(self, search: Search) -> Minimum:
+        """Go on with a search while what is left is no noise, then with each curve weighed by that, to its end."""
+        if any(map(no_noise, self._left(search).values())):
+            search = search.least(_MOST)
+        if len(self.data.values) > 1:
+            search = search.evenly().least(_MOST)
+        return search.ended()
+
+    def _intervals(self, best: Minimum, half: Sequence[float]) -> list[Row]:
+        """Return the values at a minimum, with intervals of a half width unless that is infinite."""
+        width = np.nan_to_num(half[: len(self.ranges)], posinf=0.0)
+        values, *ends = (self._values(best.at + side * width) for side in (0.0, -1.0, 1.0))
+        found = [(value, *sorted(end[name] for end in ends)) for name, value in values.items()]
+        names = list(self.ranges)
+        if self.shift is None:
+            names.append(SHIFT)
+            found.append((best.shift, best.shift - half[-1], best.shift + half[-1]))
+        return [
+            {"key": name, "value": value, "low": low if known else None, "high": high if known else None}
+            for name, (value, low, high), known in zip(names, found, np.isfinite(half), strict=True)
+        ]
+
+    def _beside_noise(self, trial: Callable[[Row], Row], best: Minimum, name: str, left: Left) -> Left:
+        """Return what is left of a curve with the noise: what two measurements differ in beside the run, over √2."""
+        assert self.repeated is not None
+        keys = {name: best.row[name] for name in self.ranges}
+        row = trial(keys | {"repeat": True})
+        times = self.repeated.time + row[SHIFT]
+        ours = self.data.time[best.part] + best.row[SHIFT]
+        # The nearest point: between two, noise would be smaller.
+        nearest = np.searchsorted(0.5 * (times[1:] + times[:-1]), ours)
+        apart = np.array(row["off"][name], float)[nearest] - np.array(best.row["off"][name], float)[best.part]
+        apart = apart[np.isfinite(apart)] / math.sqrt(2.0)
+        return left._replace(noise=rms(apart), free=len(apart) / remembered(apart))
+
+
+def _promise(begun: Sequence[Search], search: Search) -> tuple[bool, float]:
+    """Return what sorts searches: first those whose neighbours all cost more, then others, by their cost."""
+    nearest = sorted(begun, key=lambda other: float(np.linalg.norm(other.at - search.at)))
+    around = nearest[1 : 2 * len(search.at) + 1]
+    return any(other.cost < search.cost for other in around), search.cost
+
+
+def rms(values: Any) -> float:
+    """Return the root mean square of numbers, of which NaN (or ``None``) does not count."""
+    return float(np.sqrt(np.nanmean(np.array(values, float) ** 2)))
+
+
+def _cost(search: Search | Minimum) -> float:
+    return search.cost
+
+
+def _half(best: Minimum) -> np.ndarray:
+    """Return half of the width of the intervals of the unknowns."""
+    return float(stdtrit(best.freedom, 0.5 + 0.5 * _CONFIDENCE)) * best.deviations
+
+
+def _apart(at: np.ndarray, best: Minimum) -> bool:
+    """Return whether unknowns are away from a minimum: not in its intervals, three times as wide."""
+    return bool(np.any(np.abs(at - best.at) > 3.0 * _half(best)[: len(at)] + _SAME))
+
+
+def _moved(row: Row, best: Minimum) -> bool:
+    """Return whether the clock of a run is elsewhere than at a minimum."""
+    return bool(abs(row[SHIFT] - best.shift) > _NEAR * (row["end"] - row["begin"]))
+
+
+def _name(case: Row) -> str:
+    """Return the name of a case, which is all that it takes."""
+    return " ".join(str(value) for value in case.values())
 
 
 def mapping(names: Sequence[str]) -> dict[str, str]:
@@ -159,100 +487,3 @@ def mapping(names: Sequence[str]) -> dict[str, str]:
             raise ArgumentError(f"--map {text}: must be NAME=COLUMN, as in CH1=a_tip")
         found[name] = column
     return found
-
-
-class _Search:
-    """One search from guesses of keys, and of `SHIFT` if the clock moves; a row of each of its runs goes to ``runs``.
-
-    The points that take part are ``part`` of the data, wherever the clock moves.
-    """
-
-    def __init__(
-        self,
-        scene: Scene,
-        data: Measured,
-        part: np.ndarray,
-        guesses: Mapping[str, float],
-        shift: float,
-        runs: list[Row],
-    ) -> None:
-        self._scene = scene
-        self._data = data
-        self._part = part
-        self._guesses = guesses
-        self._shift = shift
-        self.runs = runs
-        self._spread = {name: float(np.std(values)) or 1.0 for name, values in data.values.items()}
-        self._weights = {name: 1.0 / spread for name, spread in self._spread.items()}
-
-    def values(self, unknowns: np.ndarray) -> dict[str, float]:
-        """Return the keys at ``unknowns``."""
-        duration = float(np.ptp(self._data.time))
-        return {
-            name: guess + x * duration if name == SHIFT else guess * float(np.exp(np.clip(x, -700.0, 700.0)))
-            for (name, guess), x in zip(self._guesses.items(), unknowns.tolist(), strict=True)
-        }
-
-    def left(self, unknowns: np.ndarray) -> np.ndarray:
-        """Return what is left of the curves, weighed."""
-        values = self.values(unknowns)
-        shift = values.get(SHIFT, self._shift)
-        try:
-            run = simulate(with_keys(self._scene, values))
-        except (RunStopped, SceneError) as refused:
-            self.runs.append({**values, "error": str(refused)})
-            return np.full(len(self._data.values) * int(self._part.sum()), _REFUSED)
-        curves = at(run, np.clip(self._data.time[self._part] + shift, run.time[0], run.time[-1]))
-        off = {name: signal(curves, name) - measured[self._part] for name, measured in self._data.values.items()}
-        rms = {f"left_{name}": float(np.sqrt(np.mean(part**2))) for name, part in off.items()}
-        self.runs.append({**values, **rms, "error": ""})
-        return np.concatenate([self._weights[name] * part for name, part in off.items()])
-
-    def least(self, start: np.ndarray | None = None, most: int = 60) -> Any:
-        """Search from ``start``, or from the guesses, by at most so many evaluations."""
-        begin = np.zeros(len(self._guesses)) if start is None else start
-        ends = dict.fromkeys(("xtol", "ftol", "gtol"), _TOLERANCE)
-        return least_squares(self.left, begin, jac="3-point", diff_step=_STEP, max_nfev=most, **ends)
-
-    def found(self) -> Row:
-        """Search, then once more with each curve weighed by what is left of it, and judge what was found."""
-        first = self.least().x
-        self.left(first)
-        self._weights = {
-            name: 1.0 / max(self.runs[-1][f"left_{name}"], 1e-9 * spread) for name, spread in self._spread.items()
-        }
-        result = self.least(first)
-        self.left(result.x)
-        keys, undetermined = self._judged(result)
-        left = {name: self.runs[-1][f"left_{name}"] for name in self._spread}
-        return {
-            "keys": keys,
-            "undetermined": undetermined,
-            "left": {name: (rms, rms / self._spread[name]) for name, rms in left.items()},
-            "message": str(result.message).rstrip("."),
-        }
-
-    def _judged(self, result: Any) -> tuple[list[Row], list[str]]:
-        """Return the keys with their intervals, and what the data does not determine."""
-        names, values = list(self._guesses), self.values(result.x)
-        lengths = np.linalg.norm(result.jac, axis=0)
-        undetermined = [f"{name} does not change the curves" for name, size in zip(names, lengths, strict=True)
-                        if size <= _UNDETERMINED * float(lengths.max(initial=0.0)) or size == 0.0]  # fmt: skip
-        freedom = len(result.fun) - len(names)
-        if undetermined:
-            return [{"key": name, "value": values[name], "low": None, "high": None} for name in names], undetermined
-        _, sizes, directions = np.linalg.svd(result.jac / lengths, full_matrices=False)
-        if sizes[-1] < _UNDETERMINED * sizes[0]:
-            shares = np.abs(directions[-1])
-            together = [name for name, share in zip(names, shares, strict=True) if share > 0.1 * shares.max()]
-            undetermined.append(f"{' and '.join(together)} change the curves in the same way: fix one of them")
-        inverse = directions.T / np.maximum(sizes, 1e-300)
-        deviation = np.sqrt(2.0 * result.cost / freedom * (inverse**2).sum(axis=1)) / lengths
-        half = np.diag(float(student.ppf(0.5 + 0.5 * _CONFIDENCE, freedom)) * deviation)
-        keys = []
-        for name, off in zip(names, half, strict=True):
-            low, high = sorted(self.values(result.x + side * off)[name] for side in (-1.0, 1.0))
-            if name != SHIFT and off.max() > np.log(2.0):
-                undetermined.append(f"{name} may be anything from {low:.3g} to {high:.3g}")
-            keys.append({"key": name, "value": values[name], "low": low, "high": high})
-        return keys, undetermined

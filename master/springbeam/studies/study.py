@@ -37,7 +37,7 @@ from .tables import Findings, Row
 
 FILE = "study.jsonl"
 #: How the files of studies begin.
-_KINDS = ("sweep", "tradeoff", "stability")
+_KINDS = ("sweep", "tradeoff", "stability", "fit")
 
 
 class Study(BaseModel, ABC):
@@ -57,6 +57,11 @@ class Study(BaseModel, ABC):
     @abstractmethod
     def cases(self) -> Mapping[str, Row]:
         """Return the axes of each case, by its name. Raises SceneError if there is nothing to compute."""
+
+    @property
+    def expected(self) -> int:
+        """Number of records when all is done; raises as `cases`."""
+        return len(self.cases())
 
     @abstractmethod
     def record(self, case: Row) -> Row:
