@@ -298,11 +298,12 @@ def noisy(values, share=0.02, seed=0):
 
 
 def test_a_wrong_minimum_is_left_and_never_certified(here):
-    """From 4.5 the nearest minimum is 4.6, five periods of a record that has six; the right one is at 3.1."""
+    """From 4.5 the nearest minimum is 4.6, whose residual is 131 % of the spread; the right one is at 3.1."""
     times = np.linspace(0.0, 20.0, 401)
-    run = simulate(with_changes(load_scene("duffing"), spring={"linear_stiffness": 3.1}))
+    coarse = ["coupling.macro_step=0.05"]
+    run = simulate(with_changes(load_scene("duffing", coarse), spring={"linear_stiffness": 3.1}))
     written(here / "m.csv", "time,y", times, noisy(run.at(times)["y"]))
-    line = ["fit", "duffing", "m.csv", "--json", "--vary"]
+    line = ["fit", "duffing", "m.csv", "--set", *coarse, "--json", "--vary"]
     for clock in ([], ["--shift", "0"]):
         (key, *_) = json.loads(printed(*line, "spring.linear_stiffness=4.5", *clock))["keys"]
         assert key["low"] < 3.1 < key["high"]
@@ -312,7 +313,7 @@ def test_a_wrong_minimum_is_left_and_never_certified(here):
 
 
 def test_a_residual_with_structure_is_no_noise(tmp_path):
-    """The damping is held 20 % too large: a third of what is left is no noise, the stiffness would be off by none."""
+    """The damping is held 20 % too large."""
     scene = with_changes(OSCILLATOR, spring={"damping": 1.44})
     path = written(tmp_path / "m.csv", "time,y", TIMES, noisy(exact(), 0.01))
     (why,) = fitted(path, ["spring.linear_stiffness=700"], scene, shift=0.0)["undetermined"]
@@ -361,7 +362,7 @@ def test_values_that_fit_as_well_are_named(tmp_path):
     assert key["low"] < 800.0 < key["high"]
 
 
-@settings(max_examples=10, deadline=None, phases=(Phase.explicit, Phase.generate))
+@settings(max_examples=6, deadline=None, phases=(Phase.explicit, Phase.generate))
 @given(
     stiffness=st.floats(300.0, 2000.0),
     damping=st.floats(0.5, 4.0),

@@ -123,9 +123,6 @@ def predict(
     p = prediction_of(what)
     shown: list[Any] = [Text(what.title or "(untitled scene)", style="bold")]
     shown += [f"{name:<10}{text}" for name, text in _lines(p)]
-    if p["schemes"]:
-        names = ("scheme", "degree:", "spectral radius − 1:.1e", "critical H [s]:.3g", "")
-        shown.append(table(names, [_scheme(**s, threshold=p["threshold"]) for s in p["schemes"]]))
     shown += [f"note      {note}" for note in p["notes"]]
     return Findings(p, shown)
 
@@ -160,6 +157,8 @@ def _lines(p: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name in ("spring", "contact"):
         if p[f"{name}_frequency"] is not None:
             yield name, f"ωH = {p[f'{name}_frequency'] * H:.3g} at its stiffest"
+    if p["exchange"] is not None:
+        yield "scheme", _exchange(**p["exchange"])
 
 
 def _listed(*told: tuple[str, float | None]) -> str:
@@ -167,10 +166,9 @@ def _listed(*told: tuple[str, float | None]) -> str:
     return ", ".join(words.format(value) for words, value in told if value is not None)
 
 
-def _scheme(
-    scheme: str, degree: int, spectral_radius: float, critical_step: float | None, threshold: float
-) -> tuple[Any, ...]:
-    """Return the row of a scheme."""
+def _exchange(scheme: str, degree: int, spectral_radius: float, critical_step: float | None, threshold: float) -> str:
+    """Return whether an exchange is stable, in words."""
     excess = spectral_radius - 1.0
-    step = "none" if critical_step is None else critical_step
-    return scheme, degree, excess if abs(excess) >= 1e-11 else 0, step, "unstable" * (excess > threshold)
+    state = f"unstable: amplitudes grow by {excess:.1e} a step" if excess > threshold else "stable at this H"
+    known = "none is unstable" if critical_step is None else f"unstable from H = {critical_step:.3g} s on"
+    return f"{scheme} of degree {degree}, {state}; {known}"

@@ -3,7 +3,8 @@
 The scene is linearised where it is stiffest: the hardening spring at the largest deflection and the contact law at the
 largest penetration that the energy at first contact allows; a softening spring at rest.
 
-The coupled step of a linear pair as a matrix: exact bodies, any scheme, its spectral radius.
+The coupled step of a linear pair by an exchange (``jacobi``, ``gauss_seidel``) as a matrix: exact bodies, its spectral
+radius. The scheme ``energy`` creates no energy at any H.
 
 Bodies are oscillators ξ̈ + c ξ̇ + ω² ξ = b F with the interface displacement w = bᵀξ. With S the response to a unit
 impulse and S_j its j-fold integral (S₋₁ = Ṡ), a step of size h under F(τ) = Σ F_j τʲ/j! is exact::
@@ -11,7 +12,7 @@ impulse and S_j its j-fold integral (S₋₁ = Ṡ), a step of size h under F(τ
     ξ(h) = (Ṡ + cS) ξ₀ + S ξ̇₀ + b Σ F_j S_{j+1}      ∫ξ, ∫∫ξ: each index one, two higher
     ξ̇(h) = −ω²S ξ₀ + Ṡ ξ̇₀ + b Σ F_j S_j
 
-Nothing here uses the bodies or the solvers of a run, except the conditions that define a scheme.
+Nothing here uses the bodies or the solvers of a run.
 """
 
 from __future__ import annotations
@@ -21,22 +22,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import legendre
 from scipy.linalg import block_diag
-from scipy.optimize import brentq
 
-from ...bodies import force
-from ...bodies.protocol import Motion
-from ...coupling.projection import penetration_series
-from ...coupling.solver import CONDITIONS
-from ...monolithic.oscillators import GAUSS, Oscillators
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
 from ...scene import Beam, Scene
 from ...scene.laws import depth
 from ...scene.linearised import contact_energy, spring_frequency, spring_stiffness
 from ...scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
 from ...scene.suspicions import suspicions
-from ..design import RIGID, SOFT
+from ...scene.tables import ORDINARY_SCHEMES
 
 #: A coupling is called unstable where its spectral radius exceeds 1 by more than this: e-fold growth in 1000 steps.
 THRESHOLD = 1e-3
@@ -46,8 +40,8 @@ MOST_MODES = 128
 _UNMOVED = 1e-12
 #: ωH up to which a mode is called resolved: 2π steps a period.
 RESOLVED = 1.0
-#: The search for a critical macro step begins here, in units of 1/(highest frequency), and goes up by this factor.
-_SEARCH = 1e-3, 2.0
+#: The search for a critical macro step begins here, in units of 1/(rate of the contact).
+_SEARCH = 1e-2
 
 
 def predict(scene: Scene) -> dict[str, Any]:
@@ -60,14 +54,16 @@ def predict(scene: Scene) -> dict[str, Any]:
 
         * ``estimates``: what the scene is, by hand calculation, see `_estimates`; ``frequencies``: the lowest three of
           the beam's mesh [Hz];
-        * ``macro_step``: H [s]; ``threshold`` of the spectral radius above 1, from which on a coupling is unstable;
+        * ``macro_step``: H [s];
         * ``omega_1``, ``omega_max``: lowest and highest frequency kept of the beam; ``spring_frequency`` of the
           linearised spring, 0 where it does not oscillate; ``contact_frequency`` of tip and spring top on the
           linearised contact law [rad/s];
         * ``tip_mass`` [kg]; ``impedance`` Z = √(KAG ρA) [N·s/m];
         * ``modes`` of the beam, ``resolved_modes`` among them, with ωH ≤ `RESOLVED`, and ``static_shapes`` that are
           kept beside them where not all modes are;
-        * ``schemes``: a row each, with ``spectral_radius`` at H and ``critical_step``, the smallest unstable H [s];
+        * ``exchange``: of a scheme that can be unstable, ``scheme``, ``degree``, ``spectral_radius`` at H,
+          ``critical_step``, the smallest unstable H [s], and ``threshold`` of the spectral radius above 1, from which
+          on it is unstable;
         * ``notes``.
     """
     H, beam, modal, pair = scene.coupling.H, scene.beam, None, None
@@ -76,10 +72,9 @@ def predict(scene: Scene) -> dict[str, Any]:
         "estimates": _estimates(scene),
         "frequencies": [],
         "macro_step": H,
-        "threshold": THRESHOLD,
         "spring_frequency": None if scene.spring is None else spring_frequency(scene),
         "impedance": None if beam is None else math.sqrt(shear_stiffness(beam) * beam.density * beam.area),
-        "schemes": [],
+        "exchange": None,
     } | dict.fromkeys(names)
     notes = suspicions(scene)
     notes += [f"[{table}] is not our own body: its frequencies are not known beforehand" for table in scene.partners]
@@ -105,12 +100,16 @@ def predict(scene: Scene) -> dict[str, Any]:
         pair = linear_pair(scene, modal)
     if pair is not None:
         found["contact_frequency"] = pair.contact_frequency if pair.soft else None
-        found["schemes"] = [
-            {"scheme": scheme, "degree": degree, "spectral_radius": spectral_radius(pair, scheme, degree, H),
-             "critical_step": critical_step(pair, scheme, degree)}
-            for scheme, degree in (SOFT if pair.soft else RIGID)
-            if beam is None or beam.integrator == "modal" or degree == 0
-        ]  # fmt: skip
+        scheme, degree = scene.coupling.scheme, scene.degree
+        # The scheme energy changes no energy at any H: there is nothing to ask.
+        if scheme in ORDINARY_SCHEMES:
+            found["exchange"] = {
+                "scheme": scheme,
+                "degree": degree,
+                "spectral_radius": spectral_radius(pair, scheme, degree, H),
+                "critical_step": critical_step(pair, scheme, degree),
+                "threshold": THRESHOLD,
+            }
     elif not notes:
         notes.append("nothing to couple: a scene with one body and no stop under its tip")
     notes += [
@@ -180,32 +179,29 @@ def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
 # -- critical steps -------------------------------------------------------------------------------------------------
 
 
-def _frequencies(pair: LinearPair) -> tuple[float, float]:
-    """Return the highest and lowest frequency of the pair [rad/s], of bodies and contact law."""
-    omega = np.sqrt(np.abs(np.concatenate([pair.beam.omega2, pair.spring.omega2])))
-    highest, lowest = float(omega.max()), float(omega[omega > 0.0].min())
-    return max(highest, pair.contact_frequency), lowest
-
-
 def critical_step(pair: LinearPair, scheme: str, degree: int, threshold: float = THRESHOLD) -> float | None:
     """Return the smallest H [s] with a spectral radius above 1 + ``threshold``, to 1e-3 of itself; None without one.
 
-    Searched upwards by factors of 2 from 1e-3/ω_max on, until the slowest mode turns 10 rad in a step. Not for
-    ``energy``, which changes no energy at any H.
+    Of an exchange. What it adds to a step is of the order of (r H)², r the rate of the contact law on both ends: the
+    search begins where that is 1e-4, and goes up by factors of 2 until the slowest mode turns 10 rad.
     """
-    if scheme == "energy":
-        return None
-    start, factor = _SEARCH
-    fast, slow = _frequencies(pair)
+    rates = np.sqrt(np.abs(np.concatenate([pair.beam.omega2, pair.spring.omega2])))
+    slowest = float(rates[rates > 0.0].min())
 
     def excess(size: float) -> float:
         return spectral_radius(pair, scheme, degree, size) - 1.0 - threshold
 
-    H = start / fast
-    while H * slow <= 10.0:
-        if excess(H) > 0.0:
-            return float(brentq(excess, H / factor, H, xtol=1e-6 * H, rtol=4e-4)) * 1.0005  # where it is unstable
-        H *= factor
+    H = _SEARCH / pair.contact_rate
+    while excess(H) > 0.0:
+        H *= 0.5
+    while H * slowest <= 10.0:
+        if excess(2.0 * H) > 0.0:
+            stable, unstable = H, 2.0 * H
+            while unstable - stable > 1e-3 * stable:
+                middle = 0.5 * (stable + unstable)
+                stable, unstable = (stable, middle) if excess(middle) > 0.0 else (middle, unstable)
+            return unstable
+        H *= 2.0
     return None
 
 
@@ -225,6 +221,8 @@ def impulse_integrals(omega2: np.ndarray, c: np.ndarray, h: float) -> np.ndarray
     (7, r) array
         Row j + 1 is S_j [s^{j+1}].
     """
+    from ...monolithic.oscillators import GAUSS, Oscillators  # a second to load: only for exchanges
+
     at_end = Oscillators(omega2, c).weights(h, slice(-1, None))
     forces = [(h * GAUSS.nodes) ** j / math.factorial(j) for j in range(5)]
     return np.vstack([at_end.S_dot, at_end.S, forces @ at_end.force[0]])
@@ -256,15 +254,14 @@ class LinearBody:
         """Return the exact step over ``h`` [s] as matrices.
 
         The first two give the state (ξ, ξ̇) at its end from that at its start, (2r, 2r), and from F, Ḟ, F̈ there,
-        (2r, 3); the others give the `Motion` at its end from these, (4, 2r) and (4, 3).
+        (2r, 3); the others give displacement and velocity of the interface at its end from these, (2, 2r) and (2, 3).
         """
         S = impulse_integrals(self.omega2, self.c, h)
-        parts = [(S[k] + self.c * S[k + 1], S[k + 1], S[k + 2 : k + 5]) for k in (0, 1, 2)]  # of ξ, ∫ξ, ∫∫ξ
-        parts.insert(1, (-self.omega2 * S[1], S[0], S[1:4]))  # of ξ̇
+        parts = [(S[0] + self.c * S[1], S[1], S[2:5]), (-self.omega2 * S[1], S[0], S[1:4])]  # of ξ, of ξ̇
         of_state = [np.hstack([np.diag(place), np.diag(rate)]) for place, rate, _ in parts]
         of_force = [(self.b * forced).T for _, _, forced in parts]
         motion, pushed = (np.array([self.b @ row for row in rows]) for rows in (of_state, of_force))
-        return np.vstack(of_state[:2]), np.vstack(of_force[:2]), motion, pushed
+        return np.vstack(of_state), np.vstack(of_force), motion, pushed
 
 
 @dataclass(frozen=True)
@@ -286,47 +283,28 @@ class LinearPair:
         """Return √(k (1/m_tip + 1/m)) of a soft law [rad/s], 0 of a tie."""
         return math.sqrt(self.stiffness * (1.0 / self.beam.mass + 1.0 / self.spring.mass)) if self.soft else 0.0
 
+    @property
+    def contact_rate(self) -> float:
+        """Return the larger of the frequency and of what the damping of a soft law takes, c (1/m_tip + 1/m) [1/s]."""
+        return max(self.contact_frequency, self.damping * (1.0 / self.beam.mass + 1.0 / self.spring.mass))
+
 
 def amplification(pair: LinearPair, scheme: str, degree: int, h: float) -> np.ndarray:
-    """Return the matrix of one macro step of size ``h`` [s], for states (ξ, ξ̇) of the beam, then of the spring."""
-    (A, of_C, u, u_of_C), (B, of_force, y, y_of_force) = pair.beam.step(h), pair.spring.step(h)
+    """Return the matrix of one macro step of size ``h`` [s], for states (ξ, ξ̇) of the beam, then of the spring.
+
+    Of an exchange, which has a soft law.
+    """
+    (A, of_C, u, u_of_C), (B, of_force, y, _) = pair.beam.step(h), pair.spring.step(h)
     ends = block_diag(*(np.kron(np.eye(2), body.b) for body in (pair.beam, pair.spring)))  # u, v, y, z at the start
     p, rate = ends[2:] - ends[:2]
-    moved = np.hstack([-u, y])  # what C = 0 does to the `Motion` of y − u
-    exchanged = scheme in ("jacobi", "gauss_seidel")
-    C = other = np.zeros((3, len(p)))  # C, Ċ, C̈ at the start, on the beam and on the spring
-    if exchanged:
-        C = other = np.array([pair.stiffness * p + pair.damping * rate, degree * pair.stiffness * rate, 0.0 * p])
+    # C, Ċ, C̈ at the start, on the beam and on the spring
+    C = other = np.array([pair.stiffness * p + pair.damping * rate, degree * pair.stiffness * rate, 0.0 * p])
     if scheme == "gauss_seidel":  # as `coupling.exchange.Exchange`
         tip = np.hstack([u, 0.0 * y]) + u_of_C @ C
         expected = ends[2] + degree * h * ends[3]
         at_end = pair.stiffness * (expected - tip[0]) + pair.damping * (ends[3] - tip[1])
         other = np.array([C[0], (at_end - C[0]) / h, 0.0 * p] if degree else [at_end, 0.0 * p, 0.0 * p])
-    if not exchanged:
-        C = other = _solved(pair, degree, h, moved, u_of_C + y_of_force, p)
     return np.asarray(block_diag(A, B) + np.vstack([of_C @ C, -of_force @ other]))
-
-
-def _solved(
-    pair: LinearPair, degree: int, h: float, moved: np.ndarray, by_force: np.ndarray, p: np.ndarray
-) -> np.ndarray:
-    """Return C, Ċ, C̈ of a step by ``energy``, in closed form what the solvers of `coupling` find.
-
-    Of a soft law C has the first Legendre coefficients of k p̃ + c p̃′. Of a tie, its limit for k → ∞, the numbers that
-    p̃ is made of are zero. ``moved`` less ``by_force`` @ (C, Ċ, C̈) is the `Motion` of y − u, ``p`` that at the start.
-    """
-    n = degree + 1
-    own, from_numbers, from_start = np.zeros((n, n)), np.eye(n), np.zeros(n)
-    if pair.soft:
-        law = pair.stiffness * np.eye(n, n + 1) + pair.damping * 2.0 / h * legendre.legder(np.eye(n + 1))
-        own = np.eye(n)
-        from_numbers = law @ np.transpose([penetration_series(0.0, unit) for unit in own.tolist()])
-        from_start = law @ penetration_series(1.0, [0.0] * n)
-    condition = CONDITIONS[degree]
-    numbers = from_numbers @ np.array([condition(Motion(*unit), h) for unit in np.eye(4)]).T
-    derivatives = np.transpose([force.derivatives(row, h) for row in np.eye(n).tolist()])
-    coefficients = np.linalg.solve(own + numbers @ by_force @ derivatives, numbers @ moved + np.outer(from_start, p))
-    return np.asarray(derivatives @ coefficients)
 
 
 def spectral_radius(pair: LinearPair, scheme: str, degree: int, h: float) -> float:
