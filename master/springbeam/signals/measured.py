@@ -19,9 +19,11 @@ from ..scene.recorded import Reading, Recorded
 from .curves import check, signal
 
 #: Most steps of a correlation, and fewest in the run.
-_MOST, _FEWEST = 200_000, 2_000
+_MOST = 200_000
+_FEWEST = 2_000
 #: Peaks of a correlation that are refined, and steps by Newton's method after that.
-_PEAKS, _NEWTON = 6, 2
+_PEAKS = 6
+_NEWTON = 2
 #: Mean square over the spread that is none.
 _ALIKE = 1e-12
 #: Half of the difference that gives a derivative by time, as a share of the run.
@@ -159,7 +161,8 @@ def aligned(run: Trajectory, measured: Measured, lowest: float = -math.inf, high
         found, step = _correlated(run, measured, lowest, highest)
         moved = found[0][0]
         others = found[1:]
-        lowest, highest = max(moved - step, lowest), min(moved + step, highest)
+        lowest = max(moved - step, lowest)
+        highest = min(moved + step, highest)
         for _ in range(_NEWTON):
             here = at_shift(run, measured, moved)
             off, slope = (weighed(part, measured) for part in (here.off, here.slope))
@@ -177,14 +180,18 @@ def weighed(curves: Mapping[str, np.ndarray], measured: Measured) -> np.ndarray:
 
 def at_shift(run: Trajectory, measured: Measured, shift: float) -> Aligned:
     """Return ``run`` beside the measurement whose clock is moved by ``shift`` [s]."""
-    begin, end = float(run.time[0]), float(run.time[-1])
+    begin = float(run.time[0])
+    end = float(run.time[-1])
     covered = measured.covered(run, shift)
-    times, half = measured.time[covered] + shift, _DIFFERENCE * (end - begin)
+    times = measured.time[covered] + shift
+    half = _DIFFERENCE * (end - begin)
     before, after = np.clip([times - half, times + half], begin, end)
     here, earlier, later = (rows_at(run, several) for several in (times, before, after))
-    off, slope = {}, {}
+    off = {}
+    slope = {}
     for what, values in measured.values.items():
-        off[what], slope[what] = np.full_like(values, np.nan), np.zeros_like(values)
+        off[what] = np.full_like(values, np.nan)
+        slope[what] = np.zeros_like(values)
         off[what][covered] = signal(here, what) - values[covered]
         slope[what][covered] = (signal(later, what) - signal(earlier, what)) / (after - before)
     return Aligned(shift, off, slope, [])
@@ -197,8 +204,10 @@ def _correlated(
 
     Between steps they are found by splines.
     """
-    begin, end = float(run.time[0]), float(run.time[-1])
-    first, last = float(measured.time[0]), float(measured.time[-1])
+    begin = float(run.time[0])
+    end = float(run.time[-1])
+    first = float(measured.time[0])
+    last = float(measured.time[-1])
     finest = (end - begin + last - first) / _MOST
     step = max(min(float(np.median(np.diff(measured.time))), (end - begin) / _FEWEST), finest)
     times = begin + step * np.arange(int((end - begin) / step) + 1)
@@ -206,11 +215,14 @@ def _correlated(
     curves = {what: signal(found, what) for what in measured.values}
     # Each point of the measurement stands at the nearest step.
     cells = np.rint((measured.time - first) / step).astype(int)
-    one, points = np.ones(len(times)), np.bincount(cells).astype(float)
+    one = np.ones(len(times))
+    points = np.bincount(cells).astype(float)
     number = np.rint(correlated(one, points))
     total = np.zeros(len(number))
     for what, values in measured.values.items():
-        a, sums, squares = curves[what], np.bincount(cells, values), np.bincount(cells, values**2)
+        a = curves[what]
+        sums = np.bincount(cells, values)
+        squares = np.bincount(cells, values**2)
         square = correlated(a**2, points) - 2.0 * correlated(a, sums) + correlated(one, squares)
         total += square / measured.spread(what) ** 2
     shifts = begin - first + step * (np.arange(len(number)) - len(points) + 1.0)

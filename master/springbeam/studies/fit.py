@@ -30,22 +30,27 @@ from .least import SHIFT, Minimum, Search
 from .study import Records, Study
 from .tables import Findings, Row, table
 
-_DISAGREES, _STOPPED = 1, 3
+_DISAGREES = 1
+_STOPPED = 3
 #: The range of a key goes from its guess over this to its guess times this.
 _RANGE = 3.0
 #: Runs all over the range, and searches from the best of them; the second time if what is left is no noise.
-_STARTS, _LOOKS = (16, 64), (2, 4)
+_STARTS = (16, 64)
+_LOOKS = (2, 4)
 #: Runs of a first look by a search, beside its first derivatives, and of the search that goes on.
-_FIRST_LOOK, _MOST = 5, 40
+_FIRST_LOOK = 5
+_MOST = 40
 #: A search that ends at a cost so many times that of the best one goes on as well.
 _RIVAL = 4.0
 _CONFIDENCE = 0.95
 #: Chance that what is called no noise is noise.
 _CHANCE = 1e-3
 #: Lags of the autocorrelation that are judged, and the fewest points of which they can be.
-_LAGS, _FEWEST = 20, 12
+_LAGS = 20
+_FEWEST = 12
 #: What is left of a curve, over its spread: no more than this is no error of the run, no less than that is no fit.
-_EXACT, _APART = 1e-4, 0.5
+_EXACT = 1e-4
+_APART = 0.5
 #: Share of the run within which shifts of the clock belong together.
 _NEAR = 0.01
 #: Unknowns are alike that differ by no more, relative to the keys.
@@ -222,8 +227,10 @@ class Fit(Study):
         """Return the runs with which the search begins. Raises SceneError if nothing can be found."""
         cases = [self._values(start) for start in self._starts()[: _STARTS[0]]]
         with_keys(self.scene, cases[0])
-        data, free = self.data, self.shift is None
-        begin, end = self.scene.contact_time or 0.0, self.scene.time.t_end
+        data = self.data
+        free = self.shift is None
+        begin = self.scene.contact_time or 0.0
+        end = self.scene.time.t_end
         inside = int(np.sum((data.time + (self.shift or 0.0) >= begin) & (data.time + (self.shift or 0.0) <= end)))
         if free:
             last = np.searchsorted(data.time, data.time + (end - begin), side="right")

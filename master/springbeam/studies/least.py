@@ -25,11 +25,15 @@ _MARGIN = 0.02
 #: Residual of a run that cannot be made, so that a search turns back.
 _REFUSED = 1e3
 #: Differences of the unknowns that give the first derivatives of a search, and those where it ends.
-_COARSE, _FINE = 1e-3, 1e-4
+_COARSE = 1e-3
+_FINE = 1e-4
 #: Where a search by secants ends: relative change of the cost, and change of the unknowns.
-_COST, _STEP = 1e-5, 1e-7
+_COST = 1e-5
+_STEP = 1e-7
 #: Steps by Newton's method after that, at most, and the share of an interval, or the change, that is small enough.
-_ROUNDS, _SHARE, _LEAST = 5, 0.1, 1e-9
+_ROUNDS = 5
+_SHARE = 0.1
+_LEAST = 1e-9
 #: A combination of unknowns that changes the curves less than this, beside the others, is not determined by them.
 _UNDETERMINED = 1e-5
 
@@ -156,7 +160,8 @@ class Search:
 
     def _differences(self, at: np.ndarray, size: float, sides: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
         """Return derivatives of the residual, and of the shift eliminated in it, by differences to some sides."""
-        columns, moved = [], []
+        columns = []
+        moved = []
         for unit in np.eye(len(at)):
             tried = [side for side in sides if not self._run(at + side * size * unit)["error"]]
             tried = tried or [side for side in (-1.0,) if not self._run(at + side * size * unit)["error"]]
@@ -189,14 +194,16 @@ class Search:
         found = least_squares(
             self._residual, self.at, derivatives, self._limits, ftol=_COST, xtol=_STEP, gtol=None, max_nfev=most
         )
-        row, weights = self._run(found.x), self._weights
+        row = self._run(found.x)
+        weights = self._weights
         return Search(self._trial, self._data, self._limits, found.x, row, free=self._free, weights=weights)
 
     def ended(self) -> Minimum:
         """Return the minimum, after last steps by Newton's method with derivatives that hold there."""
         at = ahead = self.at
         for _ in range(_ROUNDS):
-            left, (slopes, moved) = self._residual(at), self._differences(at, _FINE, (1.0, -1.0))
+            left = self._residual(at)
+            (slopes, moved) = self._differences(at, _FINE, (1.0, -1.0))
             step, _, _, sizes = np.linalg.lstsq(slopes, -left, _UNDETERMINED)
             variance = float(left @ left) / max(len(left) - len(at) - self._free, 1)
             deviation = np.sqrt(variance) / max(float(sizes.min()), 1e-300)

@@ -66,7 +66,10 @@ def predict(scene: Scene) -> dict[str, Any]:
           on it is unstable;
         * ``notes``.
     """
-    H, beam, modal, pair = scene.coupling.H, scene.beam, None, None
+    H = scene.coupling.H
+    beam = scene.beam
+    modal = None
+    pair = None
     names = ("omega_1", "omega_max", "tip_mass", "resolved_modes", "modes", "static_shapes", "contact_frequency")
     found: dict[str, Any] = {
         "estimates": _estimates(scene),
@@ -85,8 +88,10 @@ def predict(scene: Scene) -> dict[str, Any]:
         notes.append("a quasi-static beam has no inertia and no step of its own: nothing to predict")
     elif beam is not None:
         reduced = _reduced(beam)
-        modal, kept = modal_beam(reduced), reduced.modes_kept
-        resolved, frequencies = int(np.sum(modal.omega[:kept] * H <= RESOLVED)), modal.omega / (2.0 * math.pi)
+        modal = modal_beam(reduced)
+        kept = reduced.modes_kept
+        resolved = int(np.sum(modal.omega[:kept] * H <= RESOLVED))
+        frequencies = modal.omega / (2.0 * math.pi)
         ends = (float(modal.omega[0]), float(modal.omega[-1]), 1.0 / modal.inverse_tip_mass)
         found |= dict(zip(names, (*ends, resolved, kept, len(modal.omega) - kept), strict=False))
         found["frequencies"] = frequencies[:3].tolist()
@@ -100,7 +105,8 @@ def predict(scene: Scene) -> dict[str, Any]:
         pair = linear_pair(scene, modal)
     if pair is not None:
         found["contact_frequency"] = pair.contact_frequency if pair.soft else None
-        scheme, degree = scene.coupling.scheme, scene.degree
+        scheme = scene.coupling.scheme
+        degree = scene.degree
         # The scheme energy changes no energy at any H: there is nothing to ask.
         if scheme in ORDINARY_SCHEMES:
             found["exchange"] = {
@@ -127,7 +133,8 @@ def _estimates(scene: Scene) -> dict[str, float | None]:
     [N/m], ``locking`` the static stiffness of the mesh over that of the beam; ``contact_time`` is that of the first
     contact of an undeformed approach [s], ``contact_duration`` half a period of spring and beam together [s].
     """
-    beam, spring = scene.beam, scene.spring
+    beam = scene.beam
+    spring = scene.spring
     duration = None
     if beam is not None and spring is not None and not scene.contact.lasting:
         stiffness = spring.linear_stiffness + 1.0 / tip_compliance(beam)
@@ -196,7 +203,8 @@ def critical_step(pair: LinearPair, scheme: str, degree: int, threshold: float =
         H *= 0.5
     while H * slowest <= 10.0:
         if excess(2.0 * H) > 0.0:
-            stable, unstable = H, 2.0 * H
+            stable = H
+            unstable = 2.0 * H
             while unstable - stable > 1e-3 * stable:
                 middle = 0.5 * (stable + unstable)
                 stable, unstable = (stable, middle) if excess(middle) > 0.0 else (middle, unstable)
@@ -294,7 +302,8 @@ def amplification(pair: LinearPair, scheme: str, degree: int, h: float) -> np.nd
 
     Of an exchange, which has a soft law.
     """
-    (A, of_C, u, u_of_C), (B, of_force, y, _) = pair.beam.step(h), pair.spring.step(h)
+    (A, of_C, u, u_of_C) = pair.beam.step(h)
+    (B, of_force, y, _) = pair.spring.step(h)
     ends = block_diag(*(np.kron(np.eye(2), body.b) for body in (pair.beam, pair.spring)))  # u, v, y, z at the start
     p, rate = ends[2:] - ends[:2]
     # C, Ċ, C̈ at the start, on the beam and on the spring
