@@ -126,7 +126,19 @@ set_up_system() {
   [ ${#missing[@]} = 0 ] || install_packages "libraries are" "${missing[@]}"
 }
 
+# progress — says every ten seconds what was done last.
+progress() {
+  local last
+  while sleep 10 >/dev/null 2>&1 9<&-; do
+    last=$(tail -n 1 build/ninja.log 2>/dev/null | cut -c 1-100) || true
+    say "$SECONDS s: ${last:-before compiling}"
+  done
+}
+
+# build PACKAGES TARGET… — with the Python packages to use it (run) or to test it, too (dev).
 build() {
+  local packages=$1
+  shift
   # One at a time: two would build into the same folder.
   exec 9<.
   command -v flock >/dev/null && { flock -n 9 || { say "waiting for another build"; flock 9; }; }
@@ -134,8 +146,12 @@ build() {
   # What the build takes comes first, FMPy for its headers; all else is installed while the compiler works, by a pip that
   # is not as slow as those that come with older versions of Python.
   install build --no-deps "pip>=25" cmake ninja fmpy
-  install dev -e ".[dev]" &
-  local configured packages=$!
+  if [ "$packages" = run ]; then install run -e . & else install dev -e ".[dev]" & fi
+  local configured installing=$!
+  rm -f build/ninja.log
+  progress &
+  local reporting=$!
+  trap 'kill '$reporting' 2>/dev/null || true' EXIT
   configured="$PWD ${SPRINGBEAM_PREFIX:-} ${CMAKE_PREFIX_PATH:-} ${CXX:-} $sundials"
   if [ "$(cat build/.configured 2>/dev/null)" != "$configured" ]; then
     rm -rf build
@@ -154,8 +170,13 @@ build() {
   # Once asked for, Windows is kept up to date with the rest.
   [ ! -f build/win64/beam.dll ] || { get_sundials && fmus/win64/build.sh build/win64 $python; }
   say "building"
-  $venv/bin/ninja -C build ${JOBS:+-j "$JOBS"} --quiet "$@" >&2 || die "the build stopped, see above"
-  wait $packages
+  $venv/bin/ninja -C build ${JOBS:+-j "$JOBS"} "$@" >build/ninja.log 2>&1 || {
+    cat build/ninja.log >&2
+    die "the build stopped, see above"
+  }
+  echo "all is compiled; Python packages are being installed" >>build/ninja.log
+  wait $installing
+  kill $reporting
   exec 9<&-
 }
 
@@ -163,12 +184,12 @@ command=${1:-help}
 [ $# = 0 ] || shift
 case $command in
   run)
-    build fmus
+    build run fmus
     [ $# -gt 0 ] || set -- soft
     exec $venv/bin/springbeam run "$@"
     ;;
   test)
-    build
+    build dev
     failed=
     say "C++ tests"
     $venv/bin/ctest --test-dir build --output-on-failure --parallel "${JOBS:-$(nproc)}" || failed="C++ tests"
@@ -177,7 +198,7 @@ case $command in
     [ -z "$failed" ] || die "failed: $failed"
     ;;
   kernels)
-    build
+    build dev
     # What numpy uses of this processor beyond what it needs.
     features=$($python -c 'from numpy._core._multiarray_umath import __cpu_dispatch__ as extra, __cpu_features__ as has
 print(*(name for name in extra if has[name]))')
@@ -198,7 +219,7 @@ print(*(name for name in extra if has[name]))')
     [ -z "$failed" ] || die "failed with:$failed"
     ;;
   win64)
-    build fmus
+    build run fmus
     get_sundials || true
     fmus/win64/build.sh build/win64 $python
     if ! command -v wine64 wine >/dev/null && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
@@ -206,30 +227,30 @@ print(*(name for name in extra if has[name]))')
       DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends wine64 wine >/dev/null 2>&1 ||
         say "Wine could not be installed: the Windows binaries will not be tested"
     fi
-    build fmus
+    build dev fmus
     ls -l fmus/*.fmu
     ;;
   interop)
-    build fmus
+    build dev fmus
     tests/interop/install.sh "$cache" "$python"
     SPRINGBEAM_CACHE=$cache exec $python -m pytest tests/interop "$@"
     ;;
   bench)
-    build fmus beam_bench spring_bench
+    build dev fmus beam_bench spring_bench
     exec $python tests/bench "$@"
     ;;
   campaign)
-    build fmus
+    build dev fmus
     exec $python tests/campaign "$@"
     ;;
   browser)
-    build fmus
+    build dev fmus
     set_up_python browser
     command -v "${CHROMIUM:-chromium}" chromium-browser google-chrome >/dev/null || install_packages "Chromium is" chromium
     exec $python -m pytest tests/browser "$@"
     ;;
   wheel)
-    build fmus
+    build dev fmus
     get_sundials || true
     $python -m pip install --quiet --disable-pip-version-check build wheel
     rm -rf dist
@@ -239,11 +260,11 @@ print(*(name for name in extra if has[name]))')
     SPRINGBEAM_WHEEL=$(echo "$PWD"/dist/*.whl) exec $python -m pytest tests/system/test_installation.py "$@"
     ;;
   fmus)
-    build fmus
+    build run fmus
     ls -l fmus/*.fmu fmus/*.ssp
     ;;
   fuzz)
-    build fuzz_beam fuzz_spring fuzz_beam3 fuzz_spring3
+    build dev fuzz_beam fuzz_spring fuzz_beam3 fuzz_spring3
     seed=${1:-$(date +%s)}
     failed=
     sanitized() { # NAME SANITIZERS: the fuzzers in build/NAME
@@ -272,7 +293,7 @@ print(*(name for name in extra if has[name]))')
     ;;
   lint)
     set_up_python lint
-    build beam spring
+    build dev beam spring
     failed=
     run() { "$@" || failed=1; }
     run $venv/bin/ruff check .

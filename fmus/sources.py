@@ -25,8 +25,11 @@ OPTIONAL = re.compile(
 # Of SUNDIALS: IDA, its vectors, matrices and solvers as far as the spring or IDA itself uses them.
 SUNDIALS_FOLDERS = ("ida", "sundials", "nvector/serial", "sunmatrix/dense", "sunmatrix/band", "sunlinsol/dense")
 SUNDIALS_FOLDERS += ("sunnonlinsol/newton",)
-# Fortran, MPI and other bindings; the profiler is only needed when asked for.
-SUNDIALS_WITHOUT = re.compile(r"^f|_(futils|xbraid|profiler|mpi_errors|bbdpre)\.c$")
+# Fortran, MPI and other bindings; the profiler is only needed when asked for. What finds consistent initial values, and
+# what other linear solvers take.
+SUNDIALS_WITHOUT = re.compile(
+    r"^f|_(futils|xbraid|profiler|mpi_errors|bbdpre)\.c$|^ida_(direct|ic|spils)\.c$|^sundials_(band|iterative)\.c$"
+)
 
 
 class Gathered:
