@@ -14,8 +14,9 @@ HEAD = """# Scene files
 A scene is a TOML file of tables; `springbeam new NAME` writes a commented one to start from. All values are SI, up is
 positive. A missing `[beam]`, `[spring]` or `[stop]` is a scene without it; a key with an empty default is optional. An
 invalid key or value is an error that names the key and the allowed values; a key that plays no part in the scene is
-named in a warning. Symbols are those of [model.md](model.md). (Made by `python docs/scene.py`; `springbeam keys` lists
-the same.)
+named in a warning. Where a table is one of several, the last column says which of them have a key; a change of the law
+or the signal by `--set` keeps the keys that the new one has too. Symbols are those of [model.md](model.md). (Made by
+`python docs/scene.py`; `springbeam keys` lists the same.)
 
 **Editors** complete and check keys by the JSON Schema [scene.schema.json](scene.schema.json), which
 `springbeam keys --schema` prints: with Taplo or Even Better TOML, the first line of a scene beside it is

@@ -109,6 +109,24 @@ def test_another_body_takes_the_place_of_all_keys_of_the_one_before():
     assert scene.lower.model_dump() == {"element": "rigid_wall", "position": -0.1}
 
 
+def test_a_change_of_the_law_or_of_a_signal_keeps_the_keys_that_the_new_one_has_too():
+    """λ and q of compliance are no keys of a tie, λ is one of a link; a key that is new and another's is refused."""
+    given = {"law": "compliance", "stiffness": 7.0, "exponent": 1.5, "damping": 0.25}
+    compliant = with_changes(load_scene("soft"), contact=given)
+    tied = with_changes(compliant, contact={"law": "tie"}).contact
+    linked = with_changes(compliant, contact={"law": "link"}).contact
+    assert tied.model_dump(exclude_none=True) == {"law": "tie"}
+    assert linked.model_dump(exclude_none=True) == {"law": "link", "stiffness": 7.0, "damping": 0.25}
+    with pytest.raises(
+        SceneError, match=r'exponent = 2.0: is for "transmission" or "compliance", this is law = "link"'
+    ):
+        with_changes(compliant, contact={"law": "link", "exponent": 2.0})
+    load = {"on": "spring", "signal": "harmonic", "frequency": 9.0, "start": 0.5, "duration": 1.0}
+    shaken = with_changes(compliant, loads=[load])
+    (ramp,) = with_changes(shaken, **{"loads.0": {"signal": "ramp"}}).loads
+    assert ramp.model_dump(exclude_unset=True) == {"on": "spring", "signal": "ramp", "start": 0.5, "duration": 1.0}
+
+
 def outcome(data):
     try:
         return scene_from_dict(data)

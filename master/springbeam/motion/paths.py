@@ -19,11 +19,13 @@ Sample = tuple[float, float]
 Means = tuple[float, float]
 
 #: Largest values in (0, 1) of s²(1 − s)² and of s²(1 − s)²(2s − 1).
-_EVEN, _ODD = 1.0 / 16.0, 0.0178885438
+_EVEN = 1.0 / 16.0
+_ODD = 0.0178885438
 #: By how much the last of the moments moves a path at most, over the size of its coefficient of s⁵, 2 odd: about the
 #: error of the path, where that is not small.
 LAST_MOMENT = 0.5 * _ODD
-EPS, _MAX_ITERATIONS = 2.0**-52, 100
+EPS = 2.0**-52
+_MAX_ITERATIONS = 100
 
 
 class Path(NamedTuple):
@@ -37,14 +39,22 @@ class Path(NamedTuple):
     @classmethod
     def through(cls, start: Sample, end: Sample, size: float, means: Means | None = None) -> Path:
         """Return the path from ``start`` to ``end`` in a step of ``size`` [s]; a cubic where its means are unknown."""
-        (f0, d0), (f1, d1), even, odd = start, end, 0.0, 0.0
-        d0, d1, rise = d0 * size, d1 * size, f1 - f0
+        f0, d0 = start
+        f1, d1 = end
+        even = 0.0
+        odd = 0.0
+        d0 = d0 * size
+        d1 = d1 * size
+        rise = f1 - f0
         if means is not None:
             beside = means[0] - 0.5 * (f0 + f1) - (d0 - d1) / 12.0
             twice = means[1] - (7.0 * f0 + 3.0 * f1) / 20.0 - (d0 / 20.0 - d1 / 30.0)
-            even, odd = 30.0 * beside, 210.0 * (beside - 2.0 * twice)
-        tilt, twist = even - odd, 2.0 * odd
-        a2, a3 = 3.0 * rise - 2.0 * d0 - d1 + tilt, d0 + d1 - 2.0 * rise - 2.0 * tilt + twist
+            even = 30.0 * beside
+            odd = 210.0 * (beside - 2.0 * twice)
+        tilt = even - odd
+        twist = 2.0 * odd
+        a2 = 3.0 * rise - 2.0 * d0 - d1 + tilt
+        a3 = d0 + d1 - 2.0 * rise - 2.0 * tilt + twist
         return cls((f0, d0, a2, a3, tilt - 2.0 * twist, twist), even, odd, size)
 
     @property
@@ -92,10 +102,13 @@ class Place(NamedTuple):
 
     def path_to(self, later: Place) -> Path:
         """Return the path from here to a ``later`` place."""
-        before, after, size = self.time, later.time, later.time - self.time
+        before = self.time
+        after = later.time
+        size = later.time - self.time
         means = None
         if self.means is not None and later.means is not None:
-            (mean, twice), (mean_after, twice_after) = self.means, later.means
+            mean, twice = self.means
+            mean_after, twice_after = later.means
             gained = after * mean_after - before * mean
             gained_twice = after**2 * twice_after - before**2 * twice - size * before * mean
             means = gained / size, gained_twice / size**2
@@ -131,7 +144,9 @@ def _zero(coefficients: Sequence[float], slopes: Sequence[float], below: float, 
     """Return the zero between places where a polynomial is below 0 and above it, by Newton's method and bisection."""
     x = 0.5 * (below + above)
     for _ in range(_MAX_ITERATIONS):
-        found, slope, before = value(coefficients, x), value(slopes, x), x
+        found = value(coefficients, x)
+        slope = value(slopes, x)
+        before = x
         below, above = (below, x) if found > 0.0 else (x, above)
         x = x - found / slope if slope else inf
         if not min(below, above) < x < max(below, above):

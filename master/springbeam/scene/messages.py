@@ -283,11 +283,12 @@ def at(scene: Scene, place: str) -> str:
 
 def filled(scene: Scene, text: str, **numbers: Any) -> str:
     """Return ``text`` with keys and their values in place of ``{table.key}``, and ``numbers`` of ``{name:format}``."""
-    return re.sub(
-        r"\{([\w.]+):?([^}]*)\}",
-        lambda found: at(scene, found[1]) if "." in found[1] else format(numbers[found[1]], found[2]),
-        text,
-    )
+
+    def value(found: re.Match[str]) -> str:
+        name, form = found.groups()
+        return at(scene, name) if "." in name else format(numbers[name], form)
+
+    return re.sub(r"\{([\w.]+):?([^}]*)\}", value, text)
 
 
 class Rule(NamedTuple):

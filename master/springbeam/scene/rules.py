@@ -344,7 +344,7 @@ FORBIDDEN: tuple[Rule, ...] = (
         lambda s: _given_step(s) and s.time.t_end < s.coupling.H,
         "{coupling.macro_step}{default}: must be at most {time.t_end}; give a smaller one, or an accuracy, which picks "
         "one",
-        lambda s: {"default": ", the default" if s.coupling.H == DEFAULT_STEP else ""},
+        lambda s: {"default": ", the default" * (s.coupling.H == DEFAULT_STEP)},
     ),
     Rule(
         lambda s: _given_step(s) and s.time.t_end / s.coupling.H > MOST_MACRO_STEPS,

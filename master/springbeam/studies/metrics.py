@@ -46,7 +46,10 @@ class Metric:
 
 
 def _end(column: str) -> Callable[[Trajectory], float | None]:
-    return lambda run: float(run[column][-1]) if column in run.columns else None
+    def of(run: Trajectory) -> float | None:
+        return float(run[column][-1]) if column in run.columns else None
+
+    return of
 
 
 def _extreme(column: str, pick: Callable[[Extremes], float]) -> Callable[[Trajectory], float | None]:
@@ -75,7 +78,10 @@ def _number(kind: EventKind) -> Callable[[Trajectory], float | None]:
 
 
 def _total(name: str) -> Callable[[Trajectory], float | None]:
-    return lambda run: float(run.summary[name]) if name in run.summary else None
+    def of(run: Trajectory) -> float | None:
+        return float(run.summary[name]) if name in run.summary else None
+
+    return of
 
 
 def _settled(column: str) -> Callable[[Trajectory], float | None]:
