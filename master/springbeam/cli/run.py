@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 #: Most rows that --output-interval may ask for.
 _MOST_ROWS = 10_000_000
 _REFRESH_SECONDS = 0.1
-#: Events and cascades that the table shows; more are in events.csv.
-_FIRST_LINES = 24
+#: Events and cascades of a kind that the table shows; others of this kind are one line, and all are in events.csv.
+_FIRST_OF_KIND = 8
 
 
 def run(
@@ -241,7 +241,10 @@ def picked_in_words(accuracy: Mapping[str, Any]) -> str:
 
 
 def _event_table(events: list[Event], scene: Scene) -> Table:
-    """Return the events as a table; of a cascade the first one, and the sums over the others."""
+    """Return the events as a table; of a cascade the first one, and the sums over the others.
+
+    Of many events of a kind, the sums over all but the first stand below: they push out no events of other kinds.
+    """
     from ..results.trajectory import cascades, rounded
 
     position, speed = ("u_tip", "v_tip") if scene.lower is None else ("y", "z")
@@ -251,15 +254,20 @@ def _event_table(events: list[Event], scene: Scene) -> Table:
     )
     scales = {name: max(abs(getattr(event, name) or 0.0) for event in events) for name in (position, speed)}
     rows: list[tuple[Any, ...]] = []
-    folded = list(cascades(events))
-    for first, *others in folded[:_FIRST_LINES]:
+    shown = Counter[str]()
+    hidden: dict[str, list[Event]] = {}
+    for first, *others in cascades(events):
+        shown[first.kind] += 1
+        if shown[first.kind] > _FIRST_OF_KIND:
+            hidden.setdefault(first.kind, []).extend([first, *others])
+            continue
         places = (getattr(first, name) for name in scales)
         moves = ("" if x is None else rounded(x, scale) for x, scale in zip(places, scales.values(), strict=True))
         rows.append((first.kind, first.time, *moves, *_sums([first])))
         if others:
             rows.append((f"+{len(others)}, until", others[-1].time, None, None, *_sums(others)))
-    if more := sum(map(len, folded[_FIRST_LINES:])):
-        rows.append(("⋮", f"{more} more", *[None] * 5))
+    for kind, some in hidden.items():
+        rows.append((f"+{len(some)} {kind}, until", some[-1].time, None, None, *_sums(some)))
     return table(columns, rows)
 
 

@@ -115,7 +115,7 @@ IMPULSES = {
     "impulse_foundation": Look(BLACK, "of the foundation", marker=Marker("▲", "^", "triangle-up", 3.0)),
 }
 LEVELS = {
-    "Ψ": Look(BLACK, "rest of the spring Ψ", Line(0.8, dashed=True)),
+    "Ψ": Look(BLACK, "start of the spring Ψ", Line(0.8, dashed=True)),
     "φ": Look(BLACK, "foundation φ", Line(1.3)),
 }
 #: Columns of pixels of a time axis, roughly; more points than a few per column cannot be seen.
@@ -259,7 +259,7 @@ def time_unit(trajectory: Trajectory) -> Unit:
 
 
 def near_levels(scene: Scene, moving: Sequence[np.ndarray]) -> dict[str, float]:
-    """Return the heights [m] of the spring's rest Ψ and the foundation φ, of those within 1.5 times the range of the
+    """Return the heights [m] of the spring's start Ψ and the foundation φ, of those within 1.5 times the range of the
     motion [m]."""
     heights = {}
     if scene.spring is not None:
