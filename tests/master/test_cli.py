@@ -15,6 +15,8 @@ from runs import block
 
 import springbeam.run.runner
 from springbeam import Event, RunStopped, load_scene, with_changes
+from springbeam.cli.run import _event_table
+from springbeam.motion.events import EventKind
 from springbeam.results.directory import PICTURES
 from springbeam.results.files import load_trajectory
 from springbeam.results.totals import totals
@@ -178,3 +180,20 @@ def test_peaks_are_compared_over_one_window():
     assert found["contact_force_max [N]"] == [pytest.approx(own[1], rel=1e-14)] * 2
     runs[0].steps = None
     assert results_of(runs)["contact_force_max [N]"] == [None, own[1]]
+
+
+def test_many_events_of_a_kind_push_out_no_others():
+    """Ninety-five strokes on the stop, and a contact that opens before the last one: all are in the table."""
+    bounces = [
+        Event(time, kind, 0.0, 0.0, impulse_foundation=1.0)
+        for stroke in range(95)
+        for time, kind in ((float(stroke), EventKind.STOP_IMPACT), (stroke + 0.5, EventKind.UNSEATED))
+    ]
+    events = [*bounces[:-1], Event(94.1, EventKind.SEPARATION, 0.0, 0.0), bounces[-1]]
+    table = _event_table(events, load_scene("soft"))
+    columns = [list(column.cells) for column in table.columns]
+    kinds = [str(cell) for cell in columns[0]]
+    assert kinds.count("stop_impact") == kinds.count("unseated") == 8
+    assert kinds[-3:] == ["separation", "+87 stop_impact, until", "+87 unseated, until"]
+    assert [str(cell) for cell in columns[1]][-2:] == ["94.00000000", "94.50000000"]
+    assert [str(cell) for cell in columns[5]][-2:] == ["87", "87"]
