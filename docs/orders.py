@@ -1,6 +1,7 @@
 """Errors in the macro step on `soft`, before any event and through three:  .venv/bin/python docs/orders.py   (a minute)
 
-Writes two tables and the picture of docs/measured.md, "Orders".
+Writes two tables and the picture of docs/measured.md, "Orders", and a table of docs/coupling.md, "One velocity and one
+force".
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from pages import IMAGES, shrink, table, write_section  # beside this script
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
+from springbeam.results.steps import force
 
 DEGREES = (0, 1, 2)
 STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
@@ -24,6 +26,8 @@ PHASES = {
     "touch after second meeting": (0.2750, 0.3190),
 }
 APART = 5e-3
+#: Degrees and macro steps [s] of the errors of joined ends, and the macro step of what they are compared with.
+JOINED, FINE = ((0, 1e-3), (0, 2.5e-4), (2, 4e-3), (2, 1e-3), (2, 5e-4)), 2.5e-5
 #: Below are rounding and the tolerance of IDA: of y [m], of v_tip [m/s].
 ROUNDING = 1e-13, 1e-10
 
@@ -73,6 +77,22 @@ def late() -> list[list[str]]:
     return found
 
 
+def joined() -> list[list[str]]:
+    """Return rms errors at the rows from 5 ms to the foundation: velocities [m/s], then forces [N]."""
+    soft = with_changes(load_scene("soft"), time={"t_end": PHASES["tied, before any event"][1]})
+    fine = simulate(with_changes(soft, coupling={"degree": 2, "macro_step": FINE}))
+    found = []
+    for degree, H in JOINED:
+        run = simulate(with_changes(soft, coupling={"degree": degree, "macro_step": H}))
+        rows = (run.time > APART) & (run.time < soft.time.t_end - FINE)
+        steps, exact = run.steps[rows], fine.at(run.time[rows])
+        of_ends = steps["v_tip"], run.v_tip[rows], force(steps, steps["size"]), run.contact_force[rows]
+        beside = exact.v_tip, exact.v_tip, exact.contact_force, exact.contact_force
+        off = [np.sqrt(np.mean((a - b) ** 2)) for a, b in zip(of_ends, beside, strict=True)]
+        found.append([f"{degree}, {H:g}", *(f"{error:.0e}" for error in off)])
+    return found
+
+
 def picture(errors: dict[int, np.ndarray]) -> None:
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), sharey=True, layout="constrained")
     for ax, phase in zip(axes, ("tied, before any event", "touch after second meeting"), strict=True):
@@ -97,6 +117,8 @@ def main() -> None:
     write_section("measured.md", "orders", table(head, rows(errors)))
     head = ["degree", "H [s]", "foundation impact [s]", "release [s]", "second meeting [s]", "energy residual"]
     write_section("measured.md", "events", table(head, late()))
+    head = ["degree, H [s]", "v_tip alone [m/s]", "common velocity", "end of the polynomial [N]", "multiplier"]
+    write_section("coupling.md", "joined", table(head, joined()))
 
 
 if __name__ == "__main__":
