@@ -15,6 +15,7 @@ from springbeam.results.recording import MemoryRecorder
 from springbeam.run import accuracy as search
 from springbeam.run.accuracy import simulate
 from springbeam.run.runner import run
+from springbeam.scene import as_scene
 from springbeam.scene.files import tomllib
 from springbeam.studies.crosscheck import orders
 from springbeam.studies.stability.judge import ERRORS, Reference, judge
@@ -101,6 +102,31 @@ def test_runs_differ_by_the_largest_of_their_motion_and_by_their_peak_force():
     ways = {name: np.abs(fine[name] - fine[name][0]).max() for name in ("u_tip", "y")}
     apart = max(np.abs(ends[0][name] - ends[1][name]).max() / way for name, way in ways.items())
     assert found["motion"] == pytest.approx(apart, rel=0.05)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.2, 0.3, 0.5, 1.0, 3.0])
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0, 3.0])
+def test_two_runs_and_the_law_show_how_wrong_a_peak_force_is(exponent, share):
+    """A mass of 2 kg falls on a soft stop, in steps of which the window of its peak force is a ``share``."""
+    mass, stiffness = 2.0, 1e6
+    deep = (0.5 * mass * (exponent + 1.0) / stiffness) ** (1.0 / (exponent + 1.0))  # at 1 m/s
+    omega = np.sqrt(exponent * stiffness * deep ** (exponent - 1.0) / mass)
+    H = 0.02 * 2.0 * np.pi / omega / share
+    scene = as_scene(
+        {
+            "time": {"t_end": 1.3 * H + 4.0 / omega},
+            "beam": {"element": "point_mass", "mass": mass, "displacement": 1.3 * H, "velocity": -1.0},
+            "stop": {"position": 0.0},
+            "contact": {"law": "compliance", "stiffness": stiffness, "exponent": exponent},
+        }
+    )
+    fine = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": H / 16.0})).summary["contact_force_max"]
+    for degree in (0, 1, 2):
+        twice, run = (
+            simulate(with_changes(scene, coupling={"degree": degree, "macro_step": size})) for size in (2.0 * H, H)
+        )
+        wrong = abs(run.summary["contact_force_max"] / fine - 1.0)
+        assert wrong < max(3.0 * search._estimated(twice, run, 1e-3, {})[1]["force"], 1e-6)
 
 
 @pytest.mark.parametrize("name", FOUND["alone"])

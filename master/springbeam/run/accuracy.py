@@ -13,8 +13,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..bodies.factory import load_bodies
 from ..bodies.protocol import Body
+from ..results.dense import at
 from ..results.distance import distance
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, as_scene, with_changes
@@ -34,6 +37,8 @@ _CONTACT_TURN = 2.0
 _WAVE_TURN = 3.0
 #: An estimate of the error is to be so many times smaller than the accuracy.
 _SAFETY = 1.5
+#: Places along the path of the ends where the law is asked for its peak force: in a window, and in a macro step.
+_IN_A_WINDOW, _IN_A_STEP = 100, 8
 #: The coupling's and IDA's relative tolerance over the accuracy.
 _TOLERANCE = 1e-3
 
@@ -129,7 +134,7 @@ def _estimated(
     """Return the `distance` of two runs by its parts, and with it the error of the finer one: D/(2ᵖ − 1).
 
     The order p is what this distance and that ``before`` show, 1 … 2; 1 where there is none. Contacts shorter than the
-    share ``short`` of the run are no evidence.
+    share ``short`` of the run are no evidence. The error of a peak force is at least that of `_peak_beside_law`.
     """
     found = distance(coarse, fine, short * float(fine.time[-1] - fine.time[0]))
     apart = {name: part for name, part in found._asdict().items() if part is not None}
@@ -138,7 +143,31 @@ def _estimated(
         then = before.get(name)
         order = min(max(math.log2(then / now), 1.0), 2.0) if then and now else 1.0
         errors[name] = now / (2.0**order - 1.0)
+    if "force" in errors:
+        errors["force"] = max(errors["force"], _peak_beside_law(fine))
     return apart, errors
+
+
+def _peak_beside_law(run: Trajectory) -> float:
+    """Return by how much the peak of a soft contact force differs from the law's along the path, relative to it.
+
+    Two runs whose steps are longer than the window of the peak may miss it alike: each takes it of polynomials over
+    steps. The path of the ends within steps has a higher order.
+    """
+    law = run.scene.soft_law
+    peak = float(run.summary.get("contact_force_max", 0.0))
+    if law is None or peak == 0.0:
+        return 0.0
+    window = float(run.summary["contact_force_window"])
+    begins = float(run.summary["contact_force_max_time"])
+    points = max(_IN_A_WINDOW, math.ceil(_IN_A_STEP * window / run.scene.coupling.H))
+    times = begins + window * (np.arange(3 * points + 1) / points - 1.0)
+    ends = at(run, np.clip(times, run.time[0], run.time[-1])).columns
+    rates = ends.get("z", 0.0) - ends["v_tip"]
+    force = np.array([law.force(*there) for there in zip((-ends["gap"]).tolist(), rates.tolist(), strict=True)])
+    sums = np.append(0.0, np.cumsum(0.5 * (force[1:] + force[:-1])))
+    found = float((sums[points:] - sums[:-points]).max()) / points
+    return abs(found - peak) / max(found, peak)
 
 
 def _first(scene: Scene) -> float:
