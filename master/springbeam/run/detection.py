@@ -179,6 +179,10 @@ class Detector:
             return force, -scale / size
 
         locate(evaluate, guess, size, _SHARP * scale, state.time)
+        if last.size < SAME * H and start > _SHARP * scale:
+            # The sign at the start decides. Short trial steps turn the mismatch of the ends' velocities round, which
+            # strong damping turns into a force: the parabola through the whole step shows better when it vanishes.
+            last = pair.attempt(state, guess, step.start)
         if last.size >= SAME * H:
             return last, kind
         return None if state.met_again == state.time else (self._no_step(last), kind)

@@ -21,6 +21,8 @@ from .setup import Setup
 #: Events in a row, each within H of the one before; more of them and the contact is said to chatter. Impacts that die
 #: out are up to 18,000 (e = 0.999); those of a lossy body on a lossless stop are without end.
 _MOST_IN_A_ROW = 20_000
+#: Largest product of `Body.decay` and a macro step at which some of an impulse on an end is left at the next row.
+_KEPT = 10.0
 #: The force of a step is continued over at most this many times its size; beyond, its end value is held.
 _REACH_OF_FORCE = 4.0
 
@@ -330,7 +332,8 @@ class Pair:
             found = body.decay(time, macro_step, speed)
             if found is None:
                 self.without_acceleration.append(body)
-            self._decays[id(body)] = found or 0.0
+            # An impulse that is gone within the step leaves no velocity to be taken out.
+            self._decays[id(body)] = found if found is not None and found * macro_step < _KEPT else 0.0
         return self._decays[id(body)]
 
     def reduced_mass(self, phase: Phase) -> float:
