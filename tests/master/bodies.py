@@ -16,7 +16,7 @@ from numpy.polynomial.polynomial import polyint, polymul, polyval
 from springbeam.bodies.elements import EndLoaded
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.force import shifted, work_on
-from springbeam.bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion
+from springbeam.bodies.protocol import NO_FORCE, Body, Energies, Force, Motion
 from springbeam.contact.interface import Interface
 from springbeam.coupling.protocol import Step
 from springbeam.monolithic.semi_discrete import ModalLoads, modal_beam
@@ -54,7 +54,7 @@ class Double(Body):
         return end
 
 
-class ModalBody(Double, BeamBody):
+class ModalBody(Double):
     """ä + α ω² ȧ + ω² a = b C + f per mode, w = bᵀa; F = +C.
 
     Parameters
@@ -124,7 +124,7 @@ class ModalBody(Double, BeamBody):
         k = self.omega.argmin()
         return float(self.omega[k]), 0.5 * float(self._damping[k] / self.omega[k])
 
-    def modes(self):
+    def modes(self, displacement=0.0):
         return self.omega**2, self._damping, self.b
 
     def acceleration(self):

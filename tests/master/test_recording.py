@@ -181,7 +181,7 @@ def test_memory_and_files_hold_the_same_and_the_rows_are_its_columns(tmp_path, s
 def test_files_are_plain_csv_and_json(tmp_path):
     steps, _, shapes = block(2)
     steps["u_tip_after"], steps["events"] = 1.0 / 3.0, [0, 1]
-    filed(tmp_path / "run", (steps, [Event(0.1, "impact", y=0.5, z=-1.0, energy_loss=0.25)], shapes))
+    filed(tmp_path / "run", (steps, [Event(0.1, "impact", y=0.5, z=-1.0, energy_loss=0.25, joint="tied")], shapes))
     text = (tmp_path / "run" / "trajectory.csv").read_bytes().decode()
     header, first, *_ = text.split("\n")
     assert header.split(",") == [*COLUMNS, *(name for name in BODY_COLUMNS if name != "bending_stress")]
@@ -189,7 +189,7 @@ def test_files_are_plain_csv_and_json(tmp_path):
     assert (text.count("\n"), text[-1], text.count("\r")) == (3, "\n", 0)
     assert (tmp_path / "run" / "events.csv").read_text().splitlines() == [
         ",".join(EVENT_COLUMNS),
-        "0.1,impact,0.5,-1.0,,,0.0,0.0,0.25",
+        "0.1,impact,0.5,-1.0,,,0.0,0.0,0.25,tied,false",
     ]
     summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
     assert summary["macro_steps"] == 3

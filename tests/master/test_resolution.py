@@ -4,7 +4,7 @@ from math import factorial
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, Upper
+from bodies import DuffingBody, Upper, beam_body
 from scenes import scene_from_dict
 
 from springbeam import simulate
@@ -373,5 +373,6 @@ def test_ends_move_with_both_masses_unless_the_lower_one_is_held():
 def test_a_beam_has_the_momentum_of_its_slowest_swing():
     """Its inertia at the tip times the tip's range in 2/ω₁, where the tip itself is slower than that."""
     steps = records(Phase(Joint.TIED, seated=True), u_tip=[0.0, 4.0, 4.0, 4.0], v_tip=[0.0, 0.0, 0.0, 0.3])
+    beam = beam_body(SCENE.beam)
     momentum = tip_inertia(SCENE.beam) * 4.0 * 0.5 * slowest_frequency(SCENE.beam)
-    assert least_momentum(*pair(), steps) == pytest.approx(momentum, rel=1e-12)
+    assert least_momentum(Pair(set_up(SCENE), beam, DuffingBody(TOP)), steps) == pytest.approx(momentum, rel=2e-3)

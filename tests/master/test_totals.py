@@ -67,12 +67,12 @@ def test_a_window_need_not_begin_or_end_at_a_row(ends, window):
 def test_durations_and_rebound():
     steps = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 1.0, 11))
     events = (
-        Event(0.1, "impact"),
+        Event(0.1, "impact", joint="tied"),
         Event(0.3, "separation", v_tip=0.5),
-        Event(0.4, "impact"),
-        Event(0.5, "retie", v_tip=0.125),
+        Event(0.4, "impact", joint="touch"),
+        Event(0.5, "retie", v_tip=0.125, joint="tied"),
         Event(0.5, "release", v_tip=0.25),
-        Event(0.9, "impact"),
+        Event(0.9, "impact", joint="tied"),
     )
     numbers = found(steps, *events, apart=False)
     assert numbers["contact_duration"] == pytest.approx(0.2, rel=1e-15)
@@ -93,7 +93,8 @@ def test_the_shortest_contact_that_ended_by_the_last_row_counts_if_it_passes_on_
     steps = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 0.8, 9))
     steps[column] = sign * (steps["time"] < 0.45)
     times = (0.1, 0.3, 0.5, 0.6, 0.75, 0.9)
-    events = [Event(time, EventKind(kinds[k % 2])) for k, time in enumerate(times)]
+    held = {"contact_force": {"joint": "tied"}, "foundation_force": {"seated": True}}[column]
+    events = [Event(time, EventKind(kinds[k % 2]), **({} if k % 2 else held)) for k, time in enumerate(times)]
 
     def shortest(below, least, of=steps):
         return shortest_contact(SCENE, of, events, below, least)
@@ -105,8 +106,8 @@ def test_the_shortest_contact_that_ended_by_the_last_row_counts_if_it_passes_on_
 
 def test_a_touch_after_a_release_is_a_contact_of_its_own():
     steps = steps_with(lambda t: (1.0, 0.0, 0.0), np.linspace(0.0, 0.8, 9))
-    kinds = {0.0: "impact", 0.4: "release", 0.5: "separation"}
-    events = [Event(time, EventKind(kind)) for time, kind in kinds.items()]
+    phases = {0.0: ("impact", "tied"), 0.4: ("release", "touch"), 0.5: ("separation", "free")}
+    events = [Event(time, EventKind(kind), joint=joint) for time, (kind, joint) in phases.items()]
     assert shortest_contact(SCENE, steps, events, 1.0, 0.05) == pytest.approx(0.1, rel=1e-14)
     assert shortest_contact(SCENE, steps, events, 1.0, 0.15) == pytest.approx(0.5, rel=1e-14)
 
@@ -180,7 +181,9 @@ def test_the_window_is_a_fiftieth_of_the_slowest_period():
     # Of compliance with p = 1: 2π √(μ/λ), μ of the spring and the tip's Rayleigh mass.
     compliant = with_changes(SCENE, contact={"law": "compliance", "stiffness": 4.0, "exponent": 1.0})
     reduced = 1.0 / (1.0 / SCENE.spring.mass + 1.0 / tip_inertia(SCENE.beam))
-    window = window_of(compliant)
+    at_contact = np.zeros(1, STEP)
+    at_contact["beam_kinetic"] = 0.1
+    window = force_window(compliant, Pair(set_up(compliant), *bodies(compliant)), at_contact)
     assert window == pytest.approx(2.0 * np.pi * np.sqrt(reduced / 4.0) / 50.0, rel=1e-3)  # its mesh has not all modes
     # 1/k of the beam is 3.3e-3 + 1e-2 m/N: with the spring's 3 N/m it holds 1 kg.
     massless = with_changes(SCENE, beam={"fidelity": "quasi_static"})

@@ -7,8 +7,8 @@ import oscillator
 import pytest
 from bodies import DuffingBody
 
-from springbeam import PointMass, SpringDamper, simulate, with_changes
-from springbeam.bodies.protocol import Abilities
+from springbeam import PointMass, SceneError, SpringDamper, simulate, with_changes
+from springbeam.bodies.protocol import NO_FORCE, Abilities
 from springbeam.scene import load_scene, scene_from_dict
 
 M, K, C = 3.0, 40.0, 0.2
@@ -102,3 +102,35 @@ def test_steps_of_one_size_are_counted_from_where_the_run_starts(below, kind, up
     run = simulate(scene, **bodies)
     assert run.time[0] == pytest.approx(start, rel=1e-12)
     assert run.steps["size"][1:] == pytest.approx(np.full(30, 0.01), rel=1e-9)
+
+
+class Held(SpringDamper):
+    """Takes the force that a step starts with for that of the whole step, as a first body of one's own does."""
+
+    def advance(self, time, size, contact, foundation=NO_FORCE):
+        return super().advance(time, size, (contact[0], 0.0, 0.0), (foundation[0], 0.0, 0.0))
+
+
+class Forgetful(SpringDamper):
+    """Tells no integrals."""
+
+    def advance(self, time, size, contact, foundation=NO_FORCE):
+        return super().advance(time, size, contact, foundation)._replace(integral=0.0, integral_2=0.0)
+
+
+@pytest.mark.parametrize("place", ["upper", "lower"])
+@pytest.mark.parametrize(("kind", "lacks"), [(Held, "follows derivatives of the force"), (Forgetful, "integral_2")])
+@pytest.mark.parametrize("y", [0.0, -1e3])
+def test_a_body_that_ignores_what_a_degree_needs_is_run_with_degree_0_and_refused_a_higher_one(place, kind, lacks, y):
+    """At 1 km a response of 1 mm is seen as well as at 0."""
+    given = with_changes(above(OWN), contact={"law": "link", "stiffness": 50.0}, spring={"equilibrium": y})
+    given = with_changes(given, beam={"displacement": y})
+    start = {"displacement": y, "velocity": -0.3}
+    run = simulate(given, **{place: kind(2.0, K, **start)})
+    assert (run.summary["degree"], run.summary["status"]) == (0, "done")
+    assert run.summary["max_energy_residual"] < 1e-9
+    assert np.ptp(run.u_tip) > 0.01
+    again = kind(2.0, K, **start)
+    with pytest.raises(SceneError, match=rf"degree = 1: .* {lacks}.*; use degree = 0"):
+        simulate(with_changes(given, coupling={"degree": 1}), **{place: again})
+    assert again.motion()[:2] == (y, -0.3)

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from math import inf
 from typing import Any
+
+import numpy as np
 
 from ..scene import SAME, Scene, SceneError
 from ..scene.messages import Rule, texts_of
 from ..scene.tables import ORDINARY_SCHEMES
-from .protocol import Abilities, Body
+from .protocol import NO_FORCE, Abilities, Body, BodyFailed, Force, StepRefused
 
 # -- what bodies can do ------------------------------------------------------------------------------------------------
 
@@ -22,7 +25,7 @@ _LACKS = {
     "state": "its state cannot be saved (canGetAndSetFMUstate = false)",
     "any_size": "its steps have one size (canHandleVariableCommunicationStepSize = false)",
     "velocity": "it has no velocity",
-    "integrals": "it has not integral and integral_2",
+    "integrals": "it has not integral and integral_2, or a body of your own wrong ones in its Motion",
     "impulse": "it has no impulse, or of a body of your own no apply_impulse",
 }
 _TO_BE_STRUCK = ("state", "any_size", "velocity", "impulse")
@@ -84,8 +87,9 @@ LACKING: tuple[Rule, ...] = (
     ),
     Rule(
         lambda s, body, table: s.degree > body.slopes,
-        "{coupling.degree}: the body in [{table}] cannot do that, its input takes derivatives of order {slopes} at "
-        "most (canInterpolateInputs; FMI 3.0 has none); use degree = {followed}",
+        "{coupling.degree}: the body in [{table}] cannot do that, it follows derivatives of the force of order "
+        "{slopes} at most (canInterpolateInputs; FMI 3.0 has none; a body of your own, in advance); use "
+        "degree = {followed}",
         _followed,
     ),
     Rule(  # of so many integrals of the gap that the scheme sets to 0
@@ -119,6 +123,10 @@ OFFERED = (
     ("impulse", "impulse", "rigid impacts, foundation", '"compliance", "link", "tie" of equal velocities'),
     ("energies", "kinetic_energy, potential_energy", "the whole ledger", "the ledger of the interface"),
 )
+
+
+#: Length of a trial step over a macro step, and how far a force moves a body in it, over its way or 1 m.
+_TRIAL, _MOVED = 2.0**-8, 1e-6
 
 
 # -- how they start ----------------------------------------------------------------------------------------------------
@@ -161,14 +169,59 @@ FORBIDDEN_STARTS = (
 )
 
 
-def admit(scene: Scene, start_time: float, upper: Body | None, lower: Body | None) -> None:
+def tried(body: Body, time: float, macro_step: float) -> Abilities:
+    """Return what a ``body`` of the caller's can do, by four short steps from ``time`` [s] that are undone.
+
+    They show whether it follows a force that grows over a step, and tells the integrals of its motion. A body that
+    refuses them is taken at its word.
+    """
+    able = body.can()
+    if not able.state or not 0.0 < body.mass < inf:
+        return able
+    h = _TRIAL * macro_step if able.any_size else macro_step
+    w, v, _, _ = body.motion()
+    moved = _MOVED * (max(abs(w), h * abs(v)) or 1.0)
+    push = 2.0 * body.mass * moved / (h * h)  # constant, it moves a free mass as far
+    forces: list[Force] = [NO_FORCE, (push, 0.0, 0.0), (0.0, push / h, 0.0), (0.0, 0.0, 2.0 * push / h**2)]
+    body.mark()
+    ends = []
+    try:
+        for force in forces:
+            ends.append(body.advance(time, h, force))
+            body.rewind()
+    except (BodyFailed, StepRefused, OverflowError):
+        body.rewind()
+        return able
+    alone, *others = np.array(ends)
+    held, grown, bent = (np.abs(end - alone) for end in others)
+    if held[0] == 0.0:
+        return able
+    # Of a free mass the responses are 1/3, 1/6 and L h/3, L h²/12: a stiff body's are larger.
+    slopes = [grown[0] > held[0] / 6.0, bent[0] > held[0] / 12.0]
+    integrals = [held[2] > held[0] * h / 6.0, held[3] > held[0] * h * h / 24.0]
+    return replace(
+        able,
+        slopes=min(able.slopes, [*slopes, False].index(False)),
+        integrals=min(able.integrals, [*integrals, False].index(False)),
+    )
+
+
+def admit(
+    scene: Scene,
+    start_time: float,
+    upper: Body | None,
+    lower: Body | None,
+    found: Mapping[str, Abilities] | None = None,
+) -> None:
     """Raise SceneError if ``scene`` cannot be run with these bodies as they are at ``start_time`` [s].
 
     That is where it needs what a body cannot do, or where the bodies start in places or with velocities from which the
-    contact law, the foundation or an undeformed approach cannot begin.
+    contact law, the foundation or an undeformed approach cannot begin. What was ``found`` out about a body's abilities,
+    by table, counts instead of what it says.
     """
     bodies = {name: body for name, body in (("beam", upper), ("spring", lower)) if body is not None}
-    lines = refusals(scene, {table: _abilities(body) for table, body in bodies.items()})
+    able = {table: body.can() for table, body in bodies.items()}
+    lines = refusals(scene, {**able, **(found or {})})
     lines += [
         f"the body in [{table}]: mass = 0: only an upper end can be without inertia, tied by a rigid law to one that "
         "has some; give it a mass greater than 0 [kg]"
@@ -195,17 +248,11 @@ def admit(scene: Scene, start_time: float, upper: Body | None, lower: Body | Non
         raise SceneError("\n".join(lines))
 
 
-def _abilities(body: Body) -> Abilities:
-    """Return what ``body`` can do; one that leaves `Body.apply_impulse` out takes no impulses."""
-    takes = getattr(body.apply_impulse, "__func__", None) is not Body.apply_impulse
-    return body.abilities if takes else replace(body.abilities, impulse=False)
-
-
 def _joined(scene: Scene, upper: Body, lower: Body) -> list[str]:
     """Join ends that are to be tied, where one takes no impulse; return why, if their velocities forbid it."""
     v, z, lines = upper.motion().velocity, lower.motion().velocity, []
     for table, body, other in (("beam", upper, lower), ("spring", lower, upper)):
-        if (abilities := _abilities(body)).impulse:
+        if (abilities := body.can()).impulse:
             continue
         if abs(v - z) > (_SAME_SPEED if abilities.velocity else _SAME_SPEED_MEASURED) * max(abs(v), abs(z)):
             lines.append(

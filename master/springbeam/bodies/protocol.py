@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, sqrt
 from typing import Any, NamedTuple, TypeVar
 
@@ -85,6 +85,10 @@ class Abilities:
     energies: bool = True  #: it tells its energies
 
 
+#: Abilities that a body has by a method, which it may leave out.
+_BY_METHOD = {"impulse": "apply_impulse", "energies": "energies"}
+
+
 class Body:
     """A body with one interface end and a state that can be rewound; a body of one's own derives from it.
 
@@ -133,24 +137,48 @@ class Body:
         omega = sqrt(stiffest / self.mass)
         return omega, 0.5 * self.damping / (self.mass * omega)
 
-    def modes(self) -> Modes | None:
-        """Return the modes of the end, as of a linear body; ``None`` where they are not known."""
-        stiffness = self.stiffness(0.0)
+    def modes(self, displacement: Any = 0.0) -> Modes | None:
+        """Return the modes of the end, as of a linear body; ``None`` where they are not known.
+
+        Of an array of displacements [m] they are those where the body is stiffest.
+        """
+        stiffness = self.stiffness(displacement)
         if stiffness is None or self.damping is None:
             return None
         if not 0.0 < self.mass < inf:
             return np.zeros(1), np.zeros(1), np.zeros(1)
-        return np.array([stiffness / self.mass]), np.array([self.damping / self.mass]), np.array([self.mass**-0.5])
+        stiffest = float(np.max(stiffness))
+        return np.array([stiffest / self.mass]), np.array([self.damping / self.mass]), np.array([self.mass**-0.5])
+
+    def moved_by(self, load: Load) -> float:
+        """Return the largest force on a mode of a ``load`` of 1, over the displacement of the end in that mode.
+
+        0 where that is not known.
+        """
+        return 0.0
 
     @property
     def massless(self) -> bool:
         """Whether the end has no inertia: it then has the velocity of what it is joined to, and springs back alone."""
         return self.mass == 0.0
 
-    #: Where its state cannot be saved, a step is made once, by the schemes that never repeat one.
+    #: What the body says that it can do; `can` has the answer. Where its state cannot be saved, a step is made once, by
+    #: the schemes that never repeat one.
     abilities = Abilities()
+    #: Steps begun so far, and how often the state was set back; ``None`` where nobody counts.
+    steps: int | None = None
+    rewinds: int | None = None
     #: Work that the end has received so far [J], of a body by which the coupling is judged, not by its energies.
     received: float | None = None
+
+    def can(self) -> Abilities:
+        """Return what the body can do: its `abilities` without those whose methods it leaves out."""
+        left_out = {
+            ability: False
+            for ability, method in _BY_METHOD.items()
+            if getattr(getattr(self, method), "__func__", None) is getattr(Body, method)
+        }
+        return replace(self.abilities, **left_out)
 
     def take_place(self, *, upper: bool) -> None:
         """Learn, before the run, whether it is the upper body; one that fits in either place needs to know."""
@@ -232,11 +260,18 @@ class Body:
         """Return what a beam that `tells` feels, asked once a step."""
         raise NotImplementedError(f"{type(self).__name__} has no inner_forces, and says that it tells")
 
+    def shape(self) -> np.ndarray | None:
+        """Return deflections [m], bending moments [N·m] and shear forces [N] one after another, shape (63,).
+
+        They are those at `springbeam.scene.statics.SHAPE_POINTS`; ``None`` of a body that shows no shape.
+        """
+        return None
+
     def apply_impulse(self, impulse: float) -> None:
         """Change the velocity of the end at once by an upward impulse [N·s].
 
-        A body that leaves it out is refused where a scene needs impulses (`springbeam.bodies.gate`); one that changes
-        nothing but by rounding is none.
+        A body that leaves it out is refused where a scene needs impulses (`springbeam.bodies.gate`); an impulse that
+        changes nothing but by rounding is none.
         """
         if abs(impulse) > ROUNDED_IMPULSE * self.mass * abs(self.motion().velocity):
             raise BodyFailed(f"{type(self).__name__} has no apply_impulse, and meets an impulse of {impulse:.6g} N·s")
@@ -278,14 +313,3 @@ class Body:
 
     def close(self) -> None:
         """Free what the body holds; it is not used afterwards."""
-
-
-class BeamBody(Body):
-    """A body that can show its shape."""
-
-    def shape(self) -> np.ndarray:
-        """Return deflections [m], bending moments [N·m] and shear forces [N] one after another, shape (63,).
-
-        They are those at `springbeam.scene.statics.SHAPE_POINTS`.
-        """
-        raise NotImplementedError

@@ -29,7 +29,7 @@ from numpy.polynomial import legendre
 from ..scene import Beam, statics
 from ..scene.statics import SHAPE_POINTS
 from . import force
-from .protocol import NO_FORCE, SIZES_REMEMBERED, BeamBody, Energies, Force, Motion
+from .protocol import NO_FORCE, SIZES_REMEMBERED, Body, Energies, Force, Motion
 
 
 class BendState(NamedTuple):
@@ -42,7 +42,7 @@ class BendState(NamedTuple):
     dissipated: float = 0.0  #: so far [J]
 
 
-class QuasiStaticBeam(BeamBody):
+class QuasiStaticBeam(Body):
     """The massless beam as a body.
 
     Parameters
@@ -121,7 +121,7 @@ class QuasiStaticBeam(BeamBody):
         return Energies(0.0, strain, self.state.dissipated, -k * w * rest - self._load_energy)
 
     def shape(self) -> np.ndarray:
-        """See `BeamBody.shape`; without inertia moment and shear force are those of statics."""
+        """See `Body.shape`; without inertia moment and shear force are those of statics."""
         deflection = self._load_shape + self._stiffness * self.state.w * self._tip_shape
         C = self._stiffness * (self.state.w + self._alpha * self.state.velocity)
         moment, shear = self._load_moment + C * self._arm, self._load_shear + C

@@ -11,10 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..bodies.protocol import Body, Ends
-from ..motion.events import EventKind
+from ..motion.events import EventKind, Joint
 from ..motion.paths import EPS, Means, Sample
 from .interface import Interface
-from .phases import Joint, Phase
+from .phases import Phase
 
 _MAX_EVALUATIONS = 60
 

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
 from functools import cached_property
 
 from ..bodies.protocol import Ends, Motion
-from ..motion.events import EventKind
+from ..motion.events import EventKind, Joint
 from .interface import Interface, common_velocity
 
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only); slower than the
@@ -19,14 +18,6 @@ from .interface import Interface, common_velocity
 _SEATING_SPEED, _SEATING_SPEED_UNSEEN = 1e-8, 1e-4
 #: Rounding of a velocity, relative to the largest so far.
 VELOCITY_ROUNDING = 16.0 * 2.0**-52
-
-
-class Joint(Enum):
-    """How the beam's tip and what lies below it are joined."""
-
-    FREE = "free"  #: no contact force
-    TIED = "tied"  #: bilateral, u_tip = y < Ψ
-    TOUCH = "touch"  #: unilateral, 0 ≤ C ⊥ u_tip − y ≥ 0
 
 
 @dataclass(frozen=True)

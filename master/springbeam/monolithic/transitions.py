@@ -16,9 +16,11 @@ unseated       seated, N becomes negative; without a spring this is the tip's `s
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from ..motion.events import Event, EventKind
+from ..motion.events import Event, EventKind, Joint
 from .hybrid_system import HybridSystem
 from .laws import ReferencePhase, Watch
 
@@ -169,7 +171,7 @@ class HybridState:
         e = self.system.energies(self.X, self.phase)
         return float(e["e_beam"] + e["e_spring"] + e["e_load"])
 
-    def _emit(self, kind: str, **values: float) -> None:
+    def _emit(self, kind: str, **values: Any) -> None:
         s = self.system
         m = s.motion(self.phase, self.X)
         self.loss += values.get("energy_loss", 0.0)
@@ -177,4 +179,6 @@ class HybridState:
             values |= {"y": float(m.y), "z": float(m.z)}
         if s.beam is not None:
             values |= {"u_tip": float(m.u), "v_tip": float(m.v)}
-        self.events.append(Event(self.time, EventKind(kind), **values))
+        contact = self.phase.contact
+        joint = Joint("touch" if contact == "slack" else contact)
+        self.events.append(Event(self.time, EventKind(kind), **values, joint=joint, seated=self.phase.seated))

@@ -34,16 +34,21 @@ class EventKind(str, Enum):
         """Whether tied ends are released."""
         return self in (EventKind.RELEASE, EventKind.SEPARATION)
 
-    @property
-    def joins(self) -> bool:
-        """Whether the ends are joined in another way than before."""
-        return self.opens or self in (EventKind.IMPACT, EventKind.RETIE)
+
+class Joint(str, Enum):
+    """How the beam's tip and what lies below it are joined; the values are the words in ``events.csv``."""
+
+    FREE = "free"  #: no contact force
+    TIED = "tied"  #: bilateral, u_tip = y < Ψ
+    TOUCH = "touch"  #: unilateral, 0 ≤ C ⊥ u_tip − y ≥ 0
+
+    __str__ = str.__str__
 
 
 @dataclass(frozen=True)
 class Event:
     """One event, with its columns in file order; ``y, z, u_tip, v_tip`` are the values after it, ``None`` for an absent
-    body."""
+    body, ``joint`` and ``seated`` the phase after it."""
 
     time: float
     kind: EventKind  #: or its word
@@ -54,9 +59,12 @@ class Event:
     impulse_contact: float = 0.0  #: on the beam's tip, upward [N·s]
     impulse_foundation: float = 0.0  #: of the foundation, upward [N·s]
     energy_loss: float = 0.0  #: [J]
+    joint: Joint = Joint.FREE  #: or its word
+    seated: bool = False  #: whether the foundation holds the lower end
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kind", EventKind(self.kind))
+        object.__setattr__(self, "joint", Joint(self.joint))
 
 
 EVENT_COLUMNS = tuple(Event.__dataclass_fields__)

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..bodies.fmu_bodies import FmuBeam, FmuSpring
 from ..bodies.protocol import NO_FORCE, BodyFailed, StepRefused
-from ..motion.events import Event, EventKind
+from ..motion.events import Event, EventKind, Joint
 from ..results.trajectory import Trajectory
 from ..scene import Scene
 from ..scene.laws import TransmissionContact
@@ -225,7 +225,7 @@ class _Algorithm:
         worked = (reached.foundation - reached.pressing + self._spring.external_force) * (reached.y - y)
         self._injected_into_spring += self._spring_energy() - energy + reached.dissipated - worked
         if phase == "seated":
-            self._note(EventKind.STOP_IMPACT, end, impulse_foundation=h * reached.foundation)
+            self._note(EventKind.STOP_IMPACT, end, h * reached.foundation)
         self._record(end, phase, contact, inside, reached.foundation, case)
 
     def _predicted_tip(self, u_free: float, u: float) -> float:
@@ -356,6 +356,7 @@ class _Algorithm:
             )
         )
 
-    def _note(self, kind: EventKind, time: float, **impulse: float) -> None:
+    def _note(self, kind: EventKind, time: float, impulse: float = 0.0) -> None:
         tip = self._beam.motion()
-        self._events.append(Event(time, kind, self._y, self._z, tip.displacement, tip.velocity, **impulse))
+        ends = (self._y, self._z, tip.displacement, tip.velocity)
+        self._events.append(Event(time, kind, *ends, impulse_foundation=impulse, joint=Joint.TIED))

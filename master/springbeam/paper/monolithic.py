@@ -28,7 +28,7 @@ import numpy as np
 import scipy.sparse.linalg as spla
 
 from ..monolithic.semi_discrete import assemble, constant_forces, inner_forces
-from ..motion.events import Event, EventKind
+from ..motion.events import Event, EventKind, Joint
 from ..results.trajectory import Trajectory
 from ..scene import Scene
 from ..scene.laws import TransmissionContact
@@ -199,10 +199,10 @@ class _Algorithm:
         self._note("impact", row)
         return row
 
-    def _note(self, kind: str, row: _Row, **impulse: float) -> None:
-        self.events.append(
-            Event(self.time, EventKind(kind), row.y, row.z, float(row.q[-1]), float(row.v[-1]), **impulse)
-        )
+    def _note(self, kind: str, row: _Row, impulse: float = 0.0) -> None:
+        u, v = float(row.q[-1]), float(row.v[-1])
+        event = Event(self.time, EventKind(kind), row.y, row.z, u, v, impulse_foundation=impulse, joint=Joint.TIED)
+        self.events.append(event)
 
     def _unforced(self, row: _Row) -> np.ndarray:
         """Return q of (62) without a force on the tip."""
@@ -265,7 +265,7 @@ class _Algorithm:
         forces = (on_tip, inside, pressing, foundation)
         after = _Row(self.time, q_new, v_new, y_new, z_new, phase, *forces, case, booked=True)
         if seated:
-            self._note("stop_impact", after, impulse_foundation=h * foundation)
+            self._note("stop_impact", after, h * foundation)
         return after
 
     # Result ---------------------------------------------------------------------------------------------------------

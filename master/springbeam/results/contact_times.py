@@ -13,20 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..motion.events import Event, EventKind
+from ..motion.events import Event
 from ..scene import Scene
-from .steps import impulse, joined
+from .steps import impulse
 from .trajectory import Trajectory
 
 #: Share of the impulse of a run below which a contact or a stroke is none to speak of.
 SLIGHT = 2e-3
-
-#: Whether the lower end is on the foundation from an event on, or at it and no longer after it.
-_ON_FOUNDATION = {
-    EventKind.STOP_IMPACT: (True, False),
-    EventKind.SEATED: (True,),
-    EventKind.UNSEATED: (False,),
-}
 
 #: From when to when something is touched [s]; an impact that lets go at once has no length.
 Interval = tuple[float, float]
@@ -46,10 +39,10 @@ def contact_changes(run: Trajectory, window: float) -> list[ContactChange]:
     Strokes on the foundation that follow each other within ``window`` are one.
     """
     changes = []
-    for since, until in _merged(_contacts(run, inf), window):
+    for since, until in _merged(tip_contacts(run.scene, run.events, inf), window):
         if until - since >= window:
             changes += [ContactChange("closes", since), ContactChange("opens", until)]
-    for since, until in _merged(foundation_contacts(run.scene, run.events, inf), window):
+    for since, until in _merged(foundation_contacts(run.events, inf), window):
         changes += [ContactChange("strikes", since)]
         if until > since:
             changes += [ContactChange("leaves", until)]
@@ -85,53 +78,32 @@ def impulse_difference(run: Trajectory, reference: Trajectory) -> float:
     return float(np.abs(found - exact).sum()) / scale if scale > 0.0 else nan
 
 
-def _contacts(run: Trajectory, end: float) -> list[Interval]:
-    """Return the contacts of tip and spring; one that goes on ends at ``end`` [s].
-
-    In a run without steps, ends between which no force acts are apart, also above a lower end that rests.
-    """
-    if run.steps is not None and len(run.steps):
-        free_at_end = not joined(run.steps[-1])
-    elif "contact_force" not in run.columns:  # one body alone
-        free_at_end = True
-    else:
-        free_at_end = run.phase[-1] == "free" or (run.phase[-1] == "seated" and run.contact_force[-1] == 0.0)
-    return tip_contacts(run.events, end, free_at_end=bool(free_at_end))
-
-
-def tip_contacts(events: Iterable[Event], end: float, *, free_at_end: bool) -> list[Interval]:
-    """Return the contacts of tip and spring; one that goes on ends at ``end`` [s]."""
-    joins = [event for event in events if event.kind.joins]
-    # A release leaves the ends free, not touching, if they meet again or nothing follows.
-    free_after = [*(event.kind is EventKind.IMPACT for event in joins[1:]), free_at_end]
-    return _intervals(
-        (
-            (event.time, not (event.kind is EventKind.SEPARATION or (event.kind is EventKind.RELEASE and free)))
-            for event, free in zip(joins, free_after, strict=False)
-        ),
-        end,
-    )
+def tip_contacts(scene: Scene, events: Iterable[Event], end: float) -> list[Interval]:
+    """Return when tip and spring are joined; a contact that goes on ends at ``end`` [s]. One body alone has none."""
+    if not scene.coupled:
+        return []
+    return _intervals(((event.time, event.joint != "free") for event in events), end)
 
 
 def touches(events: Iterable[Event]) -> list[Interval]:
-    """Return from when to when released ends still touch until they part [s]."""
-    joins = [event for event in events if event.kind.joins]
+    """Return from when to when ends that are not tied touch until they part [s]."""
+    joints = groupby(events, key=lambda event: event.joint)
+    phases = [(joint, next(alike).time) for joint, alike in joints]
     return [
-        (event.time, after.time)
-        for event, after in pairwise(joins)
-        if (event.kind, after.kind) == (EventKind.RELEASE, EventKind.SEPARATION)
+        (since, until)
+        for (joint, since), (following, until) in pairwise(phases)
+        if (joint, following) == ("touch", "free")
     ]
 
 
-def foundation_contacts(scene: Scene, events: Iterable[Event], end: float) -> list[Interval]:
-    """Return the impacts on the foundation, and the rests on it; a rest that goes on ends at ``end`` [s].
-
-    Ends that part leave the lower one on the foundation; a tip alone leaves the foundation itself.
-    """
-    on_foundation = dict(_ON_FOUNDATION)
-    if scene.lower is None:
-        on_foundation[EventKind.SEPARATION] = (False,)
-    return _intervals(((event.time, held) for event in events for held in on_foundation.get(event.kind, ())), end)
+def foundation_contacts(events: Iterable[Event], end: float) -> list[Interval]:
+    """Return the impacts on the foundation, and the rests on it; a rest that goes on ends at ``end`` [s]."""
+    changes = []
+    for event in events:
+        if event.kind.strikes:
+            changes.append((event.time, True))
+        changes.append((event.time, event.seated))
+    return _intervals(changes, end)
 
 
 def _intervals(changes: Iterable[tuple[float, bool]], end: float) -> list[Interval]:
@@ -162,10 +134,10 @@ def _contacts_and_strokes(run: Trajectory, end: float) -> Iterator[tuple[list[In
     if run.steps is not None:
         times = run.steps["time"]
         passed = np.abs(impulse(run.steps)) + np.abs(kicks(times, run.events))
-    yield _contacts(run, end), times, passed
+    yield tip_contacts(run.scene, run.events, end), times, passed
     times = np.array([event.time for event in run.events])
     yield (
-        foundation_contacts(run.scene, run.events, end),
+        foundation_contacts(run.events, end),
         times,
         np.array([abs(e.impulse_foundation) for e in run.events]),
     )

@@ -38,7 +38,7 @@ def lines(rows: Iterable[Sequence[Any]]) -> bytes:
 def event_lines(events: Iterable[Event]) -> bytes:
     """Return ``events`` as lines of ``events.csv``, what a body is missing for left empty."""
     rows = ([getattr(event, name) for name in EVENT_COLUMNS] for event in events)
-    return lines(["" if v is None else v if isinstance(v, str) else float(v) for v in row] for row in rows)
+    return lines(["" if v is None else v if isinstance(v, str | bool) else float(v) for v in row] for row in rows)
 
 
 def write_rows(run: RunDirectory, blocks: Iterable[Mapping[str, np.ndarray]]) -> None:
@@ -210,9 +210,10 @@ def export(directory: str | Path, form: Literal["csv", "parquet"]) -> list[Path]
         if written:
             write_summary(run, {**summary, "files": run.sizes()})
         return [run.trajectory]
-    from pyarrow import Table, float64, parquet, schema, string, table  # it takes its time to load
+    from pyarrow import Table, bool_, float64, parquet, schema, string, table  # it takes its time to load
 
-    kinds = schema([(name, string() if name == "kind" else float64()) for name in EVENT_COLUMNS])
+    of_words = {"kind": string(), "joint": string(), "seated": bool_()}
+    kinds = schema([(name, of_words.get(name, float64())) for name in EVENT_COLUMNS])
     tables = [table(trajectory.columns), Table.from_pylist([vars(event) for event in trajectory.events], kinds)]
     if trajectory.shape_table is not None:
         tables.append(table(dict(zip(SHAPE_COLUMNS, trajectory.shape_table.T, strict=True))))

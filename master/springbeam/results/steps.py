@@ -33,8 +33,8 @@ STEP_COLUMNS = (
     *("impact_loss", "beam_received", "spring_received"),
     # All energies when the run began, before an impact at its start [J].
     "energy_at_start",
-    # What the beam tells at the end of the step, before the event, as of `springbeam.bodies.protocol.Felt`; and which
-    # bodies tell, `BEAM_TELLS` and `SPRING_TELLS` added up, the same in all records of a run.
+    # What the beam tells at the end of the step, before the event, as of `springbeam.bodies.protocol.InnerForces`; and
+    # which bodies tell, `BEAM_TELLS` and `SPRING_TELLS` added up, the same in all records of a run.
     *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress", "told"),
     # The same in all records: the degree of the contact force, the tip's part in the velocity that joined ends have in
     # common, m_tip/(m_tip + m), and their reduced mass, 1/(1/m_tip + 1/m) [kg], 0 if no rigid law joins them.

@@ -118,8 +118,8 @@ def shortest_contact(scene: Scene, steps: np.ndarray, events: Iterable[Event], b
     found = inf
     if len(steps) == 0:
         return inf
-    held = [*tip_contacts(events, inf, free_at_end=_apart(steps[-1])), *touches(events)]
-    for intervals, force in ((held, "contact_force"), (foundation_contacts(scene, events, inf), "foundation_force")):
+    held = [*tip_contacts(scene, events, inf), *touches(events)]
+    for intervals, force in ((held, "contact_force"), (foundation_contacts(events, inf), "foundation_force")):
         passed = np.cumsum(impulse(steps, force))
         for since, until in intervals:
             if 0.0 < until - since < min(below, found) and until <= time[-1]:
@@ -127,11 +127,6 @@ def shortest_contact(scene: Scene, steps: np.ndarray, events: Iterable[Event], b
                 if abs(passed[last] - passed[first]) > least:
                     found = until - since
     return found
-
-
-def _apart(step: np.ndarray) -> bool:
-    """Return whether tip and spring are apart from the row of a record on."""
-    return not joined(step).any()
 
 
 def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float) -> dict[str, float | int]:
@@ -146,13 +141,11 @@ def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float
     if scene.contact.lasting and scene.coupled:
         return found
     end = float(steps["time"][-1])
-    free_at_end = _apart(steps[-1])
-    of_tip = tip_contacts(events, end, free_at_end=free_at_end)
-    intervals = of_tip if scene.coupled else foundation_contacts(scene, events, end)
+    intervals = tip_contacts(scene, events, end) if scene.coupled else foundation_contacts(events, end)
     lengths = [until - since for since, until in intervals]
     found |= {"contact_duration": max(lengths, default=0.0), "contact_duration_total": sum(lengths)}
     found["number_of_contacts"] = len(intervals)
-    if intervals and intervals[-1][1] == end and not free_at_end:
+    if intervals and intervals[-1][1] == end and joined(steps[-1]):
         found["bounce_time"] = intervals[-1][0] - intervals[0][0]
     opened = max((until for _, until in intervals if until < end), default=None)
     if left := [event.v_tip for event in events if event.time == opened and event.v_tip is not None]:

@@ -17,9 +17,9 @@ from ..contact.events import (
     no_dip,
     position_tolerance,
 )
-from ..contact.phases import VELOCITY_ROUNDING, Joint
+from ..contact.phases import VELOCITY_ROUNDING
 from ..coupling.protocol import Step
-from ..motion.events import Event, EventKind
+from ..motion.events import Event, EventKind, Joint
 from ..motion.paths import Path, Place, Sample, sign_changes
 from .macro_steps import AdaptiveSteps, MacroGrid
 from .setup import SAME
@@ -273,7 +273,9 @@ class Detector:
             joint, kind = (Joint.TOUCH, EventKind.IMPACT) if touching else (Joint.FREE, EventKind.SEPARATION)
             (u, v), (y, z) = (_inside(*motions, step.size, at) for motions in zip(step.start, step.end, strict=True))
             if all(map(isfinite, (u, v, y, z))):  # else the energies of the row are out of range too and stop the run
-                found.append((joint, Event(step.time + at * step.size, kind, y, z, u, v)))
+                found.append(
+                    (joint, Event(step.time + at * step.size, kind, y, z, u, v, joint=joint, seated=state.phase.seated))
+                )
         return found
 
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..bodies.protocol import Body
 from ..results.columns import ledger
 from .stepping import Pair
 
@@ -70,7 +69,9 @@ class Balance:
             table for table, body in zip(("beam", "spring"), pair.bodies, strict=True) if body.received is not None
         ]
         #: Bodies of the caller's may tell no energies; there is then no balance to judge by.
-        self._untold = any(type(body).energies is Body.energies and body.mass < inf for body in pair.bodies)
+        self._untold = any(
+            not body.can().energies and body.received is None and body.mass < inf for body in pair.bodies
+        )
         if self._untold:
             self._warns = self._stops = inf
         self._scale = 0.0  #: the largest energy so far [J]

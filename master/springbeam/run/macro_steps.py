@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from math import ceil, inf, log2, sqrt
 
 from ..bodies import force
-from ..contact.phases import Joint
 from ..coupling.protocol import Step
+from ..motion.events import Joint
 from ..motion.paths import Path
 from .outcome import RunStopped
 from .setup import SAME, SHORTEST_STEP, Setup

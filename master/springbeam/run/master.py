@@ -13,10 +13,10 @@ from time import monotonic
 
 import numpy as np
 
-from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, Ends, StepRefused
-from ..contact.phases import Impact, Joint, Phase, Transitions
+from ..bodies.protocol import NO_FORCE, Body, BodyFailed, Ends, StepRefused
+from ..contact.phases import Impact, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
-from ..motion.events import Event, EventKind
+from ..motion.events import Event, EventKind, Joint
 from ..results.columns import ledger
 from ..results.recording import Recorder
 from ..results.steps import BEAM_TELLS, SPRING_TELLS, STEP, packed
@@ -43,7 +43,7 @@ class Master:
     setup
         What is run.
     upper, lower
-        The bodies at the start time; ``None`` where there is none. One that is no `BeamBody` leaves no shapes.
+        The bodies at the start time; ``None`` where there is none. An upper one without a shape leaves none.
     recorder
         Receives records, events and shapes.
     contact
@@ -76,7 +76,6 @@ class Master:
         self.balance = Balance(self.pair)
         self._log = Log(recorder, self.balance.check)
         self._told = BEAM_TELLS * self.pair.upper.tells + SPRING_TELLS * self.pair.lower.tells
-        self._pictured = upper if isinstance(upper, BeamBody) else None
         self.state.shapes_left = _SHAPES_AFTER_CONTACT
         self.state.next_shape = setup.start
         length = setup.end - setup.start or 1.0  # 0 where contact is at t_end: the one shape is that of the start
@@ -221,8 +220,11 @@ class Master:
         tip, low = self.pair.ends_together(self.state.phase)
         y, z = low[:2] if self._setup.lower else (None, None)
         u, v = tip[:2] if self._setup.upper else (None, None)
-        self.state.events += 1
-        self._log.events.append(Event(self.state.time, kind, y, z, u, v, impact.on_beam, impact.of_foundation, lost))
+        state = self.state
+        state.events += 1
+        impulses = (impact.on_beam, impact.of_foundation)
+        happened = Event(state.time, kind, y, z, u, v, *impulses, lost, state.phase.joint, state.phase.seated)
+        self._log.events.append(happened)
 
     def _note_soft_contact(self, step: Step) -> None:
         state = self.state
@@ -248,10 +250,9 @@ class Master:
         if speed > state.fastest:
             state.fastest = speed
         self._log.records.append(self._packed(step, ends, before))
-        if self._pictured is not None:
-            early = state.shapes_left > 0 and state.phase.joint is not Joint.FREE
-            if early or state.time >= state.next_shape:
-                self._shape(self._pictured, early)
+        early = state.shapes_left > 0 and state.phase.joint is not Joint.FREE
+        if early or state.time >= state.next_shape:
+            self._shape(early)
 
     def _packed(self, step: Step, ends: Ends, forces: Present) -> bytes:
         state = self.state
@@ -283,11 +284,13 @@ class Master:
             *(self._told, pair.joined.degree, pair.tip_share, pair.turned_mass),
         )
 
-    def _shape(self, beam: BeamBody, early: bool) -> None:
+    def _shape(self, early: bool) -> None:
         state = self.state
         every = self._shape_every
         time = state.time
         state.shapes_left -= early
         if time >= state.next_shape:
             state.next_shape += every * ((time - state.next_shape) // every + 1.0)
-        self._log.shapes.append(np.array([time, *beam.shape()]))
+        shape = self.pair.upper.shape()
+        if shape is not None:
+            self._log.shapes.append(np.array([time, *shape]))

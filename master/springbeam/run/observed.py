@@ -11,14 +11,11 @@ from ..motion.events import Event
 from ..results.columns import MOST_SHOWN, normal_compliance
 from ..results.dense import between_rows
 from ..results.totals import shortest_contact
-from ..scene import Load, Scene
-from ..scene.frequencies import slowest_frequency
+from ..scene import Scene
 from ..scene.laws import stiffest
-from ..scene.linearised import contact_energy, spring_frequency
 from ..scene.loads import TableLoad
-from ..scene.modes import tip_modes
 from ..scene.resolution import SHORT, SHORT_IMPULSE, not_resolved, oscillating, window_of
-from ..scene.statics import tip_inertia
+from .loads import ON_BEAM, ON_SPRING
 from .stepping import Pair
 
 #: Warning of a run in which a force was too large for its column.
@@ -32,10 +29,10 @@ _DENSE, _POINTS = 1.0, (8, 96)
 _TOGETHER = 1024
 #: Share of an end's way that is not worth computing.
 _NEGLIGIBLE = 1e-3
-#: Modes of the beam that a table may move.
+#: Modes of a body that a table may move.
 _MODES = 20
-#: ∫ φ over length and tip value of the lowest mode of a slender beam; one that shears alone has 0.64.
-_MEAN = 0.4
+#: Columns whose sum is the energy that both bodies and the contact law store [J].
+_STORED = ("beam_kinetic", "beam_potential", "spring_kinetic", "spring_potential", "law_stored")
 
 
 def not_shown(scene: Scene, pair: Pair, steps: np.ndarray) -> str | None:
@@ -50,7 +47,7 @@ def why_not_resolved(
     scene: Scene, pair: Pair, H: float, steps: np.ndarray, events: Sequence[Event], misplaced: float | None
 ) -> str | None:
     """Return in words why a run in steps of H [s] whose ends are ``misplaced`` is not resolved; ``None`` if it is."""
-    least = SHORT_IMPULSE * least_momentum(scene, pair, steps)
+    least = SHORT_IMPULSE * least_momentum(pair, steps)
     lasted = shortest_contact(scene, steps, events, SHORT * H, least)
     sizes = steps["size"][steps["size"] > 0.0]
     late = float(np.sqrt(np.mean(sizes**3) / np.mean(sizes))) if scene.coupling.adaptive and len(sizes) else None
@@ -59,7 +56,7 @@ def why_not_resolved(
         misplaced or 0.0,
         oscillations=oscillating(scene, _oscillations(pair, steps)),
         shortest_contact=lasted,
-        left_out=left_out(scene, steps),
+        left_out=left_out(pair, steps),
         between_rows=between_rows(scene, steps),
         H=late,
     )
@@ -107,15 +104,16 @@ def force_window(scene: Scene, pair: Pair, steps: np.ndarray) -> float:
     """Return over which time the contact force is averaged before its peak is taken [s].
 
     It is ``contact.force_window``, or `springbeam.scene.resolution.WINDOW` of a period: that of a contact by a soft law
-    that opens where it is deepest, whose peak is the law's; else the slowest of the upper body alone; that of both
-    together where that does not oscillate; the run where nothing does.
+    that opens where it has taken all the energy, whose peak is the law's; else the slowest of the upper body alone;
+    that of both together where that does not oscillate; the run where nothing does.
     """
     if scene.contact.force_window is not None:
         return scene.contact.force_window
     upper, lower = pair.upper, pair.lower
     if pair.opens_softly and pair.law is not None:
         deepest = float((steps["y"] - steps["u_tip"]).max(initial=0.0))
-        stiffness = max(stiffest(pair.law, contact_energy(scene)), pair.law.slope(deepest))
+        energy = sum(steps[name] for name in _STORED)
+        stiffness = max(stiffest(pair.law, float(np.max(energy, initial=0.0))), pair.law.slope(deepest))
         omega = sqrt(stiffness * (1.0 / upper.inertia + 1.0 / lower.inertia))
     else:
         omega, _ = upper.oscillation() or (0.0, 0.0)
@@ -131,25 +129,31 @@ def _together(pair: Pair, steps: np.ndarray) -> float:
     return sqrt(stiffness / inertia) if 0.0 < stiffness < inf and 0.0 < inertia < inf else 0.0
 
 
-def least_momentum(scene: Scene, pair: Pair, steps: np.ndarray) -> float:
-    """Return the smaller one of both bodies' largest momenta [kg·m/s], without waves that a beam carries.
+def least_momentum(pair: Pair, steps: np.ndarray) -> float:
+    """Return the smaller one of both bodies' largest momenta [kg·m/s], without waves that a body carries.
 
     That of a body that does not move does not count; ∞ if there is none.
     """
     if not len(steps):
         return inf
-    speeds = np.abs(steps["v_tip_after"]).max(), np.abs(steps["z_after"]).max()
-    upper, lower = (body.mass * w if w else 0.0 for body, w in zip((pair.upper, pair.lower), speeds, strict=True))
-    if scene.beam is not None:
-        quarter = min(2.0 / slowest_frequency(scene.beam), scene.duration or inf)
-        upper = max(upper, tip_inertia(scene.beam) * np.ptp(steps["u_tip"]) / quarter)
-    return min((float(momentum) for momentum in (upper, lower) if momentum > 0.0), default=inf)
+    momenta = []
+    duration = pair.setup.end - pair.setup.start
+    for body, name, velocity in ((pair.upper, "u_tip", "v_tip_after"), (pair.lower, "y", "z_after")):
+        speed = float(np.abs(steps[velocity]).max())
+        momentum = body.mass * speed if speed > 0.0 else 0.0
+        omega, _ = body.oscillation() or (0.0, 0.0)
+        if omega > 0.0 and body.inertia > body.mass:  # its end is lighter than what swings
+            quarter = min(2.0 / omega, duration or inf)
+            momentum = max(momentum, body.inertia * float(np.ptp(steps[name])) / quarter)
+        if momentum > 0.0:
+            momenta.append(momentum)
+    return min(momenta, default=inf)
 
 
 # -- what steps leave out of measured loads ----------------------------------------------------------------------------
 
 
-def left_out(scene: Scene, steps: np.ndarray) -> float:
+def left_out(pair: Pair, steps: np.ndarray) -> float:
     """Return how far what the ``steps`` leave out of tables moves an end, over its largest distance from its start.
 
     Each step takes the projection of a load onto polynomials of degree 2 (`springbeam.run.loads`). What is left out
@@ -158,17 +162,18 @@ def left_out(scene: Scene, steps: np.ndarray) -> float:
 
     The answer is to first order, of bodies that are free, without their damping: at most.
     """
-    made, shares = steps[steps["size"] > 0.0], [0.0]
-    tables = [load for load in scene.loads if isinstance(load, TableLoad)]
-    if tables and len(made) and scene.beam is not None and not scene.massless:
-        omega, tip = (of_modes[:_MODES] for of_modes in tip_modes(scene.beam))
-        forces = [_on_beam(scene, load) for load in tables]
-        shares.append(_share(tables, forces, made, omega, tip**2, steps["u_tip_after"]))
-    if tables and len(made) and scene.spring is not None:
-        omega = np.array([max(spring_frequency(scene), 1.0 / scene.duration)])
-        on_top = {"spring": 1.0 / scene.spring.mass, "base": 1.0}
-        forces = [on_top.get(load.on, 0.0) for load in tables]
-        shares.append(_share(tables, forces, made, omega, np.ones(1), steps["y_after"]))
+    made = steps[steps["size"] > 0.0]
+    if not len(made):
+        return 0.0
+    slowest = 1.0 / (pair.setup.end - pair.setup.start)
+    shares = [0.0]
+    for body, name, places in ((pair.upper, "u_tip_after", ON_BEAM), (pair.lower, "y_after", ON_SPRING)):
+        tables = [load for load in pair.setup.loads if isinstance(load, TableLoad) and load.on in places]
+        modes = body.modes(steps[name]) if tables else None
+        if modes is not None:
+            omega = np.maximum(np.sqrt(np.maximum(modes[0][:_MODES], 0.0)), slowest)
+            forces = [body.moved_by(load) for load in tables]
+            shares.append(_share(tables, forces, made, omega, modes[2][:_MODES] ** 2, steps[name]))
     return max(shares)
 
 
@@ -190,17 +195,6 @@ def _share(
         return 0.0
     moved = [f * _swing(load, made, omega, weights, _NEGLIGIBLE * way / f) for load, f in acting]
     return sum(moved) / way
-
-
-def _on_beam(scene: Scene, load: Load) -> float:
-    """Return the largest force on a mode [N] of a ``load`` of 1, over the tip's displacement in that mode."""
-    beam = scene.beam
-    assert beam is not None
-    if load.on == "base":
-        return _MEAN * beam.density * beam.area * beam.length
-    if load.on == "beam" and load.at is None:
-        return _MEAN * beam.length * sum(map(abs, load.shape or (1.0,)))
-    return 0.0 if load.on == "spring" else 1.0
 
 
 def _swing(load: TableLoad, made: np.ndarray, omega: np.ndarray, weights: np.ndarray, negligible: float) -> float:

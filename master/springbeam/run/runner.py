@@ -12,8 +12,7 @@ from typing import Any
 
 from ..bodies.equilibrium import contact_at_rest
 from ..bodies.factory import findings, load_bodies
-from ..bodies.fmu_bodies import FmuBody
-from ..bodies.gate import admit
+from ..bodies.gate import admit, tried
 from ..bodies.protocol import Body
 from ..contact.interface import Rigid
 from ..results.recording import MemoryRecorder, Recorder
@@ -64,9 +63,12 @@ class Simulation(AbstractContextManager["Simulation"]):
             scene = scene.model_copy(update={"upper": scene.beam.model_copy(update={"approach": "elastic"})})
         self.scene = scene
         self.recorder = recorder or MemoryRecorder(scene)
-        given = [body.abilities for body in (upper, lower) if body is not None]
-        found = [finding.abilities for finding in findings(of_scene).values()]
-        setup = set_up(scene, *given, *found)
+        able = {table: finding.abilities for table, finding in findings(of_scene).items()}
+        H = scene.coupling.macro_step or 1e-3 * scene.time.t_end
+        for table, body in (("beam", upper), ("spring", lower)):
+            if body is not None:
+                able[table] = tried(body, scene.contact_time or 0.0, H)
+        setup = set_up(scene, *able.values())
         soft = None if setup.law is None or isinstance(setup.law, Rigid) else setup.law.force
         contact = contact_at_rest(of_scene, setup.degree, soft)
         self._bodies = beam, spring = load_bodies(of_scene, setup.start, setup.degree, contact)
@@ -75,7 +77,7 @@ class Simulation(AbstractContextManager["Simulation"]):
             update={"coupling": scene.coupling.model_copy(update={"degree": setup.degree})}
         )
         try:
-            admit(self._resolved, setup.start, upper or beam, lower or spring)
+            admit(self._resolved, setup.start, upper or beam, lower or spring, able)
             self._master = Master(setup, upper or beam, lower or spring, self.recorder, contact)
         except BaseException:
             self.close()
@@ -186,7 +188,7 @@ class Simulation(AbstractContextManager["Simulation"]):
         wall_time = perf_counter() - self._loaded
         amounts = summary(self._resolved, self._master, self.recorder)
         told = zip(("beam", "spring"), self._bodies, strict=True)
-        counting = {name: body for name, body in told if isinstance(body, FmuBody)}
+        counting = {name: body for name, body in told if body is not None and body.steps is not None}
         return {
             **status,
             "version": version("springbeam"),

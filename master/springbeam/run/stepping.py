@@ -10,10 +10,10 @@ from ..bodies import force
 from ..bodies.elements import RigidWall
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force
 from ..contact.interface import Interface
-from ..contact.phases import Joint, Phase
+from ..contact.phases import Phase
 from ..coupling import coupling_of
 from ..coupling.protocol import Step, Uncoupled
-from ..motion.events import EventKind
+from ..motion.events import EventKind, Joint
 from .loads import Loads
 from .outcome import RunStopped
 from .setup import Setup
@@ -120,7 +120,8 @@ class Pair:
         self.bodies = (self.upper, self.lower)
         for body in self.bodies:
             body.take_place(upper=body is self.upper)
-        self.repeatable = all(body.abilities.state for body in self.bodies)
+        abilities = [body.can() for body in self.bodies]
+        self.repeatable = all(able.state for able in abilities)
         equilibrium = setup.equilibrium
         if equilibrium is None:
             equilibrium = self.lower.motion().displacement
@@ -149,7 +150,7 @@ class Pair:
         self.joined = coupling_of(setup.scheme, setup.degree, setup.tolerance, self.law, self.upper.reach)
         self._uncoupled = self.joined if self.law else Uncoupled()
         #: Whether a step can be repeated with another size.
-        self.divides = self.repeatable and all(body.abilities.any_size for body in self.bodies)
+        self.divides = self.repeatable and all(able.any_size for able in abilities)
 
     def initial_state(self, time: float, contact: float = 0.0) -> State:
         """Return the state before anything happens; ends that a soft law joins for good are joined from the start.
