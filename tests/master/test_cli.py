@@ -3,11 +3,14 @@
 import errno
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+import typer
 from bodies import simulate
 from commands import command, printed
 from matplotlib.figure import Figure
@@ -15,6 +18,7 @@ from runs import block
 
 import springbeam.run.runner
 from springbeam import Event, RunStopped, load_scene, with_changes
+from springbeam.cli.common import interruptible
 from springbeam.cli.run import _event_table
 from springbeam.motion.events import EventKind
 from springbeam.results.directory import PICTURES
@@ -197,3 +201,26 @@ def test_many_events_of_a_kind_push_out_no_others():
     assert kinds[-3:] == ["separation", "+87 stop_impact, until", "+87 unseated, until"]
     assert [str(cell) for cell in columns[1]][-2:] == ["94.00000000", "94.50000000"]
     assert [str(cell) for cell in columns[5]][-2:] == ["87", "87"]
+
+
+def test_an_interrupt_that_is_lost_in_a_finaliser_is_not_the_last(capsys):
+    """Python reports what a finaliser raises, or a function called from C, and goes on: the command had not ended."""
+
+    class Finalised:
+        def __del__(self):
+            signal.raise_signal(signal.SIGTERM)
+            len("")  # Python acts on the signal here
+
+    made = [Finalised()]
+
+    @interruptible()
+    def work():
+        end = time.monotonic() + 60.0
+        made.clear()
+        while time.monotonic() < end:
+            time.sleep(0.01)
+
+    with pytest.raises(typer.Exit) as ended:
+        work()
+    assert ended.value.exit_code == 3
+    assert capsys.readouterr().err == "error: interrupted\n"

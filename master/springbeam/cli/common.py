@@ -42,6 +42,8 @@ GONE = {
 }
 #: How long a signal waits for Python to act on it [s].
 PATIENCE = 5.0
+#: After how long a signal is sent again whose exception was lost [s].
+_AGAIN = 0.05
 
 
 def complete_scene(incomplete: str) -> list[str]:
@@ -255,7 +257,8 @@ def interruptible() -> Iterator[None]:
     """End the command with exit code 3 on Ctrl-C, and on SIGTERM, which batch systems send.
 
     Python acts on a signal when the call into an FMU returns. The wakeup descriptor gets it at once: if Python has not
-    acted within `PATIENCE`, the process ends. What a run has handed over is on disk then, as after a kill.
+    acted within `PATIENCE`, the process ends. What a run has handed over is on disk then, as after a kill. An exception
+    that is raised in a finaliser, or in a function that an FMU has called, is lost: the signal is sent again.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -273,17 +276,30 @@ def interruptible() -> Iterator[None]:
             typer.echo(f"error: interrupted: a call into an FMU has not returned within {PATIENCE:g} s", err=True)
             os._exit(STOPPED)
 
+    def lost(unraisable: Any) -> None:
+        if issubclass(unraisable.exc_type, KeyboardInterrupt):
+            again.append(threading.Timer(_AGAIN, os.kill, (os.getpid(), signal.SIGTERM)))
+            again[-1].start()
+        else:
+            hook(unraisable)
+
+    again = list[threading.Timer]()
+    hook = sys.unraisablehook
     ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     numbers = (signal.SIGTERM,) if ignored else (signal.SIGINT, signal.SIGTERM)
     before = {number: signal.signal(number, interrupt) for number in numbers}
     wakeup = signal.set_wakeup_fd(sender, warn_on_full_buffer=False)
     watchdog = threading.Thread(target=watch, name="watchdog", daemon=True)
     watchdog.start()
+    sys.unraisablehook = lost
     try:
         yield
     except KeyboardInterrupt:
         fail(STOPPED, "interrupted")
     finally:
+        sys.unraisablehook = hook
+        for timer in again:
+            timer.cancel()
         signal.set_wakeup_fd(wakeup)
         for number, handler in before.items():
             signal.signal(number, handler)
