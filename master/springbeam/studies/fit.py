@@ -247,7 +247,7 @@ class Fit(Study):
     def expected(self) -> int:
         """Number of runs if the first look finds what is left to be noise."""
         keys = len(self.ranges)
-        return len(self.cases()) + _LOOKS[0] * (_FIRST_LOOK - 1 + keys) + 2 * keys + 3
+        return len(self.cases()) + _LOOKS[0] * (_FIRST_LOOK + keys) + 2 * keys + 2
 
     def settings(self) -> dict[str, Any]:
         """Return what tells one fit from another, the measurements by what they hold."""
@@ -331,7 +331,7 @@ class Fit(Study):
             waiting = sorted((search for search in begun if search not in chosen), key=partial(_promise, begun))
             first = waiting[: looks - 1]
             looked += [search.least(_FIRST_LOOK) for search in first]
-            other = self._elsewhere(trial, begun, min(looked, key=_cost)) if looked else None
+            other = self._elsewhere(trial, min(looked, key=_cost)) if looked else None
             second = [other] if other is not None else waiting[looks - 1 : looks]
             looked += [search.least(_FIRST_LOOK) for search in second]
             looked.sort(key=_cost)
@@ -358,25 +358,21 @@ class Fit(Study):
         search = Search(run, self.data, self._logarithms, at, row, free=free)
         return search if search.part.sum() > len(at) + free else None
 
-    def _elsewhere(self, trial: Callable[[Row], Row], begun: Sequence[Search], last: Search) -> Search | None:
-        """Return the best of searches that begins with another shift of the clock than ``last``, if there is one.
+    def _elsewhere(self, trial: Callable[[Row], Row], last: Search) -> Search | None:
+        """Return a search that begins with the keys to which ``last`` has led, and another shift of the clock.
 
-        Keys can make up for a clock that is a period late, as a damping for a decay. ``last`` is where
-        the best has led so far.
+        Keys can make up for a clock that is a period late, as a damping for a decay. ``None`` where no other shift is.
         """
+        if self.shift is not None:
+            return None
         turns = [rms(last.row["slope"][name]) / self.data.spread(name) for name in self.data.values]
         period = 2.0 * math.pi / max(*turns, 1e-300)
-        several = [
-            (misfit, k, shift)
-            for k, search in enumerate(begun)
-            for shift, misfit in [(search.row[SHIFT], search.cost), *search.row["others"]]
-            if abs(shift - last.row[SHIFT]) > 0.4 * period
-        ]
-        near = 0.1 * period
-        for _, k, shift in sorted(several):
-            if found := self._begun(trial, begun[k].at, {"lowest": shift - near, "highest": shift + near}):
-                return found
-        return None
+        row = trial(self._values(last.at))
+        several = [(misfit, shift) for shift, misfit in row["others"] if abs(shift - last.row[SHIFT]) > 0.4 * period]
+        if not several:
+            return None
+        _, shift = min(several)
+        return self._begun(trial, last.at, {"lowest": shift - 0.1 * period, "highest": shift + 0.1 * period})
 
     def _judged(self, trial: Callable[[Row], Row], looked: Sequence[Search]) -> Found:
         """Go on with the best of searches and with those that may end as well; return what tells how good the best is.
