@@ -62,21 +62,21 @@ Expansion Flight::expand(double size) {
   size_ = size;
   loads_ = start_.loads.scaled(size);
   for (touching_ = false;; touching_ = true) {
-    Expansion motion(start_.y, start_.z, start_.depth, loads_, size);
+    Expansion motion(motion_.elongation(start_.y), start_.z, start_.depth, loads_, size);
     while (motion.highest <= least_order) motion_.extend(motion, touching_, loads_, size);
-    if (start_.released) motion.y[2] = 0.0;
+    if (start_.released) motion.x[2] = 0.0;
     if (touching_ || !parameters_.compliant() || direction(motion.depth) <= 0.0) return motion;
   }
 }
 
 Motion::Rates Flight::rates(const Expansion& motion) const {
-  const Series &y = motion.y, &depth = motion.depth;
+  const Series &x = motion.x, &depth = motion.depth;
   Compliance::Slopes slopes{};
   if (touching_) {
     const double deepest = start_.depth + std::abs(depth[1]) + std::abs(depth[2]);
     slopes = motion_.compliance().slopes(deepest, depth[1] / size_);
   }
-  const auto rates = motion_.rates(std::abs(start_.y) + std::abs(y[1]) + std::abs(y[2]), slopes);
+  const auto rates = motion_.rates(std::abs(x[0]) + std::abs(x[1]) + std::abs(x[2]), slopes);
   if (!std::isfinite(rates.sum())) throw SolverError(out_of_range);
   return rates;
 }
@@ -99,16 +99,16 @@ bool Flight::analytic(const Expansion& motion) const {
 /// exponent says, those between may be 0.
 double Flight::neglected(const Expansion& motion, double oscillation) const {
   const std::size_t k = motion.highest;
-  const Series& c = touching_ ? motion.depth : motion.y;
+  const Series& c = touching_ ? motion.depth : motion.x;
   double before = 0.0;
   for (std::size_t j = k - Compliance::highest_power; j < k; ++j) before = std::max(before, std::abs(c[j]));
   return static_cast<double>(k) * std::abs(c[k]) + size_ * oscillation * (size_ * oscillation) * before;
 }
 
 void Flight::follow(Expansion& motion, double oscillation) {
-  auto& y = motion.y;
+  auto& x = motion.x;
   const double part = std::max(share * parameters_.relative_tolerance, least_share);
-  const Series& c = touching_ ? motion.depth : y;
+  const Series& c = touching_ ? motion.depth : x;
   const auto allowed = [&] {
     return part * std::max({std::abs(c[1]), std::abs(c[2]), std::abs(c[3]), std::abs(c[4])});
   };
@@ -122,7 +122,7 @@ void Flight::follow(Expansion& motion, double oscillation) {
   }
   const int order = static_cast<int>(motion.highest) - 1;
 
-  Series to_stop = y, to_tip = motion.depth;
+  Series to_stop = x, to_tip = motion.depth;
   to_stop[0] = start_.gap;
   if (!touching_)
     for (double& c : to_tip) c = -c;
@@ -132,7 +132,7 @@ void Flight::follow(Expansion& motion, double oscillation) {
   const double H = size_;
   double rise = 0.0, faster = 0.0, integral = 0.0, integral_2 = 0.0;
   for (int k = order; k > 0; --k) {
-    const double c = y[static_cast<std::size_t>(k)];
+    const double c = x[static_cast<std::size_t>(k)];
     rise = (rise + c) * s;
     integral = (integral + c / (k + 1)) * s;
     integral_2 = (integral_2 + c / ((k + 1) * (k + 2))) * s;
@@ -163,7 +163,7 @@ double Flight::dissipated(const Expansion& motion, int order, double s) const {
   double lost = 0.0;
   if (motion_.damping() > 0.0)
     lost += motion_.damping() / size_ *
-            work([&](std::size_t i) { return static_cast<double>(i + 1) * motion.y[i + 1]; }, motion.y, order - 1);
+            work([&](std::size_t i) { return static_cast<double>(i + 1) * motion.x[i + 1]; }, motion.x, order - 1);
   if (touching_ && law.damped())
     lost += work([&](std::size_t i) { return motion.contact.elastic[i] + motion.contact.damping[i]; }, motion.depth,
                  order - 2) -

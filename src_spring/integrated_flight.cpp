@@ -59,7 +59,7 @@ void IntegratedFlight::launch() {
 
   // What y and z are, or become over the span or the time in which the motion changes.
   const Compliance::Slopes slopes = touching_ ? law.slopes(start_.depth, rate) : Compliance::Slopes{};
-  const double change = motion_.rates(std::abs(start_.y), slopes).sum();
+  const double change = motion_.rates(std::abs(motion_.elongation(start_.y)), slopes).sum();
   const double span = H * change > 1.0 ? 1.0 / change : H;
   const double velocity = std::abs(z) + std::abs(a) * span, displacement = std::abs(start_.y) + velocity * span;
   // Rounding of the forces, but that of damping, which grows no larger than that of the velocity.

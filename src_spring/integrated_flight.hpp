@@ -1,9 +1,9 @@
 // Free motion of the spring's top as an implicit system for IDA, where no Taylor series serves (flight.hpp).
 //
-// In scaled time s = τ/H, with q = y − y₀, p = H ẏ, A = ∫₀ˢ q, B = ∫₀ˢ A and the dissipated energy e:
+// In scaled time s = τ/H, with q = y − y(0), p = H ẏ, A = ∫₀ˢ q, B = ∫₀ˢ A and the dissipated energy e:
 //     F = ( q' − p,   p' − H² ÿ(y, ẏ, τ),   A' − q,   B' − A,   e' − H (α_s ẏ² + d) ) = 0,
-// d the power that the contact dissipates. q, p, A, B are lengths; ∫y = H (y₀ s + A), ∫∫y = H² (y₀ s²/2 + B). All are
-// under error control.
+// d the power that the contact dissipates. q, p, A, B are lengths; ∫y = H (y(0) s + A), ∫∫y = H² (y(0) s²/2 + B). All
+// are under error control.
 #pragma once
 
 #include "events.hpp"

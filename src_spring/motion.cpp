@@ -31,6 +31,7 @@ Motion::Motion(const Parameters& parameters)
       damping_(parameters.damping),
       k1_(parameters.linear_stiffness),
       k2_(parameters.cubic_stiffness),
+      unloaded_(parameters.unloaded),
       compliance_(parameters.compliance_stiffness, parameters.compliance_exponent, parameters.compliance_damping) {}
 
 double Motion::acceleration(double y, double z, double force, double contact) const {
@@ -38,16 +39,17 @@ double Motion::acceleration(double y, double z, double force, double contact) co
 }
 
 double Motion::acceleration_by_displacement(double y, double contact_slope) const {
-  return -(k1_ + 3.0 * k2_ * y * y + contact_slope) / mass_;
+  const double x = elongation(y);
+  return -(k1_ + 3.0 * k2_ * x * x + contact_slope) / mass_;
 }
 
-Expansion::Expansion(double y, double z, double depth, const Loads& loads, double size)
-    : y{y, size * z}, depth{depth, size * z - loads.tip[1], -loads.tip[2] / 2} {}
+Expansion::Expansion(double x, double z, double depth, const Loads& loads, double size)
+    : x{x, size * z}, depth{depth, size * z - loads.tip[1], -loads.tip[2] / 2} {}
 
 void Expansion::shorten(double factor) {
   double power = 1.0;
-  for (std::size_t k = 0; k < y.size(); ++k, power *= factor) {
-    y[k] *= power;
+  for (std::size_t k = 0; k < x.size(); ++k, power *= factor) {
+    x[k] *= power;
     depth[k] *= power;
     contact.elastic[k] *= power;
     contact.damping[k] *= power;
@@ -55,17 +57,17 @@ void Expansion::shorten(double factor) {
 }
 
 void Motion::extend(Expansion& motion, bool touching, const Loads& loads, double size) const {
-  auto& [y, square, depth, contact, highest] = motion;
+  auto& [x, square, depth, contact, highest] = motion;
   const std::size_t k = highest - 1;
   double cube = 0.0;
-  for (std::size_t i = 0; i <= k; ++i) square[k] += y[i] * y[k - i];
-  for (std::size_t i = 0; i <= k; ++i) cube += y[i] * square[k - i];
+  for (std::size_t i = 0; i <= k; ++i) square[k] += x[i] * x[k - i];
+  for (std::size_t i = 0; i <= k; ++i) cube += x[i] * square[k - i];
   if (touching) compliance_.extend(contact, k, depth, size);
   const double n = static_cast<double>(k);
-  const double force = coefficient(loads.force, k) - k1_ * y[k] - k2_ * cube - damping_ * (n + 1.0) * y[k + 1] / size -
+  const double force = coefficient(loads.force, k) - k1_ * x[k] - k2_ * cube - damping_ * (n + 1.0) * x[k + 1] / size -
                        contact.elastic[k] - contact.damping[k];
-  y[++highest] = force / mass_ * size * size / ((n + 1.0) * (n + 2.0));
-  depth[highest] += y[highest];
+  x[++highest] = force / mass_ * size * size / ((n + 1.0) * (n + 2.0));
+  depth[highest] += x[highest];
 }
 
 Motion::Rates Motion::rates(double reach, const Compliance::Slopes& contact) const {
@@ -83,6 +85,9 @@ Polynomial Motion::holding_force(double y, const Loads& loads, bool touching, do
   return force;
 }
 
-double Motion::potential_energy(double y) const { return (k1_ / 2 + k2_ / 4 * y * y) * y * y; }
+double Motion::potential_energy(double y) const {
+  const double square = elongation(y) * elongation(y);
+  return (k1_ / 2 + k2_ / 4 * square) * square;
+}
 
 }  // namespace spring

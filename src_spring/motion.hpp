@@ -1,5 +1,6 @@
 // The spring's equation of motion while its top is free,
-//     m ÿ = F(τ) − α_s ẏ − k1 y − k2 y³ − [touching] C(y − u_tip(τ), ẏ − u̇_tip(τ)),      F = −C + N + f_s − m a,
+//     m ÿ = F(τ) − α_s ẏ − k1 x − k2 x³ − [touching] C(y − u_tip(τ), ẏ − u̇_tip(τ)),
+//     x = y − y₀ the spring's elongation,   F = −C + N + f_s − m a,
 // with its Jacobian and, for the start of a segment, its time derivatives.
 #pragma once
 
@@ -22,15 +23,15 @@ struct Loads {
   Loads scaled(double size) const { return {spring::scaled(force, size), spring::scaled(tip, size)}; }
 };
 
-/// A motion near a segment's start: Taylor coefficients in s = τ/H of y, of y², of the depth y − u_tip and of the
-/// contact. Those of y are known up to `highest`.
+/// A motion near a segment's start: Taylor coefficients in s = τ/H of the elongation x = y − y₀, of x², of the depth
+/// y − u_tip and of the contact. Those of x are known up to `highest`; from s¹ on they are those of y.
 struct Expansion {
-  Series y{}, square{}, depth{};
+  Series x{}, square{}, depth{};
   Compliance::Along contact;
   std::size_t highest = 1;
 
-  /// From y [m], z [m/s] and y − u_tip, under scaled loads, over a segment of size H [s].
-  Expansion(double y, double z, double depth, const Loads& loads, double size);
+  /// From x [m], z [m/s] and y − u_tip, under scaled loads, over a segment of size H [s].
+  Expansion(double x, double z, double depth, const Loads& loads, double size);
   /// To a segment of H × `factor`; nothing can be added then.
   void shorten(double factor);
 };
@@ -51,15 +52,17 @@ class Motion {
   /// Adds one coefficient to the motion; loads and size are those that it began with.
   void extend(Expansion& motion, bool touching, const Loads& loads, double size) const;
 
-  /// Bounds of the rates with which the solution can change, for |y| ≤ `reach`: √(stiffness/m), damping/m [1/s].
+  /// Bounds of the rates with which the solution can change, for |x| ≤ `reach`: √(stiffness/m), damping/m [1/s].
   struct Rates {
     double oscillation, decay;
     double sum() const { return oscillation + decay; }
   };
   Rates rates(double reach, const Compliance::Slopes& contact) const;
 
-  double spring_force(double y) const { return (k1_ + k2_ * y * y) * y; }  ///< k1 y + k2 y³ [N]
-  /// Force that would hold the top at y, at rest, under F and C: −F + k1 y + k2 y³ + C [N].
+  double elongation(double y) const { return y - unloaded_; }  ///< x [m]
+  /// k1 x + k2 x³ [N]
+  double spring_force(double y) const { return (k1_ + k2_ * elongation(y) * elongation(y)) * elongation(y); }
+  /// Force that would hold the top at y, at rest, under F and C: −F + k1 x + k2 x³ + C [N].
   double holding_force(double y, double force, double contact) const { return spring_force(y) - force + contact; }
   /// The same with its first two derivatives [N, N/s, N/s²].
   Polynomial holding_force(double y, const Loads& loads, bool touching, double depth) const;
@@ -70,7 +73,7 @@ class Motion {
   double damping() const { return damping_; }
 
  private:
-  double mass_, damping_, k1_, k2_;
+  double mass_, damping_, k1_, k2_, unloaded_;
   Compliance compliance_;
 };
 

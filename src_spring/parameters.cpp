@@ -19,10 +19,10 @@ void check(const Parameters& p) {
                                 ", cubic_stiffness = " + number(p.cubic_stiffness) +
                                 ": a softening spring (cubic_stiffness < 0) needs linear_stiffness > 0, "
                                 "else there is no potential well");
-  if (std::abs(p.displacement) > p.hilltop())
+  if (std::abs(p.displacement - p.unloaded) > p.hilltop())
     throw std::invalid_argument("spring: displacement = " + number(p.displacement) +
                                 ": the start of a softening spring must be within the hilltop of its potential, "
-                                "|y| <= sqrt(linear_stiffness/|cubic_stiffness|) = " +
+                                "|y - unloaded| <= sqrt(linear_stiffness/|cubic_stiffness|) = " +
                                 number(p.hilltop()));
   if (p.stop_enabled && p.displacement < p.stop_position)
     throw std::invalid_argument("spring: displacement = " + number(p.displacement) +

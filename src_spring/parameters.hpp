@@ -14,6 +14,7 @@ struct Parameters {
   double damping = 0.0;           ///< α_s [N·s/m]
   double linear_stiffness = 1.0;  ///< k1 [N/m]
   double cubic_stiffness = 0.0;   ///< k2 [N/m³]
+  double unloaded = 0.0;          ///< y₀ [m], where the spring is without force
   double displacement = 0.0;      ///< y at the start [m]
   double velocity = 0.0;          ///< ẏ at the start [m/s]
   ContactLaw contact_law = ContactLaw::external;
@@ -27,7 +28,7 @@ struct Parameters {
   double absolute_tolerance = 1e-14;
 
   bool compliant() const { return contact_law == ContactLaw::normal_compliance; }
-  /// |y| where a softening spring's potential has its hilltop, √(k1/|k2|); infinity for any other.
+  /// |y − y₀| where a softening spring's potential has its hilltop, √(k1/|k2|); infinity for any other.
   double hilltop() const;
 };
 

@@ -1,5 +1,5 @@
 // The top at rest on the foundation, y = φ, under loads that are quadratic in time. The force that holds it there,
-//     N(τ) = −F(τ) + k1 y + k2 y³ + C(δ(τ), δ̇(τ)),   δ(τ) = φ − u_tip(τ),
+//     N(τ) = −F(τ) + k1 (y − y₀) + k2 (y − y₀)³ + C(δ(τ), δ̇(τ)),   δ(τ) = φ − u_tip(τ),
 // is known, so there is nothing to integrate numerically but the contact force, by quadrature.
 #pragma once
 

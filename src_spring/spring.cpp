@@ -129,7 +129,7 @@ class Spring::Step {
     state_.y = came.y;
     state_.z = came.z;
     t_ = came.at_end ? size_ : t_ + came.elapsed;
-    if (std::abs(came.y) > far * parameters_.hilltop()) fail("it goes on for ever", came.y, t_);
+    if (std::abs(came.y - parameters_.unloaded) > far * parameters_.hilltop()) fail("it goes on for ever", came.y, t_);
     // Rounding must not put the top below the stop. Not from the gap: a distant stop would quantise y.
     if (parameters_.stop_enabled)
       state_.y = came.event == Event::stop ? parameters_.stop_position : std::max(came.y, parameters_.stop_position);
@@ -140,10 +140,10 @@ class Spring::Step {
 
   /// Past the hilltop, a motion that nothing brings back reaches infinity in finite time, where the solver fails.
   [[noreturn]] void fail(const std::string& why, double y, double reached) const {
-    const bool away = std::abs(y) > parameters_.hilltop();
+    const bool away = std::abs(y - parameters_.unloaded) > parameters_.hilltop();
     throw StepFailure("spring: a step of " + number(size_) + " s fails after " + number(reached) + " s: " +
-                          (away ? "the top has run away, past its hilltop |y| = " + number(parameters_.hilltop()) +
-                                      " m, where a softening spring pushes outwards"
+                          (away ? "the top has run away, past its hilltop |y - unloaded| = " +
+                                      number(parameters_.hilltop()) + " m, where a softening spring pushes outwards"
                                 : why + "; use a smaller step size"),
                       reached);
   }

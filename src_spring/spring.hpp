@@ -1,7 +1,7 @@
 // The Duffing spring with its foundation, integrated by SUNDIALS IDA as an implicit system F(t, Y, Ẏ) = 0.
-//     m ÿ + α_s ẏ + k1 y + k2 y³ = −C + N + f_s − m a   (Ahn & Tate, eq. (6)),      up is positive.
-// a is the acceleration of the foundation, relative to which y is counted.
-// C comes from outside (contact_law external) or from the normal compliance inside, C = λ_nc δ₊^p (1 + χ δ̇)₊,
+//     m ÿ + α_s ẏ + k1 (y − y₀) + k2 (y − y₀)³ = −C + N + f_s − m a   (Ahn & Tate, eq. (6)),      up is positive.
+// y₀ is where the spring is without force, 0 in (6); a is the acceleration of the foundation, relative to which y is
+// counted. C comes from outside (contact_law external) or from the normal compliance inside, C = λ_nc δ₊^p (1 + χ δ̇)₊,
 // δ = y − u_tip;
 // N comes from outside or, with the stop enabled, from Signorini's condition (8) with restitution:
 //     0 ≤ N ⊥ y − φ ≥ 0,   z⁺ = −e z⁻ at an impact. Impacts that die out end seated, y = φ, until N would be < 0.
@@ -68,8 +68,8 @@ class Spring {
   int impacts() const { return static_cast<int>(state_.impacts); }  ///< on the foundation inside, since the start
   double last_impact() const { return state_.last_impact; }         ///< when [s]; −1: there was none
   double kinetic_energy() const;                                    ///< ½ m z² [J]
-  double potential_energy() const;                                  ///< ½ k1 y² + ¼ k2 y⁴ [J]
-  double spring_force() const;                                      ///< k1 y + k2 y³ [N]
+  double potential_energy() const;  ///< ½ k1 (y − y₀)² + ¼ k2 (y − y₀)⁴ [J]
+  double spring_force() const;      ///< k1 (y − y₀) + k2 (y − y₀)³ [N]
   // Under the inputs at the end of the last step, or as observed since:
   double acceleration() const;  ///< ż [m/s²]
   /// Its rate [m/s³], with F at `force_rate` and C of the law inside at `reaction_rate` [N/s].

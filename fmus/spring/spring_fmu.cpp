@@ -25,7 +25,7 @@ using spring::Spring;
 
 /// The spring's parameters, where its top rests, and what exchange between steps adds to them.
 struct FmuParameters : Parameters {
-  double equilibrium = 0.0;  ///< Ψ [m]: for the partner; in (6) the spring's force is 0 at y = 0
+  double equilibrium = 0.0;  ///< Ψ [m]: for the partner; it plays no part in the motion
   double gravity = 0.0;      ///< [m/s²]
   double communication_step = 0.0, tip_response = 0.0, tip_response_2 = 0.0;
 };
@@ -284,8 +284,8 @@ fmi::Table fmi::make_table() {
   t.identifier = "spring";
   t.title = "DuffingSpring";
   t.description =
-      "Duffing spring m y'' + alpha_s y' + k1 y + k2 y^3 = -C + N + f_s under a contact force C, above a rigid "
-      "foundation";
+      "Duffing spring m y'' + alpha_s y' + k1 x + k2 x^3 = -C + N + f_s, x = y - unloaded, under a contact force C, "
+      "above a rigid foundation";
   t.stop_time = 0.6;
   t.step_size = 1e-3;
   t.ends_steps_early = true;
@@ -302,10 +302,12 @@ fmi::Table fmi::make_table() {
   parameter("damping", "N.s/m", &Parameters::damping, "viscous damping alpha_s").at_least(0);
   parameter("linear_stiffness", "N/m", &Parameters::linear_stiffness, "linear stiffness k1");
   parameter("cubic_stiffness", "N/m3", &Parameters::cubic_stiffness, "cubic stiffness k2; < 0 softens");
-  parameter("equilibrium", "m", &FmuParameters::equilibrium,
-            "position Psi of the top when nothing touches it, for whoever reads the parameters: the motion begins at "
-            "the start "
-            "value of displacement and the spring's force is 0 at y = 0");
+  parameter("unloaded", "m", &Parameters::unloaded,
+            "position of the top where the spring is without force: the force is k1 x + k2 x^3, x = y - unloaded");
+  parameter(
+      "equilibrium", "m", &FmuParameters::equilibrium,
+      "position Psi of the top at the start, for whoever reads the parameters: the motion begins at the start value of "
+      "displacement, and the spring is without force at unloaded");
   parameter("gravity", "m/s2", &FmuParameters::gravity,
             "acceleration of gravity g, downward: a force of -mass*g, part of external_force in load_work");
   parameter("contact_law", "", &Parameters::contact_law, "1 = external, 2 = normal compliance inside")
@@ -384,9 +386,9 @@ fmi::Table fmi::make_table() {
                                         "compliance_damping", "displacement", "tip_displacement", "tip_velocity",
                                         // with communication_step > 0, of which the first is foreseen:
                                         "communication_step", "tip_response", "tip_velocity_forecast", "velocity",
-                                        "mass", "damping", "linear_stiffness", "cubic_stiffness", "external_force",
-                                        "base_acceleration", "foundation_force", "stop_enabled", "stop_position",
-                                        "restitution", "gravity"};
+                                        "mass", "damping", "linear_stiffness", "cubic_stiffness", "unloaded",
+                                        "external_force", "base_acceleration", "foundation_force", "stop_enabled",
+                                        "stop_position", "restitution", "gravity"};
   using M = const SpringModel&;
   add.output("displacement_integral", "m.s", "integral of displacement over the last step",
              of(&Spring::displacement_integral), of(&Spring::displacement));
@@ -433,7 +435,7 @@ fmi::Table fmi::make_table() {
       .from({"mass", "velocity"});
   add.output("potential_energy", "J", "potential energy of the spring", of(&Spring::potential_energy),
              [](M m) { return m.spring->spring_force() * m.spring->velocity(); })
-      .from({"linear_stiffness", "cubic_stiffness", "displacement"});
+      .from({"linear_stiffness", "cubic_stiffness", "unloaded", "displacement"});
   add.output(
          "contact_energy", "J", "energy stored in the contact law inside", [](M m) { return m.contact_energy(); },
          [](M m) { return m.contact_power(); })

@@ -162,7 +162,7 @@ TEST(IntegratedFlight, JacobianMatchesDifferences) {
 Series expanded(const Motion& motion, double y, double z, const Loads& loads, double H, bool touching, double depth) {
   Expansion e(y, z, depth, loads, H);
   while (e.highest <= max_order) motion.extend(e, touching, loads, H);
-  return e.y;
+  return e.x;
 }
 
 // The coefficients that a start is expanded in, against differences of those one lower at later starts; for contact

@@ -83,6 +83,54 @@ def test_ends_that_touch_stay_at_rest_under_the_force_of_statics(name):
     assert np.abs(columns["energy_residual"]).max() < 1e-13
 
 
+FLOOR = -0.01  # m, above where the load takes the spring
+ELEMENT = {"element": "spring_damper", "mass": MASS, "stiffness": K1}
+
+
+@pytest.mark.parametrize("lower", [SPRING, ELEMENT], ids=["spring", "element"])
+@pytest.mark.parametrize(
+    "law", [{}, {"contact": {"law": "tie"}}, link("compliance", exponent=1.0)], ids=["tied", "tie", "compliance"]
+)
+def test_a_spring_that_would_rest_below_its_stop_rests_on_it(lower, law):
+    """N = C + k₁ φ + m g − f, and C is the force that bends the beam to the stop, or what the law makes of the rest.
+
+    The stop is elastic: a top that fell on it would bounce for ever.
+    """
+    what = scene(spring={**lower, "external_force": -30.0}, stop={"position": FLOOR, "restitution": 1.0}, **law)
+    run = run_in_memory(what)
+    soft = 1.0 / LINK if what.contact.soft else 0.0
+    C = (FLOOR - hanging(what.beam)) / (tip_compliance(what.beam) + soft)
+    np.testing.assert_allclose(run.y, FLOOR, rtol=1e-14)
+    np.testing.assert_allclose(run.contact_force, C, rtol=1e-8)
+    np.testing.assert_allclose(run.foundation_force, C + K1 * FLOOR + MASS * G + 30.0, rtol=1e-8)
+    assert set(run.phase) == {"seated"}
+    assert {event.kind for event in run.events} <= {EventKind.IMPACT}
+    assert np.abs(run.energy_residual).max() < 1e-13
+    if what.spring is not None:
+        reference = event_driven.integrate(what)
+        assert reference.foundation_force[-1] == pytest.approx(run.foundation_force[-1], rel=1e-8)
+        assert {event.kind for event in reference.events} <= {EventKind.IMPACT}
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-3])
+def test_elements_start_at_rest_under_their_loads(gap):
+    """Two masses on springs k, pressed together by f on the upper one; apart where the gap is larger than f/k."""
+    upper, f = {**ELEMENT, "external_force": -1.0}, 1.0
+    what = scene(beam=upper, spring=ELEMENT, contact={"gap": gap})
+    run = run_in_memory(what)
+    C = max(f - K1 * gap, 0.0) / 2.0
+    np.testing.assert_allclose(run.u_tip, (-MASS * G - f + C) / K1, rtol=1e-12)
+    np.testing.assert_allclose(run.y, -gap + (-MASS * G - C) / K1, rtol=1e-12)
+    np.testing.assert_allclose(run.contact_force, C, atol=1e-6)
+    assert np.abs(run.energy_residual).max() < 1e-15
+
+
+def test_an_element_below_a_beam_rests_as_our_spring():
+    ours, element = (run_in_memory(scene(spring=lower)) for lower in (SPRING, ELEMENT))
+    assert element.u_tip[-1] == pytest.approx(ours.u_tip[-1], rel=1e-12)
+    assert element.contact_force[-1] == pytest.approx(ours.contact_force[-1], rel=1e-8)
+
+
 def test_a_shock_on_a_linear_pair_at_rest_is_the_shock_alone_beside_its_statics():
     shock = {"on": "base", "signal": "half_sine", "amplitude": 300.0, "duration": 5e-3}
     tie = {"spring": SPRING, "contact": {"law": "tie"}}

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import closing
 
 from ..scene import Scene
+from ..scene.partners import SpringDamperElement
 from ..scene.statics import tip_compliance
 from .factory import load_bodies, top_at_rest
 
@@ -33,7 +34,11 @@ def contact_at_rest(scene: Scene, degree: int, law: Callable[[float], float] | N
     if deep == 0.0 or (deep < 0.0 and not scene.contact.lasting):
         return 0.0
     # What would close the gap, were the lower end rigid; a wall above does not move, and any force will do.
-    scale = deep / tip_compliance(scene.beam) if scene.beam is not None else deep
+    scale = deep
+    if scene.beam is not None:
+        scale /= tip_compliance(scene.beam)
+    elif isinstance(scene.upper, SpringDamperElement):
+        scale *= scene.upper.stiffness
     compliance = (_tip(scene, degree, scale) - free) / scale
 
     def too_small(contact: float) -> float:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..scene import Beam, Scene, SceneError, Spring
 from ..scene.loads import TableLoad
-from ..scene.partners import ForeignFmu, Partner, RigidWallElement
+from ..scene.partners import ForeignFmu, Partner, RigidWallElement, SpringDamperElement
 from ..scene.statics import resting_height, tip_compliance, tip_load_deflection
 from .archive import fmu_directory, own_fmu
 from .elements import ELEMENTS
@@ -58,7 +58,11 @@ def _body(
         if scene.massless:
             return _massless_beam(scene, spec, start_time, degree, contact)
         return _beam(scene, spec, start_time, contact)
-    return ELEMENTS[spec.element](**spec.model_dump(exclude={"element"}))
+    keys = {name: getattr(spec, name) for name in type(spec).model_fields if name != "element"}
+    if scene.static and isinstance(spec, SpringDamperElement):
+        upper = spec is scene.upper
+        keys["displacement"] = _element_at_rest(scene, spec, contact) if upper else top_at_rest(scene, contact)
+    return ELEMENTS[spec.element](**keys)
 
 
 def _beam(scene: Scene, spec: Beam, start_time: float, contact: float) -> Body:
@@ -81,23 +85,38 @@ def _massless_beam(scene: Scene, spec: Beam, start_time: float, degree: int, con
 
 
 def top_at_rest(scene: Scene, contact: float) -> float:
-    """Return where what lies below the upper end rests under ``contact`` [N]: our spring, a wall or a stop [m].
+    """Return where what lies below the upper end rests under ``contact`` [N]: a spring, a wall or a stop [m].
 
-    Raises SceneError where the spring rests nowhere.
+    A spring that would rest below the stop rests on it. Raises SceneError where the spring rests nowhere.
     """
+    floor = -inf if scene.stop is None else scene.stop.position
+    if isinstance(scene.lower, SpringDamperElement):
+        return max(_element_at_rest(scene, scene.lower, -contact), floor)
     if (spring := scene.spring) is None:
-        level = scene.lower if isinstance(scene.lower, RigidWallElement) else scene.stop
-        return -inf if level is None else level.position
-    force = spring.external_force - contact
-    for load in scene.loads:
-        force += {"spring": 1.0, "base": -spring.mass}.get(load.on, 0.0) * float(load.value(0.0))
+        return scene.lower.position if isinstance(scene.lower, RigidWallElement) else floor
+    load = _load_at_start(scene, "spring", spring.mass) - contact
+    force = spring.external_force + load
     height = resting_height(spring, force)
+    if scene.stop is not None and (height is None or height < floor) and spring.force(floor) > load:
+        return floor
     if height is None:
         raise SceneError(
             f'[time] initial_state = "static": under {force:.6g} N the spring rests nowhere; use a stiffer one, or a '
             "smaller load"
         )
     return height
+
+
+def _element_at_rest(scene: Scene, body: SpringDamperElement, force: float) -> float:
+    """Return where a mass on a linear spring rests under its loads and an upward ``force`` [N] on its end [m]."""
+    force += body.external_force + _load_at_start(scene, "tip" if body is scene.upper else "spring", body.mass)
+    return body.rest + force / body.stiffness
+
+
+def _load_at_start(scene: Scene, end: str, mass: float) -> float:
+    """Return what the loads at t = 0 are on an ``end`` with a mass, upward [N]."""
+    shares = {end: 1.0, "base": -mass}
+    return sum(shares.get(load.on, 0.0) * float(load.value(0.0)) for load in scene.loads)
 
 
 def findings(scene: Scene) -> dict[str, Findings]:

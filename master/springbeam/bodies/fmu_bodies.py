@@ -432,12 +432,13 @@ class FmuSpring(OwnBody, EndLoaded):
         self.tolerance = spring.relative_tolerance
         self._constants = {"external_force": spring.external_force}
         parameters: dict[str, Any] = spring.model_dump(exclude={"initial_velocity"})
+        parameters |= {key: getattr(spring, key) for key in spring.AT_GAP}  # also where they follow from a gap
         parameters["displacement"] = spring.equilibrium if displacement is None else displacement
         parameters["velocity"] = spring.initial_velocity
         super().__init__(parameters, start_time)
 
     def stiffness(self, displacement: Any) -> Any:
-        return self._spring.linear_stiffness + 3.0 * self._spring.cubic_stiffness * displacement**2
+        return self._spring.stiffness(displacement)
 
     def holding_force(self, displacement: float, velocity: float) -> float:
         return self._spring.force(displacement) + self._spring.damping * velocity

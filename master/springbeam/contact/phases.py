@@ -138,8 +138,10 @@ class Transitions:
             tied = common < 0.0 or (common == 0.0 and not self._rises_from_rest())
         else:
             tied = low.displacement < self._interface.equilibrium
-        # A top that stands on the foundation is driven into it, and strikes it at once; a massless tip cannot do that.
-        return Phase(Joint.TIED if tied else Joint.TOUCH, phase.seated and self._tip_mass == 0.0), impact
+        # A top that stands on the foundation is driven into it, and strikes it at once; not by a tip without mass or at
+        # rest.
+        seated = phase.seated and (self._tip_mass == 0.0 or common == 0.0)
+        return Phase(Joint.TIED if tied else Joint.TOUCH, seated), impact
 
     def _ties(self, phase: Phase) -> bool:
         """Whether a rigid law holds the ends together in ``phase``."""

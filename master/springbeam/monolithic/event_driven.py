@@ -229,11 +229,16 @@ def _at_rest(s: HybridSystem) -> np.ndarray:
             return s.stop.position
         k1 = p.linear_stiffness
         k2 = p.cubic_stiffness
+        y0 = p.unloaded  # on_spring has k1 y0
         try:
-            y = newton(lambda y: (k1 + k2 * y**2) * y - on_spring + C, p.equilibrium, lambda y: k1 + 3.0 * k2 * y**2)
+            y = newton(
+                lambda y: k1 * y + k2 * (y - y0) ** 3 - on_spring + C,
+                p.equilibrium,
+                lambda y: k1 + 3.0 * k2 * (y - y0) ** 2,
+            )
         except RuntimeError as error:
             raise ReferenceFailure(f"the spring rests nowhere: {error}") from error
-        return float(y)
+        return max(float(y), s.stop.position) if s.scene.stop is not None else float(y)
 
     def mismatch(C: float) -> float:
         p = top(C) - float(b @ (bent + b * C / k))

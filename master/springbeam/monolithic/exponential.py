@@ -51,7 +51,8 @@ class LinearForm:
     omega2, c : (p,) arrays
         ω² [1/s²], negative where a spring with k1 < 0 wins, and damping [1/s].
     inputs : (k, p) array
-        P: the forces r. First, on the top, what is left of the spring's damping, and −k2 y³; then the law's force C;
+        P: the forces r. First, on the top, what is left of the spring's damping, and −k2 (y − y₀)³; then
+        the law's force C;
         each if the phase has it.
     ends, at : (2, p) array, (2, 1) array
         u and y are ends @ ξ + at.
@@ -99,7 +100,7 @@ class LinearForm:
         found = []
         spring = self.system.spring
         if self.of_spring:
-            found.append(-self.damping * z - spring.cubic_stiffness * y**3)
+            found.append(-self.damping * z - spring.cubic_stiffness * (y - spring.unloaded) ** 3)
         if self.of_law:
             found.append(self.system.law.force(y - u, z - v))
         return np.asarray(np.reshape(found, (len(found), len(xi))).T)

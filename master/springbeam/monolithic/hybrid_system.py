@@ -5,7 +5,7 @@ and y the spring's top, if there is one. State of every phase, a vector of lengt
 
     X = (x, ẋ, D, W, t),      D the energy dissipated so far [J], W the work of the loads that vary [J]
 
-Dynamics, with u = tip·x, y = top·x and p = f(t) − ω² x − c ẋ − k2 y³ top (Ahn & Tate, eqs. (1)–(6), (8))::
+Dynamics, with u = tip·x, y = top·x and p = f(t) − ω² x − c ẋ − k2 (y − y₀)³ top (Ahn & Tate, eqs. (1)–(6), (8))::
 
     ẍ = p + C between + N top,      between = tip − top
     free    C = 0, or the force of the law (`laws`)
@@ -79,7 +79,7 @@ class HybridSystem:
         self.n = len(b) + len(one)
         self.omega2 = np.append(omega2, one * p.linear_stiffness / p.mass)
         self.c = np.append(self.alpha_b * omega2, one * p.damping / p.mass)
-        self.load = np.append(load, one * p.external_force / self.root_mass)
+        self.load = np.append(load, one * (p.external_force + p.linear_stiffness * p.unloaded) / self.root_mass)
         self.patterns = np.column_stack([self.loads.patterns, np.outer(self.loads.on_spring, one) / self.root_mass])
         self.tip = np.append(b, 0.0 * one)
         self.top = self.tip if self.alone else np.append(0.0 * b, one / self.root_mass)
@@ -147,7 +147,7 @@ class HybridSystem:
         if len(self.loads):
             own = own + self.loads.values(X[..., self.T]) @ self.patterns
         if self.spring.cubic_stiffness:
-            own = own - (self.spring.cubic_stiffness * y**3)[..., None] * self.top
+            own = own - (self.spring.cubic_stiffness * (y - self.spring.unloaded) ** 3)[..., None] * self.top
         held = self.held(phase)
         C = np.zeros_like(u)
         N = np.zeros_like(u)
@@ -198,13 +198,15 @@ class HybridSystem:
         x = X[..., self.A]
         x_dot = X[..., self.V]
         u, _, y, _ = self.ends(phase, X)
-        linear = 0.5 * (self.inertia * x_dot**2 + self.omega2 * x**2)
+        kinetic, bent = 0.5 * self.inertia * x_dot**2, 0.5 * self.omega2[: self.r] * x[..., : self.r] ** 2
+        k1, k2, y0 = self.spring.linear_stiffness, self.spring.cubic_stiffness, self.spring.unloaded
+        square = (y - y0) ** 2
         return {
-            "e_beam": np.sum(linear[..., : self.r], axis=-1) + self._hidden,
-            "e_spring": np.sum(linear[..., self.r :], axis=-1) + 0.25 * self.spring.cubic_stiffness * y**4,
+            "e_beam": np.sum(kinetic[..., : self.r] + bent, axis=-1) + self._hidden,
+            "e_spring": np.sum(kinetic[..., self.r :], axis=-1) + (0.5 * k1 + 0.25 * k2 * square) * square,
             "e_contact": self.law.potential(y - u) if self.pressed(phase) else np.zeros_like(y),
             "e_dissipated": X[..., self.D],
-            "e_load": -(x @ self.load) - X[..., self.W] - 2.0 * self._hidden,
+            "e_load": k1 * y0 * y - x @ self.load - X[..., self.W] - 2.0 * self._hidden,
         }
 
     def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:

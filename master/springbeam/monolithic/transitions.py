@@ -42,6 +42,9 @@ class HybridState:
                 system.synchronise(self.phase, X)
         if system.scene.static and not system.law.rigid and m.u < m.y and self.phase.contact == "free":
             self.phase = ReferencePhase("touch")
+        on_stop = system.scene.stop is not None and system.has_spring and float(m.y) <= system.stop.position
+        if system.scene.static and on_stop:
+            self.phase = ReferencePhase(self.phase.contact, seated=True)
 
     def watched(self) -> list[Watch]:
         """Return the functions that are ≥ 0 as long as the phase lasts."""
@@ -106,11 +109,12 @@ class HybridState:
         m = s.motion(self.phase, X)
         before = self._mechanical_energy()
         impulse = float(m.z - m.v) / s.mobility
+        at_rest = float(m.v) == float(m.z) == 0.0
         was_seated = self.phase.seated
-        self.phase = ReferencePhase("tied")
+        self.phase = ReferencePhase("tied", was_seated and at_rest)
         s.synchronise(self.phase, X)
         self._go_on("meet", before, impulse)
-        if was_seated:  # the spring already stands on the foundation
+        if was_seated and not at_rest:  # the spring already stands on the foundation
             self._hit_stop()
         elif self.phase.contact == "touch" and float(s.motion(self.phase, X).C) < -s.noise("N", X):
             self._go_on("separate")

@@ -308,11 +308,10 @@ class _Algorithm:
         return -self._contact.exponent * force / depth if depth > 0.0 else 0.0
 
     def _spring_energy(self) -> float:
-        """Return ½ m z² + ½ k1 y² + ¼ k2 y⁴ [J]."""
+        """Return ½ m z² + ½ k1 x² + ¼ k2 x⁴ [J], x = y − y₀."""
         p = self._spring
-        y = self._y
-        z = self._z
-        return 0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4
+        square = (self._y - p.unloaded) ** 2
+        return 0.5 * p.mass * self._z**2 + 0.5 * p.linear_stiffness * square + 0.25 * p.cubic_stiffness * square**2
 
     def _measure_response(self) -> None:
         """Find the response to a force that moves the tip as far as it moves by itself; to 1 N it may be rounding."""

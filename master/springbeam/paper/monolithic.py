@@ -152,16 +152,18 @@ class _Algorithm:
         """Return N of (53) with (54) for a step from (y, z) that ends at ``Y``, and its derivative by ``Y``."""
         p = self.spring
         h = self.h
+        x = y - p.unloaded
+        X = Y - p.unloaded
         force, slope = self._compliance(Y, self.stiffness)
         value = (
             2.0 * p.mass * ((Y - y) / h - z) / h
             + p.damping * (Y - y) / h
-            + 0.5 * p.linear_stiffness * (Y + y)
-            + 0.25 * p.cubic_stiffness * (Y**2 + y**2) * (Y + y)
+            + 0.5 * p.linear_stiffness * (X + x)
+            + 0.25 * p.cubic_stiffness * (X**2 + x**2) * (X + x)
             + 0.5 * (force + self._compliance(y, self.stiffness)[0])
             - p.external_force
         )
-        cubic = 0.25 * p.cubic_stiffness * (3.0 * Y**2 + 2.0 * Y * y + y**2)
+        cubic = 0.25 * p.cubic_stiffness * (3.0 * X**2 + 2.0 * X * x + x**2)
         tangent = 2.0 * p.mass / h**2 + p.damping / h + 0.5 * p.linear_stiffness + cubic + 0.5 * slope
         return value, tangent
 
@@ -289,7 +291,8 @@ class _Algorithm:
         booked = found["booked"][1:]
         by_spring = p.damping * dy**2 / h
         taken = alpha * np.sum(dq * (d.K @ dq.T).T, axis=1) / h + by_spring
-        e_spring = 0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4
+        square = (y - p.unloaded) ** 2
+        e_spring = 0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * square + 0.25 * p.cubic_stiffness * square**2
         worked = (found["foundation"] - found["pressing"] + p.external_force)[1:] * dy - by_spring
         overwritten = (found["on_tip"] - found["inside"])[1:] * dq[:, -1]
 

@@ -78,9 +78,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
 
 def _acceleration(scene: Scene, spring: Spring, found: Mapping[str, np.ndarray], steps: np.ndarray) -> np.ndarray:
     """Return ÿ [m/s²] of the spring's top under the forces of its row, 0 while it is seated."""
-    y = found["y"]
-    z = found["z"]
-    force = spring.external_force - spring.damping * z - (spring.linear_stiffness + spring.cubic_stiffness * y**2) * y
+    force = -spring.force(found["y"]) - spring.damping * found["z"]
     for i, load in enumerate(scene.loads):
         if load.on in ("spring", "base"):
             force = force + found[f"load_{i}"] * (1.0 if load.on == "spring" else -spring.mass)
@@ -122,7 +120,7 @@ def trajectory_of(
 
 def normal_compliance(scene: Scene, u: np.ndarray, first: np.ndarray) -> np.ndarray:
     """Return λ (Ψ − u)₊^p [N], the part of a rigid contact's force that the paper calls normal compliance."""
-    psi = first["y_after"] if scene.spring is None else scene.spring.equilibrium
+    psi = first["y_after"] if scene.equilibrium is None else scene.equilibrium
     return scene.contact.compliance(psi - u)
 
 

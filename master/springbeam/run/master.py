@@ -177,7 +177,7 @@ class Master:
         if self._adaptive is not None:
             self._adaptive.note(abs(state.energy_at_start))
         if pair.opens_softly and start[1].displacement - start[0].displacement > self._detector.tolerance(start):
-            state.phase = Phase(Joint.TOUCH)
+            state.phase = Phase(Joint.TOUCH, state.phase.seated)
             self._happened(EventKind.IMPACT, Impact(), 0.0)
         if self._in_contact(start) or (pair.law is None and state.contact[0] != 0.0):
             pair.mark()

@@ -27,6 +27,7 @@ class Setup:
     lower: bool
     law: SoftLaw | Rigid | None  #: between the ends; ``None`` where nothing acts
     equilibrium: float | None  #: Ψ [m]; ``None`` where it is the height at which the lower end starts
+    at_rest: bool  #: whether the run starts at rest under the loads
     floor: float | None  #: φ, the height of the rigid foundation [m]
     restitution: float  #: e of impacts on it
     level: float  #: of the wall that is in place of an absent lower body [m]
@@ -63,7 +64,8 @@ def set_up(scene: Scene, *abilities: Abilities) -> Setup:
         upper=scene.upper is not None,
         lower=scene.lower is not None,
         law=law,
-        equilibrium=None if scene.spring is None else scene.spring.equilibrium,
+        equilibrium=scene.equilibrium,
+        at_rest=scene.static,
         floor=None if rigid is None else rigid.position,
         restitution=1.0 if rigid is None else rigid.restitution,
         level=0.0 if stop is None else stop.position,

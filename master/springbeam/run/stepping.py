@@ -155,15 +155,16 @@ class Pair:
     def initial_state(self, time: float, contact: float = 0.0) -> State:
         """Return the state before anything happens; ends that a soft law joins for good are joined from the start.
 
-        A rigid law holds them by ``contact`` [N].
+        A rigid law holds them by ``contact`` [N]. Where a run starts at rest, a lower end at the stop rests on it.
         """
         tip, low = ends = self.ends()
-        if self.law is None:
-            held = (contact, 0.0, 0.0)
-            return State(time, ends, contact=held, foundation=held if self.alone else NO_FORCE)
-        at_start = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
-        phase = Phase(Joint.TIED) if self.lasting else Phase()
-        return State(time, ends, phase, (at_start, 0.0, 0.0))
+        if self.law is not None:
+            contact = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
+        joint = Joint.TIED if self.law is not None and self.lasting else Joint.FREE
+        seated = self.setup.at_rest and not self.alone and low.displacement == self.setup.floor
+        held = (contact, 0.0, 0.0)
+        alone = self.alone and self.law is None
+        return State(time, ends, Phase(joint, seated), contact=held, foundation=held if alone else NO_FORCE)
 
     def mark(self) -> None:
         """Remember the bodies' states as those that steps start from."""

@@ -170,6 +170,9 @@ class Contact(Table):
         "s", "time over which the force is averaged before its peak is taken", None, gt=0.0,
         otherwise="a fiftieth of the period of a compliant contact, else of the beam's slowest",
     )  # fmt: skip
+    gap: float = key(
+        "m", "height of the unbent beam above the unloaded spring: equilibrium and unloaded of [spring] are −gap", 0.0
+    )
 
     #: Whether ends that have met share one position, so that C is a reaction.
     rigid: ClassVar[bool] = True

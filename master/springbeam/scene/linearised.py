@@ -19,7 +19,7 @@ def contact_energy(scene: Scene) -> float:
     """Return the energy at first contact [J]: of the beam, the spring, and loads."""
     energy = 0.0
     if (spring := scene.spring) is not None:
-        energy = spring_energy(spring) + spring.external_force * spring.equilibrium  # without its load
+        energy = spring_energy(spring) + spring.external_force * _elongation(spring)  # without its load
     return max(energy + beam_energy(scene), 0.0) + _load_energy(scene)
 
 
@@ -58,7 +58,7 @@ def _load_energy(scene: Scene) -> float:
 
 
 def spring_stiffness(scene: Scene) -> float:
-    """Return k1 + 3 k2 y² of the spring at its stiffest [N/m].
+    """Return k1 + 3 k2 x² of the spring at its stiffest [N/m], x its elongation.
 
     That is at rest if it softens, else on the foundation or where it takes all the energy.
     """
@@ -67,13 +67,13 @@ def spring_stiffness(scene: Scene) -> float:
     k1 = spring.linear_stiffness
     k2 = spring.cubic_stiffness
     if k2 <= 0.0:
-        y = 0.0
+        x = 0.0
     elif scene.stop is not None:
-        y = max(abs(scene.stop.position), abs(spring.equilibrium))
+        x = max(abs(scene.stop.position - spring.unloaded), abs(_elongation(spring)))
     else:
-        # ½ k1 y² + ¼ k2 y⁴ = E
-        y = sqrt((sqrt(k1 * k1 + 4.0 * k2 * contact_energy(scene)) - k1) / k2)
-    return k1 + 3.0 * k2 * y**2
+        # ½ k1 x² + ¼ k2 x⁴ = E
+        x = sqrt((sqrt(k1 * k1 + 4.0 * k2 * contact_energy(scene)) - k1) / k2)
+    return k1 + 3.0 * k2 * x**2
 
 
 def spring_frequency(scene: Scene) -> float:
@@ -85,20 +85,25 @@ def spring_frequency(scene: Scene) -> float:
 # -- the well of a softening spring ---------------------------------------------------------------------------------
 
 
-def _potential(spring: Spring, y: float) -> float:
-    """Return the potential of the spring and its load at ``y`` [J]."""
+def _elongation(spring: Spring) -> float:
+    """Return how far the top is at the start from where the spring is without force [m]."""
+    return spring.equilibrium - spring.unloaded
+
+
+def _potential(spring: Spring, x: float) -> float:
+    """Return the potential of the spring and its load at the elongation ``x`` [J]."""
     k1 = spring.linear_stiffness
     k2 = spring.cubic_stiffness
-    return y * (y * (0.5 * k1 + 0.25 * k2 * y * y) - spring.external_force)
+    return x * (x * (0.5 * k1 + 0.25 * k2 * x * x) - spring.external_force)
 
 
 def spring_energy(spring: Spring) -> float:
     """Return the energy of the spring and its load at the start [J]."""
-    return 0.5 * spring.mass * spring.initial_velocity**2 + _potential(spring, spring.equilibrium)
+    return 0.5 * spring.mass * spring.initial_velocity**2 + _potential(spring, _elongation(spring))
 
 
 def hilltop(spring: Spring) -> float:
-    """Return how far from 0 an unloaded softening spring is at the top of its potential, √(k1/|k2|) [m]."""
+    """Return the elongation at the top of a softening spring's potential without load, √(k1/|k2|) [m]."""
     return sqrt(spring.linear_stiffness / -spring.cubic_stiffness)
 
 
@@ -110,13 +115,13 @@ def largest_load(spring: Spring) -> float:
 def well_depth(scene: Scene) -> float:
     """Return the potential [J] at the lower rim of a softening spring's well; a rim below the foundation is none.
 
-    −∞ where a side has neither. The rims are the outer roots of k1 y + k2 y³ = f_s, that is of 4 x³ − 3 x + f_s/F = 0
-    with y = 2 x √(k1/3|k2|) and the `largest_load` F; beyond F only one side has a rim.
+    −∞ where a side has neither. The rims are the outer roots of k1 x + k2 x³ = f_s, that is of 4 r³ − 3 r + f_s/F = 0
+    with x = 2 r √(k1/3|k2|) and the `largest_load` F; beyond F only one side has a rim.
     """
     spring = scene.spring
     assert spring is not None
-    x = np.roots([4.0, 0.0, -3.0, spring.external_force / largest_load(spring)])
-    rims = 2.0 / sqrt(3.0) * hilltop(spring) * x.real[(x.imag == 0.0) & (np.abs(x.real) > 0.5)]
-    barred = scene.stop is not None and all(scene.stop.position > y for y in rims if y < 0.0)
+    r = np.roots([4.0, 0.0, -3.0, spring.external_force / largest_load(spring)])
+    rims = 2.0 / sqrt(3.0) * hilltop(spring) * r.real[(r.imag == 0.0) & (np.abs(r.real) > 0.5)]
+    barred = scene.stop is not None and all(scene.stop.position > spring.unloaded + x for x in rims if x < 0.0)
     sides = [rims[rims > 0.0], *([] if barred else [rims[rims < 0.0]])]
     return min(_potential(spring, float(side[0])) if len(side) else -inf for side in sides)

@@ -60,6 +60,7 @@ class PointMassElement(Table):
     """A free mass, m ẍ = ± C + N + f."""
 
     START = "displacement"
+    AT_GAP: ClassVar[tuple[str, ...]] = ("displacement",)
 
     element: Literal["point_mass"] = key("–", "a free mass")
     mass: float = key("kg", "mass m", gt=0.0)
@@ -71,6 +72,8 @@ class PointMassElement(Table):
 class SpringDamperElement(PointMassElement):
     """A mass on a linear spring and damper, m ẍ + c ẋ + k (x − x₀) = ± C + N + f."""
 
+    AT_GAP = ("displacement", "rest")
+
     element: Literal["spring_damper"] = key("–", "a mass on a linear spring and damper")  # type: ignore[assignment]
     stiffness: float = key("N/m", "stiffness k", ge=0.0)
     damping: float = key("N·s/m", "damping c", 0.0, ge=0.0)
@@ -81,6 +84,7 @@ class RigidWallElement(Table):
     """An end that is held at rest, whatever acts on it."""
 
     START = "position"
+    AT_GAP = ("position",)
 
     element: Literal["rigid_wall"] = key("–", "an end that nothing moves")
     position: float = key("m", "where it is", 0.0)

@@ -13,7 +13,7 @@ from .laws import LAWS
 from .linearised import hilltop, largest_load, spring_energy, well_depth
 from .loads import MOST_POINTS
 from .messages import Rule, at, either, texts_of, texts_of_loads
-from .partners import RigidWallElement
+from .partners import RigidWallElement, SpringDamperElement
 from .scene import Scene
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
 from .suspicions import suspicions
@@ -27,6 +27,7 @@ from .tables import (
     TOLERANCE_KEYS,
     Beam,
     Spring,
+    Table,
 )
 
 #: More are a mistyped macro step: two weeks at a microsecond a step.
@@ -68,6 +69,17 @@ def _averages(scene: Scene) -> bool:
     return scene.accuracy is None and scene.beam is not None and scene.beam.integrator == "midpoint"
 
 
+def _rests(body: Table | None) -> bool:
+    """Return whether a body, if there is one, has a place of rest under loads that this package finds."""
+    own = isinstance(body, Beam | Spring | RigidWallElement | None)
+    return own or (isinstance(body, SpringDamperElement) and body.stiffness > 0.0)
+
+
+def _gives(body: Table | None, key: str) -> bool:
+    """Return whether a body has a ``key`` of its own that is not 0."""
+    return body is not None and key in body.model_fields_set and getattr(body, key) != 0.0
+
+
 def _let_go(scene: Scene) -> bool:
     """Return whether our beam has no inertia and is released at the start."""
     return scene.beam is not None and scene.massless and scene.beam.approach == "elastic"
@@ -89,7 +101,7 @@ def _alone_in_a_well(scene: Scene) -> bool:
     return (
         spring is not None
         and spring.softens
-        and abs(spring.equilibrium) < hilltop(spring)
+        and abs(spring.equilibrium - spring.unloaded) < hilltop(spring)
         and not (scene.static or scene.beam)
     )
 
@@ -156,22 +168,36 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     *(
         Rule(
-            lambda s, table=table: s.static and not isinstance(s.under(table), Beam | Spring | RigidWallElement | None),
-            f"{{time.initial_state}}: only our own beam and spring and a rigid_wall can start at rest, not the body in "
-            f"[{table}]; leave initial_state out",
+            lambda s, table=table: s.static and not _rests(s.under(table)),
+            f"{{time.initial_state}}: the body in [{table}] can't start at rest under loads, only our own beam and "
+            "spring, a spring_damper with a stiffness and a rigid_wall can; leave initial_state out",
         )
         for table in ("beam", "spring")
     ),
     *(
         Rule(
-            lambda s, table=table, key=key: s.static and getattr(s.under(table), key, 0.0) != 0.0,
+            lambda s, table=table, key=key: s.static and _gives(s.under(table), key),
             f"{{{table}.{key}}}: {{time.initial_state}} is at rest where the loads hold it; leave {key} out",
         )
         for table, key in (
             ("beam", "initial_deflection_slope"),
             ("beam", "initial_velocity_slope"),
             ("spring", "initial_velocity"),
+            *((table, key) for table in ("beam", "spring") for key in ("displacement", "velocity")),
         )
+    ),
+    # A gap
+    Rule(
+        lambda s: s.contact.gap != 0.0 and not (s.lower and s.lower.AT_GAP),
+        "{contact.gap}: is the height of the unbent beam above our own spring or an element in [spring]; this scene "
+        "has neither; leave gap out",
+    ),
+    *(
+        Rule(
+            lambda s, key=key: s.lower and s.contact.gap != 0.0 and key in {*s.lower.AT_GAP} & s.lower.model_fields_set,
+            f"{{spring.{key}}}: {{contact.gap}} gives it; leave one of the two out",
+        )
+        for key in ("equilibrium", "unloaded", "displacement", "rest", "position")
     ),
     # Laws
     *(
@@ -297,13 +323,13 @@ FORBIDDEN: tuple[Rule, ...] = (
     # A softening spring
     Rule(
         lambda s: s.spring and min(k := (s.spring.linear_stiffness, s.spring.cubic_stiffness)) < 0.0 >= max(k),
-        "{spring.linear_stiffness}: with {spring.cubic_stiffness} the spring pushes away from y = 0 everywhere; one of "
-        "them must be greater than 0",
+        "{spring.linear_stiffness}: with {spring.cubic_stiffness} the spring pushes away from {spring.unloaded}; one "
+        "of them must be greater than 0",
     ),
     Rule(
-        lambda s: s.spring and s.spring.softens and abs(s.spring.equilibrium) >= hilltop(s.spring),
-        "{spring.equilibrium}: the softening spring escapes from beyond |y| = √(linear_stiffness/|cubic_stiffness|) = "
-        "{hilltop:.6g} m; it must start inside",
+        lambda s: s.spring and s.spring.softens and abs(s.spring.equilibrium - s.spring.unloaded) >= hilltop(s.spring),
+        "{spring.equilibrium}: the softening spring escapes from beyond "
+        "|y − unloaded| = √(linear_stiffness/|cubic_stiffness|) = {hilltop:.6g} m; it must start inside",
         lambda s: {"hilltop": hilltop(s.spring)},
     ),
     Rule(
@@ -321,7 +347,7 @@ FORBIDDEN: tuple[Rule, ...] = (
             and spring_energy(s.spring) > well_depth(s) > -math.inf
         ),
         "{spring.cubic_stiffness}: the softening spring starts with {energy:.6g} J and escapes from a well {depth:.6g} "
-        "J deep; use a smaller initial_velocity or external_force, an equilibrium nearer to 0, or a larger "
+        "J deep; use a smaller initial_velocity or external_force, an equilibrium nearer to unloaded, or a larger "
         "linear_stiffness",
         lambda s: {"energy": spring_energy(s.spring), "depth": well_depth(s)},
     ),

@@ -6,7 +6,8 @@ import math
 import re
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import Field
+from pydantic import Field, model_validator
+from typing_extensions import Self
 
 from .laws import LAW, Contact, SoftLaw, TransmissionContact
 from .loads import SIGNAL, Load
@@ -45,6 +46,16 @@ class Scene(Table):
     contact: Annotated[Contact, LAW] = TransmissionContact()
     coupling: Coupling = Coupling()
     loads: Annotated[tuple[Annotated[Load, SIGNAL], ...], Field(strict=False)] = ()
+
+    @model_validator(mode="after")
+    def _lower_body_at_gap(self) -> Self:
+        """Put the lower body where ``gap`` says; keys that it has itself stay, and are refused by the rules."""
+        if self.lower is not None and self.contact.gap != 0.0:
+            follows = dict.fromkeys(set(self.lower.AT_GAP) - self.lower.model_fields_set, -self.contact.gap)
+            lower = self.lower.model_copy(update=follows)
+            lower.model_fields_set.difference_update(follows)
+            self.__dict__["lower"] = lower  # the scene is frozen
+        return self
 
     @property
     def beam(self) -> Beam | None:
@@ -150,6 +161,11 @@ class Scene(Table):
             static = self.massless and body.approach == "elastic" and body.alpha_b == 0.0
             height = tip_load_deflection(body) if static else height * body.length
         return StartHeight(f"{table}.{body.START}", height)
+
+    @property
+    def equilibrium(self) -> float | None:
+        """Ψ [m], where the lower end is at the start if nothing loads it; ``None`` where only an FMU knows."""
+        return None if self.lower is None or self.lower.START is None else getattr(self.lower, self.lower.START)
 
     @property
     def tip_target(self) -> StartHeight | None:

@@ -144,14 +144,13 @@ def tip_reach(beam: Beam) -> float:
 
 
 def resting_height(spring: Spring, force: float) -> float | None:
-    """Return where the spring's top rests under an upward ``force`` [N], k1 y + k2 y³ = F [m].
+    """Return where the spring's top rests under an upward ``force`` [N], k1 x + k2 x³ = F [m].
 
     Of several places it is the stable one nearest to Ψ; ``None`` if there is none.
     """
-    k1 = spring.linear_stiffness
-    k2 = spring.cubic_stiffness
-    roots = np.roots([k2, 0.0, k1, -force])
-    stable = [y for y in roots.real[roots.imag == 0.0].tolist() if k1 + 3.0 * k2 * y**2 > 0.0]
+    roots = np.roots([spring.cubic_stiffness, 0.0, spring.linear_stiffness, -force])
+    heights = spring.unloaded + roots.real[roots.imag == 0.0]
+    stable = [y for y in heights.tolist() if spring.stiffness(y) > 0.0]
     return min(stable, key=lambda y: abs(y - spring.equilibrium), default=None)
 
 

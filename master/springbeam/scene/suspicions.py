@@ -139,8 +139,8 @@ def _pull(scene: Scene) -> float:
     """Return the force on the spring's top at the start [N], 0 where it is next to nothing."""
     spring = scene.spring
     assert spring is not None
-    pull = spring.linear_stiffness * spring.equilibrium + spring.cubic_stiffness * spring.equilibrium**3
-    return 0.0 if math.isclose(pull, spring.external_force, rel_tol=1e-9) else spring.external_force - pull
+    pull = -spring.force(spring.equilibrium)
+    return 0.0 if abs(pull) <= 1e-9 * abs(spring.external_force) else pull
 
 
 def _share(scene: Scene) -> float:

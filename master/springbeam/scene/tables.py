@@ -15,8 +15,9 @@ from itertools import chain
 from math import pi
 from operator import or_
 from sys import float_info
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
+import numpy as np
 from pydantic import (
     BaseModel,
     ConfigDict,
@@ -99,6 +100,8 @@ class Table(BaseModel):
     SCALES: ClassVar[tuple[str, ...]] = ()
     #: Of a body, or the stop: the key that says where its end is at the start; ``None`` where only an FMU knows.
     START: ClassVar[str | None] = None
+    #: Of a body below: the keys that ``gap`` of ``[contact]`` gives.
+    AT_GAP: ClassVar[tuple[str, ...]] = ()
 
     #: Which keys follow from others: where they do, by the keys given, and their values, by the values of these.
     FOLLOWS: ClassVar[tuple[tuple[Callable[[set[str]], bool], dict[str, Callable[[Any], float]]], ...]] = ()
@@ -312,32 +315,45 @@ class Beam(Table):
         return self.n_modes if self.n_modes and self.integrator == "modal" else self.unknowns
 
 
+_BY_GAP = "0.0, or −gap of [contact]"
+_Heights = TypeVar("_Heights", float, np.ndarray)
+
+
 class Spring(Table):
-    """Duffing spring m ÿ + α_s ẏ + k1 y + k2 y³ = −C + N + f_s (Ahn & Tate, (6)).
+    """Duffing spring m ÿ + α_s ẏ + k1 x + k2 x³ = −C + N + f_s, x = y − unloaded (Ahn & Tate, (6)).
 
     Mass and linear stiffness have no defaults. Only if neither is given, the spring is dimensionless: both are 1.
     """
 
     START = "equilibrium"
+    AT_GAP = ("equilibrium", "unloaded")
     SCALES = ("mass", "linear_stiffness")
 
     mass: float = key("kg", "mass m", gt=0.0)
     damping: float = key("N·s/m", "damping α_s", 0.0, ge=0.0)
     linear_stiffness: float = key("N/m", "linear stiffness k1")
     cubic_stiffness: float = key("N/m³", "cubic stiffness k2: above 0 it hardens, below it softens", 0.0)
-    equilibrium: float = key("m", "height Ψ at which the top starts; it rests unloaded at 0", 0.0)
+    equilibrium: float = key(
+        "m", "height Ψ of the top at the start, below which a rigid law ties the ends", 0.0, otherwise=_BY_GAP
+    )
+    unloaded: float = key("m", "height y₀ of the top where the spring is without force", 0.0, otherwise=_BY_GAP)
     external_force: float = key("N", "constant force f_s on the top, upward", 0.0)
     initial_velocity: float = key("m/s", "velocity of the top at the start, upward", 0.0)
     relative_tolerance: float = key("–", "relative tolerance of its motion", 1e-12, gt=0.0, le=1e-2)
     absolute_tolerance: float = key("m, m/s", "absolute tolerance of its motion, of y and z", 1e-30, gt=0.0, le=1e-2)
 
-    def force(self, y: float) -> float:
-        """Return k1 y + k2 y³ − f_s [N]: what holds the top at ``y`` [m], or a seated one hands to the foundation."""
-        return self.linear_stiffness * y + self.cubic_stiffness * y**3 - self.external_force
+    def force(self, y: _Heights) -> _Heights:
+        """Return k1 x + k2 x³ − f_s [N]: what holds the top at ``y`` [m], or a seated one hands to the foundation."""
+        x = y - self.unloaded
+        return self.linear_stiffness * x + self.cubic_stiffness * x**3 - self.external_force
+
+    def stiffness(self, y: _Heights) -> _Heights:
+        """Return k1 + 3 k2 x² [N/m] at heights ``y`` [m]."""
+        return self.linear_stiffness + 3.0 * self.cubic_stiffness * (y - self.unloaded) ** 2
 
     @property
     def softens(self) -> bool:
-        """Whether it gives way: it pushes back near 0, and less and less further out."""
+        """Whether it gives way: it pushes back near ``unloaded``, and less and less further out."""
         return self.cubic_stiffness < 0.0 < self.linear_stiffness
 
 

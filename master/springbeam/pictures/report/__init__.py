@@ -192,7 +192,9 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
     if spring is not None:
         cubic = f", cubic stiffness {spring.cubic_stiffness:.4g} N/m³" if spring.cubic_stiffness else ""
         stiffness = f"stiffness {spring.linear_stiffness:.4g} N/m{cubic}"
-        yield "spring", f"mass {spring.mass:.4g} kg, {stiffness}, its top starts at Ψ = {spring.equilibrium:.4g} m"
+        unloaded = f", without force at {spring.unloaded:.4g} m" if spring.unloaded else ""
+        start = f"its top starts at Ψ = {spring.equilibrium:.4g} m"
+        yield "spring", f"mass {spring.mass:.4g} kg, {stiffness}{unloaded}, {start}"
     for table, partner in scene.partners.items():
         yield table, f"another body in its place: {kind_of(partner).replace('_', ' ')}"
     if scene.coupled:

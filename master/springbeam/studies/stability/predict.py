@@ -161,7 +161,7 @@ def _reduced(beam: Beam) -> Beam:
 
 
 def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
-    """Return the beam's modes and the spring with k1 + 3 k2 y² at its stiffest; without one, tip and foundation.
+    """Return the beam's modes and the spring with k1 + 3 k2 (y − y₀)² at its stiffest; without one, tip and foundation.
 
     ``None`` where the scene joins no two bodies.
     """

@@ -1,0 +1,168 @@
+"""Where the spring is without force: `unloaded` of [spring], and `gap` of [contact], which puts both ends there.
+
+Two identities hold for any y₀. A spring alone that is moved with its start and its stop has the same motion, moved. A
+linear spring that is unloaded at y₀ is one that is unloaded at 0 under a further load k1 y₀, whatever it meets.
+"""
+
+import numpy as np
+import pytest
+import scenes
+
+from springbeam import SceneError, load_scene, simulate, with_changes
+from springbeam.monolithic import event_driven
+from springbeam.paper import co_simulation, monolithic
+from springbeam.scene import scene_from_dict
+from springbeam.scene.linearised import spring_frequency, spring_stiffness, well_depth
+from springbeam.scene.statics import resting_height
+
+RAISED = 0.375  # m; exact in binary, as the heights below
+ALONE = {
+    "time": {"t_end": 0.5},
+    "spring": {"mass": 0.5, "linear_stiffness": 40.0, "cubic_stiffness": 900.0, "equilibrium": 0.0625},
+    "stop": {"position": -0.03125, "restitution": 0.5},
+    "coupling": {"macro_step": 5e-3},
+}
+LOWER, Y0 = 3.0, -0.02  # N/m, m
+PAIR = {
+    "time": {"t_end": 0.3},
+    "beam": {"young_modulus": 100.0, "shear_modulus": 100.0, "initial_velocity_slope": -1.0, "n_elements": 6},
+    "spring": {"mass": 1.0, "linear_stiffness": LOWER},
+    "stop": {"position": -0.015},
+    "coupling": {"macro_step": 1e-3},
+}
+SOFT = {"stiffness": 1e4, "exponent": 1.5}
+
+
+def raised(scene):
+    """Return a spring alone that is higher by `RAISED`, with its stop."""
+    height, stop = scene.spring.equilibrium + RAISED, scene.stop.position + RAISED
+    return with_changes(scene, spring={"equilibrium": height, "unloaded": RAISED}, stop={"position": stop})
+
+
+TIMES = np.linspace(0.0, 0.5, 101)
+
+
+def run_at(scene):
+    return simulate(scene).at(TIMES)
+
+
+def reference_at(scene):
+    return event_driven.integrate(scene, sample_times=TIMES)
+
+
+@pytest.mark.parametrize("program", [run_at, reference_at])
+@pytest.mark.parametrize("k2", [900.0, -100.0])
+def test_a_spring_that_is_moved_with_its_stop_has_the_same_motion(program, k2):
+    scene = with_changes(scene_from_dict(ALONE), spring={"cubic_stiffness": k2, "damping": 0.1})
+    low, high = program(scene), program(raised(scene))
+    assert scenes.kinds(low) == scenes.kinds(high)
+    for column, moved in (("y", RAISED), ("z", 0.0), ("e_spring", 0.0), ("e_dissipated", 0.0)):
+        np.testing.assert_allclose(high[column] - moved, low[column], atol=1e-9 * np.abs(low[column]).max())
+    assert np.abs(high["energy_residual"]).max() < 1e-13
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {},
+        {"contact": {"law": "compliance", **SOFT}},
+        {"contact": {"law": "tie"}},
+        {"contact": {"law": "link", "stiffness": 1e4}},
+        {"beam": {"fidelity": "quasi_static"}},
+    ],
+    ids=["transmission", "compliance", "tie", "link", "quasi static"],
+)
+@pytest.mark.parametrize("program", [simulate, event_driven.integrate])
+def test_a_linear_spring_is_one_under_the_load_of_its_preload(program, tables):
+    scene = with_changes(scene_from_dict(PAIR), **tables)
+    moved = program(with_changes(scene, spring={"unloaded": Y0}))
+    loaded = program(with_changes(scene, spring={"external_force": LOWER * Y0}))
+    assert scenes.kinds(moved) == scenes.kinds(loaded)
+    for column in ("u_tip", "y", "contact_force", "foundation_force"):
+        scale = np.abs(loaded[column]).max()
+        np.testing.assert_allclose(moved[column], loaded[column], atol=1e-9 * scale)
+    stored = 0.5 * LOWER * Y0**2  # that the load has not
+    total = moved.e_total - stored - loaded.e_total
+    np.testing.assert_allclose(total, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("program", [monolithic.algorithm_1, co_simulation.algorithm_1])
+def test_algorithm_1_has_the_same_spring(program):
+    scene = with_changes(load_scene("paper-fig2"), time={"t_end": 0.6}, spring={"cubic_stiffness": 0.0})
+    k1 = scene.spring.linear_stiffness
+    moved = program(with_changes(scene, spring={"unloaded": Y0}))
+    loaded = program(with_changes(scene, spring={"external_force": k1 * Y0}))
+    np.testing.assert_allclose(moved["y"], loaded["y"], atol=1e-10 * np.abs(loaded["y"]).max())
+    np.testing.assert_allclose(
+        moved["e_spring"] - k1 / 2.0 * Y0**2, loaded["e_spring"] - k1 * Y0 * loaded["y"], atol=1e-12
+    )
+
+
+def test_a_preloaded_spring_rests_on_its_stop_with_its_force():
+    spring = {"mass": 0.5, "linear_stiffness": 40.0, "cubic_stiffness": 256.0, "unloaded": -0.125}
+    run = simulate(scene_from_dict(ALONE | {"spring": spring, "stop": {"position": 0.0}}))
+    assert set(run.foundation_force[1:]) == {40.0 * 0.125 + 256.0 * 0.125**3}
+    assert np.ptp(run.y) == 0.0
+
+
+def test_what_is_known_before_a_run_moves_with_the_spring():
+    for k2, load in ((900.0, 0.0), (-100.0, 0.3)):
+        scene = with_changes(scene_from_dict(ALONE), spring={"cubic_stiffness": k2, "external_force": load})
+        high = raised(scene)
+        assert spring_stiffness(high) == pytest.approx(spring_stiffness(scene), rel=1e-14)
+        assert spring_frequency(with_changes(high, stop=None)) == pytest.approx(
+            spring_frequency(with_changes(scene, stop=None)), rel=1e-14
+        )
+        assert resting_height(high.spring, load) - RAISED == pytest.approx(
+            resting_height(scene.spring, load), rel=1e-12
+        )
+        if k2 < 0.0:
+            assert well_depth(high) == pytest.approx(well_depth(scene), rel=1e-12)
+
+
+# -- a gap ---------------------------------------------------------------------------------------------------------
+
+GAP = 0.01
+
+
+def with_gap(**tables):
+    return with_changes(scene_from_dict(PAIR), stop={"position": -0.03}, **tables)
+
+
+def test_a_gap_is_equilibrium_and_unloaded_below_the_unbent_beam():
+    named = with_gap(contact={"gap": GAP})
+    assert (named.spring.equilibrium, named.spring.unloaded) == (-GAP, -GAP)
+    run = simulate(named)
+    keys = simulate(with_gap(spring={"equilibrium": -GAP, "unloaded": -GAP}))
+    assert run.time[0] == keys.time[0] == GAP  # at 1 m/s
+    for column in run.columns:
+        np.testing.assert_array_equal(run[column], keys[column])
+
+
+@pytest.mark.parametrize(
+    ("body", "where"),
+    [
+        ({"element": "point_mass", "mass": 1.0}, {"displacement": -GAP}),
+        ({"element": "spring_damper", "mass": 1.0, "stiffness": 3.0}, {"displacement": -GAP, "rest": -GAP}),
+        ({"element": "rigid_wall"}, {"position": -GAP}),
+    ],
+)
+def test_an_element_is_below_the_gap(body, where):
+    tables = {name: table for name, table in PAIR.items() if name != "stop"} | {"spring": body}
+    run = simulate(scene_from_dict(tables | {"contact": {"gap": GAP}}))
+    keys = simulate(scene_from_dict(tables | {"spring": body | where}))
+    assert run.time[0] == keys.time[0] == GAP
+    for column in run.columns:
+        np.testing.assert_array_equal(run[column], keys[column])
+
+
+def test_a_scene_with_a_gap_is_written_and_changed_as_it_was_given():
+    named = with_gap(contact={"gap": GAP})
+    written = named.model_dump(exclude_none=True)
+    assert written["contact"]["gap"] == GAP
+    assert not {"equilibrium", "unloaded"} & written["spring"].keys()
+    assert scene_from_dict(written) == named
+    wider = with_changes(named, contact={"gap": 2.0 * GAP})
+    assert wider.spring.unloaded == -2.0 * GAP
+    with pytest.raises(SceneError, match="gives it; leave one of the two out"):
+        with_changes(named, spring={"equilibrium": -0.1})
