@@ -55,9 +55,14 @@ void HeldContact::compare(const TipMessage& seen) {
   reach_ = std::max({reach_, size_ * std::abs(seen.velocity), r1 * now_.force});
   const auto off = [&seen](double tip) { return std::abs(seen.displacement - tip); };
   const double miss = off(now_.tip);
-  if (now_.steps < 2.0 && miss > whole * reach_) missed_[untold] = 1;
-  if (now_.steps < 3.0 || miss <= rounding * reach_) return;  // the first step's mean velocity was a guess
-  if (off(now_.said + r2 * now_.last + r1 * now_.force) < 0.01 * miss) {
+  if (now_.steps < 2.0) {  // the first step's mean velocity was a guess
+    if (miss > whole * reach_) missed_[untold] = 1;
+    return;
+  }
+  if (miss <= rounding * reach_) return;
+  if (now_.steps < 3.0 && off(now_.said + r1 * now_.last) < 0.01 * miss) {
+    missed_[untold] = 1;  // it has met the second force, but not the first
+  } else if (off(now_.said + r2 * now_.last + r1 * now_.force) < 0.01 * miss) {
     ++missed_[late];
   } else if (off(now_.said + r1 * now_.before + r2 * now_.last) < 0.01 * miss) {
     ++missed_[swapped];

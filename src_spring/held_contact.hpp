@@ -54,7 +54,7 @@ class HeldContact {
     elsewhere,  ///< by a good part of a step's way
     late,       ///< where it would be under the forces of the next steps: values pass one after the other
     swapped,    ///< where it would be with r₁ for r₂
-    untold,     ///< a whole step's way from where it was said before the first step, or nothing was said
+    untold,     ///< where it would be without the force of the first step, or nothing was said before that
     kinds
   };
   const std::array<int, kinds>& missed() const { return missed_; }  ///< steps so far, by kind; no part of the state

@@ -232,6 +232,32 @@ def test_a_tool_that_passes_values_on_one_after_the_other_is_told(beam, spring, 
     assert "for both FMUs alike (Jacobi)" in warning
 
 
+@pytest.mark.parametrize("version", ["2.0"])
+@pytest.mark.parametrize("load", [0.0, -5.0])
+@pytest.mark.parametrize("size", [1e-3, 1e-4])
+@pytest.mark.parametrize(
+    "body", [{}, {"compliance_exponent": 3.0, "compliance_stiffness": 1e10}, {"alpha_b": 1e-3}], ids=str
+)
+def test_a_tool_that_passes_start_values_but_forgets_the_first_exchange_is_told(beam, spring, size, load, body):
+    """Start values are those of the beam, so that the spring has a force; the beam makes its first step without it.
+
+    From then on all is right. The contact begins with the run or later: then nothing is missed, nor told.
+    """
+    for begun in (True, False):
+        start = {} if begun else {"displacement": -3.5 * size, "unloaded": -3.5 * size}  # the tip falls at 1 m/s
+        pair = Pair(beam, spring, size)
+        pair.exchange = lambda pair=pair: [pair.spring.set(name, pair.beam.get(name)) for name in BY_NAME]
+        pair.start(distributed_load=load, **body, **start)
+        missed = pair.spring.get("reaction")
+        assert begun == (missed > 0.0)
+        del pair.exchange
+        pair.run(10.0 * size)
+        assert pair.spring.get("warnings") == begun
+        assert [warning.count("nothing was passed on before the first step") for warning in warnings(pair)] == [
+            1
+        ] * begun
+
+
 @pytest.mark.parametrize("first", ["beam", "spring"])
 def test_a_delay_of_one_step_mends_what_passes_within_a_step(beam, spring, first):
     pair, right = (Pair(beam, spring, 1e-3).start() for _ in range(2))
