@@ -1,21 +1,11 @@
 #include "events.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
 namespace spring {
 namespace {
-
-/// Ascending places in (0, 1].
-struct Places {
-  std::array<double, max_order + 2> at{};
-  std::size_t count = 0;
-  void add(double place) { at[count++] = place; }
-  const double* begin() const { return at.data(); }
-  const double* end() const { return at.data() + count; }
-};
 
 double value(const Series& c, int degree, double s) { return sum_of_powers(c, s, 0, degree); }
 
@@ -26,8 +16,6 @@ double sign_change(const Series& c, int degree, double low, double high) {
   return last_before(low, high, 2.0 * std::numeric_limits<double>::epsilon(), past);
 }
 
-Places sign_changes(const Series& c, int degree);
-
 /// The polynomial is monotone from 0 to the first, and from each to the next; the last is 1.
 Places ends_of_monotone_stretches(const Series& c, int degree) {
   Series derivative{};
@@ -36,6 +24,8 @@ Places ends_of_monotone_stretches(const Series& c, int degree) {
   ends.add(1.0);
   return ends;
 }
+
+}  // namespace
 
 Places sign_changes(const Series& c, int degree) {
   double others = 0.0;
@@ -49,8 +39,6 @@ Places sign_changes(const Series& c, int degree) {
   }
   return changes;
 }
-
-}  // namespace
 
 std::optional<double> first_fall(const Series& c, int degree) {
   double least = c[0];

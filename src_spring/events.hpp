@@ -3,6 +3,8 @@
 // turns there are.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <optional>
 
 #include "taylor.hpp"
@@ -18,6 +20,17 @@ double last_before(double low, double high, double resolution, const Past& past)
   }
   return low;
 }
+
+/// Ascending places in (0, 1].
+struct Places {
+  std::array<double, max_order + 2> at{};
+  std::size_t count = 0;
+  void add(double place) { at[count++] = place; }
+  const double* begin() const { return at.data(); }
+  const double* end() const { return at.data() + count; }
+};
+/// Where Σ c_k sᵏ, k ≤ degree, changes its sign, to rounding.
+Places sign_changes(const Series& c, int degree);
 
 /// The last place, to rounding, before Σ c_k sᵏ, k ≤ degree, is below 0 for the first time; nothing if it never is.
 std::optional<double> first_fall(const Series& c, int degree);

@@ -64,10 +64,13 @@ Rest rest(const Motion& motion, double y, double depth, bool compliant, const Lo
   // Where N is not smooth: the tip arrives or leaves, turns, or damping holds the contact force at 0.
   std::vector<double> cuts{0.0, size};
   if (compliant) {
-    const double root = std::sqrt(slope * slope + 2.0 * curvature * depth), sum = -(slope + std::copysign(root, slope));
-    for (const double t :
-         {sum / curvature, -2.0 * depth / sum, -slope / curvature, (law.release_speed() - slope) / curvature})
-      if (0.0 < t && t < size) cuts.push_back(t);
+    const Series deep_over_s{depth, -slope * size, -curvature / 2 * size * size};
+    const auto cut = [&](const Series& distance, int degree) {
+      for (const double s : sign_changes(distance, degree)) cuts.push_back(s * size);
+    };
+    cut(deep_over_s, 2);
+    cut({-slope, -curvature * size}, 1);
+    if (law.damped()) cut({law.release_speed() - slope, -curvature * size}, 1);
     std::sort(cuts.begin(), cuts.end());
   }
 

@@ -190,9 +190,15 @@ HEADERS = Path(fmpy.__file__).parent / "c-code"
 ZIG = HERE.parents[1] / "build" / "win64" / "zig-cc"
 
 
-def arguments(case):
+def arguments(case, scale=1.0, **start):
+    """Arguments of the host; ``scale`` is of the force and the impulses, ``start`` has start values."""
     names = [case.force, case.impulse, case.displacement, case.velocity, "kinetic_energy", "dissipated_energy"]
-    return [case.description.guid, *(str(case.variables[n].valueReference) for n in names)]
+    given = []
+    for name, value in start.items():
+        variable = case.variables[name]
+        kind = {"Integer": "i", "Boolean": "b"}.get(variable.type, "")
+        given.append(f"{kind}{variable.valueReference}={value}")
+    return [case.description.guid, str(scale), *(str(case.variables[n].valueReference) for n in names), *given]
 
 
 def rows(output):
@@ -221,6 +227,36 @@ def test_c_host(case, linux_host):
     repeated = [row for row in result if row[0] == "100"]
     assert len(repeated) == 8  # step 100 was made twice, from the same state
     assert repeated[:4] == repeated[4:]
+
+
+LAW = {"contact_law": 2, "tip_displacement": -1e-3, "tip_velocity": 0.1}
+HELD = {**LAW, "communication_step": 0.01, "tip_response": 1e-5, "tip_response_2": 2e-5, "tip_velocity_forecast": 0.1}
+STOP = {"stop_enabled": 1, "stop_position": 0.0, "restitution": 0.5}
+#: Start values under which the spring is, or begins, where a division by what is 0 lies near.
+SPECIAL = {
+    "at rest": {},
+    "at rest, preloaded": {"unloaded": 0.1, "external_force": -0.1},
+    "on its stop": STOP,
+    "pressed on its stop": {**STOP, "external_force": -1.0},
+    "touching": {**LAW, "tip_displacement": 0.0, "tip_velocity": 0.0},
+    "touching, a power by IDA": {**LAW, "tip_displacement": 0.0, "compliance_exponent": 1.5},
+    "in contact": {**LAW, "compliance_exponent": 1.5, "compliance_damping": 0.5},
+    "in contact, on its stop": {**LAW, **STOP},
+    "held, not yet in contact": {**HELD, "tip_displacement": 1e-3},
+    "held": HELD,
+    "held, damped": {**HELD, "compliance_damping": 0.5},
+    "held, on its stop": {**HELD, **STOP},
+    "without a spring": {"linear_stiffness": 0.0},
+    "damped": {"damping": 1e6},
+}
+
+
+@pytest.mark.parametrize("version", ["2.0"])
+@pytest.mark.parametrize("scale", [0.0, 1.0])
+@pytest.mark.parametrize("name", SPECIAL)
+def test_no_floating_point_trap_springs(spring, linux_host, name, scale):
+    result = rows(ran(linux_host, spring.binary, *arguments(spring, scale, **SPECIAL[name])))
+    assert len(result) == 4 * 11
 
 
 @pytest.mark.parametrize("version", ["2.0"])
