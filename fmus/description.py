@@ -192,14 +192,19 @@ class Description:
             for i, v in enumerate(self.variables):
                 if v["causality"] != "output" or (kind == "InitialUnknown" and v["exact"]):
                     continue
-                known = v["dependencies"] if kind == "Output" else [[name, 0] for name in v["initial_dependencies"]]
-                on = {(self.number[name], order) for name, order in known if self.version == 3 or order == 0}
                 if self.version == 2:
-                    dependencies = " ".join(str(j) for j in sorted(j + 1 for j, _ in on))
-                    ET.SubElement(parent, "Unknown", index=str(i + 1), dependencies=dependencies)
+                    unknown = ET.SubElement(parent, "Unknown", index=str(i + 1))
                 else:
-                    dependencies = " ".join(sorted((self._reference3(*d) for d in on), key=int))
-                    ET.SubElement(parent, kind, valueReference=self._reference3(i), dependencies=dependencies)
+                    unknown = ET.SubElement(parent, kind, valueReference=self._reference3(i))
+                if kind == "Output":
+                    known = v["dependencies"]
+                elif v["initial_dependencies"] is not None:
+                    known = [[name, 0] for name in v["initial_dependencies"]]
+                else:
+                    continue  # which means: all
+                on = {(self.number[name], order) for name, order in known if self.version == 3 or order == 0}
+                numbers = {str(j + 1) if self.version == 2 else self._reference3(j, order) for j, order in on}
+                unknown.set("dependencies", " ".join(sorted(numbers, key=int)))
 
 
 def build_description(table: dict[str, Any], source_files: list[str]) -> ET.Element:

@@ -184,7 +184,8 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
     return std::isnan(partial) ? difference(of, known) : finite(of, partial, too_large);
   }
   const auto& at_start = of.initial_dependencies;
-  const bool follows = starting && order == 0 && std::find(at_start.begin(), at_start.end(), by.name) != at_start.end();
+  const bool named = !at_start || std::find(at_start->begin(), at_start->end(), by.name) != at_start->end();
+  const bool follows = starting && order == 0 && named;
   return follows ? difference(of, known) : 0.0;
 }
 

@@ -53,7 +53,7 @@ std::string variable(const Variable& v) {
                  {"discrete", yes(v.discrete)},
                  {"elements", std::to_string(v.elements)},
                  {"dependencies", array(v.dependencies, dependency)},
-                 {"initial_dependencies", names(v.initial_dependencies)}});
+                 {"initial_dependencies", v.initial_dependencies ? names(*v.initial_dependencies) : "null"}});
 }
 
 std::string choice(const Choice& c) {

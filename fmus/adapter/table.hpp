@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -50,7 +51,8 @@ struct Variable {
   std::function<double(const Model&)> get;             ///< outputs
   std::function<double(const Model&)> derivative;      ///< outputs that know their time derivative
   std::vector<Dependency> dependencies;                ///< of an output between steps
-  std::vector<std::string> initial_dependencies;       ///< of an output at initialization
+  /// Of an output at initialization. Where it has no list, it may depend on all that is set.
+  std::optional<std::vector<std::string>> initial_dependencies{std::in_place};
 
   /// Whether it is an input that is a polynomial over the step.
   bool continuous_input() const { return causality == Causality::input && !consumed; }
@@ -62,6 +64,7 @@ struct Variable {
   Variable& steps_only() { return discrete = true, *this; }
   Variable& typical(double value) { return nominal = value, *this; }
   Variable& from(std::vector<std::string> names) { return initial_dependencies = std::move(names), *this; }
+  Variable& from_all() { return initial_dependencies.reset(), *this; }
 };
 
 /// Named alternatives, numbered from 1. Described as an Integer type and not as an Enumeration: libcosim leaves such

@@ -1,5 +1,4 @@
 // The beam FMU: its table of variables, bound to beam::Beam.
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -271,39 +270,14 @@ fmi::Table fmi::make_table() {
        "acceleration a of the clamp, upward; all displacements are relative to it, so that it acts as a distributed "
        "load of -density*area*a; derivatives as for tip_force");
 
-  // What the modal basis depends on. Every start is in it: u = s*x without a rotation, for any number of modes.
-  const std::vector<std::string> basis{"density",        "area",    "second_moment_of_area", "young_modulus",
-                                       "shear_modulus",  "length",  "shear_coefficient",     "n_elements",
-                                       "element_degree", "n_modes", "reduced_integration",   "integrator",
-                                       "mass_matrix"};
-  // A state of rest follows all loads.
-  std::vector<std::string> everything = basis;
-  everything.insert(everything.end(), {"initial_deflection_slope", "initial_velocity_slope", "tip_load_coefficient",
-                                       "gravity", "initial_state", "tip_force"});
-  for (std::size_t i = 0; i < Loads::tip - Loads::point; ++i) everything.push_back(position(i));
-  everything.insert(everything.end(), load_names.begin(), load_names.end());
-  const auto without = [&everything](const std::vector<std::string>& names) {
-    std::vector<std::string> rest;
-    for (const std::string& name : everything)
-      if (std::find(names.begin(), names.end(), name) == names.end()) rest.push_back(name);
-    return rest;
-  };
-  // What the steps ahead depend on besides.
-  std::vector<std::string> motion = basis;
-  motion.insert(motion.end(), {"alpha_b", "communication_step"});
-  std::vector<std::string> free_motion = motion;
-  for (std::size_t i = 0; i < Loads::tip - Loads::point; ++i) free_motion.push_back(position(i));
-  free_motion.insert(free_motion.end(), {"initial_deflection_slope", "initial_velocity_slope", "tip_load_coefficient",
-                                         "gravity", "initial_state", "tip_force"});
-  free_motion.insert(free_motion.end(), load_names.begin(), load_names.end());
   add.output("tip_displacement", "m", "deflection of the tip u(L)", of(&Beam::tip_displacement),
              of(&Beam::tip_velocity))
-      .from(without({"initial_velocity_slope", "integrator", "mass_matrix", "n_modes"}));
+      .from_all();
   add.output("tip_velocity", "m/s", "velocity of the tip", of(&Beam::tip_velocity), of(&Beam::tip_acceleration))
       .from({"initial_velocity_slope", "length", "initial_state"});
   add.output("tip_rotation", "rad", "rotation of the cross-section at the tip", of(&Beam::tip_rotation),
              of(&Beam::tip_rotation_rate))
-      .from(without({"initial_deflection_slope", "initial_velocity_slope"}));
+      .from_all();
   add.output("tip_displacement_integral", "m.s", "integral of tip_displacement over the last step",
              of(&Beam::tip_displacement_integral), of(&Beam::tip_displacement));
   add.output("tip_displacement_integral_2", "m.s2", "double integral of tip_displacement over the last step",
@@ -311,14 +285,13 @@ fmi::Table fmi::make_table() {
   add.output("kinetic_energy", "J", "kinetic energy", of(&Beam::kinetic_energy), of(&Beam::kinetic_power))
       .from({"density", "area", "length", "initial_velocity_slope", "mass_matrix", "element_degree", "n_elements",
              "initial_state"});
-  add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy), of(&Beam::strain_power))
-      .from(without({"initial_velocity_slope"}));
+  add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy), of(&Beam::strain_power)).from_all();
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Beam::dissipated_energy),
              of(&Beam::dissipated_power));
   add.output("load_potential", "J",
              "potential of the loads distributed_load, gravity and tip_load_coefficient, as if they were constant",
              of(&Beam::load_potential), [](const BeamModel& m) { return m.load_potential_rate(); })
-      .from(without({"initial_velocity_slope"}));
+      .from_all();
   add.depends("distributed_load",
               unless_resting([](const BeamModel& m) { return -m.beam->load_work_per_unit(Loads::distributed); }));
   add.output(
@@ -332,30 +305,27 @@ fmi::Table fmi::make_table() {
              [](const BeamModel& m) { return m.refused; })
       .steps_only();
   add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam", of(&Beam::tip_mass))
-      .from(basis);
+      .from_all();
   add.output(
          "tip_velocity_forecast", "m/s",
          "mean velocity of the tip over the next two steps of communication_step were there no tip_force; 0 if that is "
          "0",
          [](const BeamModel& m) { return m.forecast().velocity; }, [](const BeamModel& m) { return m.forecast_rate(); })
-      .from(free_motion);
+      .from_all();
   for (std::size_t i = 0; i < load_names.size(); ++i) {
     add.depends(load_names[i], unless_resting([i](const BeamModel& m) { return m.forecast_per_load(i); }));
   }
   add.local("tip_response", "m/N",
             "what 1 N held over one communication_step adds to tip_displacement at its end; 0 if that is 0",
-            [](const BeamModel& m) { return m.tip_response[0]; })
-      .from(motion);
+            [](const BeamModel& m) { return m.tip_response[0]; });
   add.local("tip_response_2", "m/N", "the same at the end of the step after, without a force meanwhile",
-            [](const BeamModel& m) { return m.tip_response[1]; })
-      .from(motion);
+            [](const BeamModel& m) { return m.tip_response[1]; });
   // What follows forces without delay, as linear functions of the response.
-  everything.emplace_back("alpha_b");
   const auto instant = [&](const char* name, const char* unit, const char* text, auto of_response) {
     add.output(
            name, unit, text, [=](const BeamModel& m) { return of_response(m, m.response()); },
            [=](const BeamModel& m) { return of_response(m, m.response_rate()); })
-        .from(everything);
+        .from_all();
     const auto follows = [&](const std::string& input, std::size_t load) {
       add.depends(input,
                   unless_resting([=](const BeamModel& m) { return of_response(m, m.beam->response_per_load(load)); }));
@@ -373,7 +343,6 @@ fmi::Table fmi::make_table() {
   instant("max_bending_stress", "Pa",
           "largest bending stress |M| h/2I at the points x = 0, L/20, ..., L; 0 if section_height is",
           [](M m, R r) { return m.bending_stress(r.forces); });
-  t.variables.back().initial_dependencies.emplace_back("section_height");
   const auto shape = [&](const std::string& name, const char* unit, const std::string& text, auto values) {
     for (std::size_t i = 0; i < beam::shape_points; ++i) {
       add.local(name + "[" + std::to_string(i + 1) + "]", unit, text + " at x = L*" + std::to_string(i) + "/20",

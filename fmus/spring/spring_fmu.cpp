@@ -417,7 +417,7 @@ fmi::Table fmi::make_table() {
     add.depends(name, [=, by = partial](M m) { return by(m) * by_held(m); });
   add.output("acceleration", "m/s2", "acceleration of the top", of(&Spring::acceleration), [](M m) { return m.jerk(); })
       .from(motion);
-  t.variables.back().initial_dependencies.emplace_back("contact_force");
+  t.variables.back().initial_dependencies->emplace_back("contact_force");
   add.depends("contact_force", [](M m) { return m.parameters.compliant() ? 0.0 : -m.mobility(); });
   for (const auto& [name, partial, order] : contact)
     add.depends(name, [by = partial](M m) { return -m.mobility() * by(m); }, order);
