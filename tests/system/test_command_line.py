@@ -127,7 +127,7 @@ def test_the_help_of_a_command_fits_80_columns_and_has_an_example_that_it_unders
     shown = printed(name, "--help")
     assert max(map(len, shown.splitlines())) <= 80
     assert "bool" not in shown  # flags have no type
-    described = COMMAND.commands[name]
+    described = COMMAND.get_command(None, name)
     example = re.search(r"Example: (springbeam .*)", described.help)[1]
     assert example in " ".join(shown.split())
     program, first, *arguments = shlex.split(example)
@@ -141,7 +141,7 @@ def test_the_command_alone_shows_how_to_start():
     shown = re.findall(r"^  springbeam (\w+)(.*?)   ", text, re.M)
     assert [name for name, _ in shown] == ["scenes", "run", "report", "crosscheck", "doctor"]
     for name, arguments in shown:
-        COMMAND.commands[name].make_context(name, arguments.split())
+        COMMAND.get_command(None, name).make_context(name, arguments.split())
 
 
 # -- JSON, quiet, colours -------------------------------------------------------------------------------------------

@@ -196,7 +196,9 @@ def test_what_is_not_run_is_still_there_and_understood():
         for line in lines:
             program, *words = shlex.split(line, comments=True)
             if program == "springbeam":
-                COMMAND.commands[words[0]].make_context(words[0], words[1:])  # raises if an option or a value is wrong
+                COMMAND.get_command(None, words[0]).make_context(
+                    words[0], words[1:]
+                )  # raises if an option or a value is wrong
 
 
 @pytest.mark.parametrize("name", ["fmu_variables", "scene"])
