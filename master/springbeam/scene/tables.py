@@ -15,9 +15,8 @@ from itertools import chain
 from math import pi
 from operator import or_
 from sys import float_info
-from typing import Annotated, Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
-import numpy as np
 from pydantic import (
     BaseModel,
     ConfigDict,
@@ -32,6 +31,9 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema
 from typing_extensions import Self
+
+if TYPE_CHECKING:
+    import numpy as np
 
 #: Up to this many unknowns all modes may be kept; the full eigenproblem grows with the cube.
 ALL_MODES_UP_TO = 1000
@@ -316,7 +318,7 @@ class Beam(Table):
 
 
 _BY_GAP = "0.0, or −gap of [contact]"
-_Heights = TypeVar("_Heights", float, np.ndarray)
+_Heights = TypeVar("_Heights", float, "np.ndarray")
 
 
 class Spring(Table):
