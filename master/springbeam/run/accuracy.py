@@ -31,6 +31,8 @@ from .outcome import Progress, RunStopped
 
 #: Fewest and most macro steps of a run.
 _FEWEST, _MOST = 8.0, 50_000
+#: Accuracy that a run in the largest resolved steps has, about, and the order of its error, both at degree 2.
+_SHARP, _ORDER = 1e-6, 6.0
 #: Angle that a soft contact may turn in a macro step of degree 2 [rad].
 _CONTACT_TURN = 2.0
 #: Angle that the fastest lasting wave may turn in a macro step of the first run that may do [rad].
@@ -133,8 +135,10 @@ def _estimated(
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Return the `distance` of two runs by its parts, and with it the error of the finer one: D/(2ᵖ − 1).
 
-    The order p is what this distance and that ``before`` show, 1 … 2; 1 where there is none. Contacts shorter than the
-    share ``short`` of the run are no evidence. The error of a peak force is at least that of `_peak_beside_law`.
+    The order p is what this distance and that ``before`` show, 1 … 2; 1 where there is none. Times of contacts that
+    agree better than at order 2 after those ``before`` may agree by chance: their error is that at order 2. Contacts
+    shorter than the share ``short`` of the run are no evidence. The error of a peak force is at least that of
+    `_peak_beside_law`.
     """
     found = distance(coarse, fine, short * float(fine.time[-1] - fine.time[0]))
     apart = {name: part for name, part in found._asdict().items() if part is not None}
@@ -145,6 +149,7 @@ def _estimated(
         errors[name] = now / (2.0**order - 1.0)
     if "force" in errors:
         errors["force"] = max(errors["force"], _peak_beside_law(fine))
+    errors["times"] = max(errors["times"], before.get("times", 0.0) / 12.0)  # D/(2² − 1), and four times less
     return apart, errors
 
 
@@ -171,7 +176,11 @@ def _peak_beside_law(run: Trajectory) -> float:
 
 
 def _first(scene: Scene) -> float:
-    """Return the number of macro steps of the first run: half as many as one needs that calls itself resolved."""
+    """Return the number of macro steps of the first run.
+
+    It is half as many as a run needs that calls itself resolved; of joined ends fewer for a loose accuracy, by the
+    order of their error: else the first run would have steps far smaller than it needs.
+    """
     rates = [omega / TURN for _, omega, _ in slow_oscillations(scene)]
     if scene.beam is not None and not scene.partners:
         if scene.massless:
@@ -180,7 +189,11 @@ def _first(scene: Scene) -> float:
             rates.append(_contact_frequency(scene) / _CONTACT_TURN)
         elif scene.coupled or scene.stop is not None:
             rates.append(lasting_frequency(scene.beam) / _WAVE_TURN)
-    return max(_FEWEST, math.ceil(0.5 * max(rates, default=0.0) * scene.duration))
+    steps = 0.5 * max(rates, default=0.0) * scene.duration
+    assert scene.accuracy is not None
+    if scene.coupled:
+        steps *= float(_SHARP / max(scene.accuracy, _SHARP)) ** (1.0 / _ORDER)
+    return max(_FEWEST, math.ceil(steps))
 
 
 def _contact_frequency(scene: Scene) -> float:
