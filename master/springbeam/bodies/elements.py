@@ -78,8 +78,12 @@ class SpringDamper(EndLoaded):
     ) -> None:
         if not (0.0 < mass < float("inf") and damping >= 0.0):
             raise ValueError(f"mass = {mass}, damping = {damping}: a mass is positive and finite, damping not negative")
-        self.mass, self._stiffness, self.damping, self._rest = mass, stiffness, damping, rest
-        self._load, self._sign = external_force, 1.0
+        self.mass = mass
+        self._stiffness = stiffness
+        self.damping = damping
+        self._rest = rest
+        self._load = external_force
+        self._sign = 1.0
         self.state = MassState(Motion(displacement, velocity, 0.0, 0.0))
         self._maps = lru_cache(SIZES_REMEMBERED)(self._map)
 

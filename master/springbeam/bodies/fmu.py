@@ -124,7 +124,8 @@ class Fmu:
         start_time: float,
         stop_time: float | None = None,
     ) -> None:
-        self.path, self._own = path, name is not None
+        self.path = path
+        self._own = name is not None
         self._stop_time = stop_time
         self._name = path.stem if name is None else name
         self._message = ""  #: the last that the FMU has logged
@@ -220,7 +221,8 @@ class Fmu:
 
     def of_state(self, *, of_trial: bool = False) -> tuple[Call, Call]:
         """Return what saves the state and what restores it: that of the mark, or that before a trial step."""
-        name, state = self._slave.STATE, self._before_trial if of_trial else self._state
+        name = self._slave.STATE
+        state = self._before_trial if of_trial else self._state
         return self.bound(f"Get{name}", byref(state)), self.bound(f"Set{name}", state)
 
     def reading(self, names: Sequence[str], size: int = 1) -> Callable[[], tuple[float, ...]]:
@@ -260,7 +262,8 @@ class Fmu:
         of_inputs, of_derivatives, of_outputs = (
             self._references(names, slave.REAL) for names in ((*inputs, *impulse), derivatives, outputs)
         )
-        given, told = (c_double * (2 + len(of_inputs) + len(each)))(), (c_double * len(outputs))()
+        given = (c_double * (2 + len(of_inputs) + len(each)))()
+        told = (c_double * len(outputs))()
         advance = Advance(
             slave.component, n_inputs=len(of_inputs), n_derivatives=len(each), n_outputs=len(outputs), inputs=of_inputs,
             derivatives=of_derivatives, outputs=of_outputs, orders=(c_int * len(each))(*[order for _, order in each]),
@@ -328,7 +331,8 @@ class Fmu:
             self._message = (text or b"").decode("utf-8", "replace")
 
     def _cause(self, otherwise: Exception | str) -> str:
-        message, self._message = self._message, ""
+        message = self._message
+        self._message = ""
         return message or str(otherwise)
 
     # -- its state, and how long it lives ------------------------------------------------------------------------------

@@ -86,7 +86,10 @@ class Port:
         always: bool = False,
         repeats: bool = True,
     ) -> None:
-        self.path, self._fmu, self._inputs, self._outputs = fmu.path, fmu, (*inputs, *impulse), outputs
+        self.path = fmu.path
+        self._fmu = fmu
+        self._inputs = (*inputs, *impulse)
+        self._outputs = outputs
         fmu.reading(self._inputs)  # a wrong reference is found before the run
         self._read = fmu.reading(outputs)
         self._advance, self._given, told = fmu.advancing(inputs, impulse, slopes, outputs, always)
@@ -201,14 +204,16 @@ class FmuBody(Body):
         port = self._port
         if (status := port.get_state()) > WARNING:
             raise port.failed(status, CANNOT["get_state"])
-        self._moved, self._marked = False, self.state
+        self._moved = False
+        self._marked = self.state
 
     def rewind(self) -> None:
         if self._moved:
             port = self._port
             if (status := port.set_state()) > WARNING:
                 raise port.failed(status, CANNOT["set_state"])
-            self._moved, self.state = False, self._marked
+            self._moved = False
+            self.state = self._marked
             self.rewinds += 1
 
     def motion(self) -> Motion:
@@ -219,7 +224,8 @@ class FmuBody(Body):
         # The FMU applies it at the start of its next step; motion and energies already show it.
         motion, told, pending, *_ = self.state
         self._moved = True
-        velocity, n = motion.velocity + impulse / self.mass, self._n_motion
+        velocity = motion.velocity + impulse / self.mass
+        n = self._n_motion
         work = 0.5 * impulse * (motion.velocity + velocity)
         told = (*told[:n], *[kinetic + work for kinetic in told[n : n + 1]], *told[n + 1 :])
         self.state = self.state._replace(
@@ -259,7 +265,8 @@ class OwnBody(FmuBody):
 
     def _connect(self) -> None:
         """Prepare what a step sets and tells: under loads, also these and their work."""
-        names, loads = self.NAMES, self._shares
+        names = self.NAMES
+        loads = self._shares
         energies = (*names.energies[:3], "load_work") if loads else names.energies
         self._port = self.fmu.once(Port, (*names.forces, *loads), (names.impulse,), (*names.motion, *energies))
         self._acceleration: Reading = self.fmu.once(Fmu.reading, (names.acceleration,))
@@ -277,7 +284,8 @@ class OwnBody(FmuBody):
 
     def set_loads(self, forces: Sequence[Force]) -> None:
         super().set_loads(forces)
-        values, slopes = [], []
+        values = []
+        slopes = []
         for name, shares in self._shares.items():
             f, df, ddf = combined([share for _, share in shares], [forces[number] for number, _ in shares])
             values.append(f + self._constants.get(name, 0.0))
@@ -320,7 +328,8 @@ class OwnBody(FmuBody):
         return made_of(Energies, (kinetic, potential, dissipated, of_loads))
 
     def close(self) -> None:
-        fmu, self._leased = self._leased, None
+        fmu = self._leased
+        self._leased = None
         if fmu is not None:  # it may be another body's by now
             fmu.give_back()
 

@@ -37,7 +37,8 @@ def work(force: Force, gap: Motion, size: float) -> float:
 def work_on(force: Force, start: Motion, end: Motion, size: float) -> float:
     """Return ∫ C ẇ dτ [J] over a step on an end that moves from ``start`` to ``end``, by parts: C Δw − ∫ Ċ Δw."""
     w0 = start.displacement
-    once, twice = end.integral - w0 * size, end.integral_2 - 0.5 * w0 * size * size
+    once = end.integral - w0 * size
+    twice = end.integral_2 - 0.5 * w0 * size * size
     return value(force, size) * (end.displacement - w0) - force[1] * once - force[2] * (size * once - twice)
 
 
@@ -56,7 +57,9 @@ def combined(shares: Sequence[float], forces: Sequence[Force]) -> Force:
 
 def legendre(force: Force, size: float, degree: int) -> list[float]:
     """Return the degree + 1 Legendre coefficients of the polynomial (cut above ``degree``)."""
-    value, slope, bend = force[0], size * force[1], size * size * force[2]
+    value = force[0]
+    slope = size * force[1]
+    bend = size * size * force[2]
     mean = value + slope / 2.0 + bend / 6.0
     return [mean] if degree == 0 else [mean, slope / 2.0 + bend / 4.0, bend / 12.0][: degree + 1]
 

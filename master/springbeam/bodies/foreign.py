@@ -78,12 +78,14 @@ class ForeignPort(Port):
     """A `Port` of a foreign FMU, through which all goes in SI units."""
 
     def __init__(self, fmu: Fmu, spec: ForeignFmu, found: Findings) -> None:
-        told, abilities = _outputs(spec, found), found.abilities
+        told = _outputs(spec, found)
+        abilities = found.abilities
         impulse = () if spec.impulse is None else (spec.impulse,)
         # Derivatives of one step may act in the next if they are not set again.
         always = {"always": True, "repeats": abilities.state}
         factors = {key: unit.factor for key, unit in found.units.items()}
-        second, force = factors["time"], factors["force"]
+        second = factors["time"]
+        force = factors["force"]
         slopes = [force / second**order for order in range(1, abilities.slopes + 1)]
         #: SI units by which what a step is given is divided, and those in which the FMU tells its outputs.
         self._of_given = (second, second, force, *(factors["impulse"] for _ in impulse), *slopes)
@@ -167,7 +169,9 @@ class ForeignBody(FmuBody, EndLoaded):
     def __init__(self, spec: ForeignFmu, upper: bool, times: tuple[float, float], found: Findings | None) -> None:
         self._port = RemotePort(spec.fmu, self.PATIENCE, self.OCCASION, opened, spec, times, found)
         self.found: Findings = self._port.found
-        self.abilities, self._spec, self._upward = self.found.abilities, spec, 1.0 if upper else -1.0
+        self.abilities = self.found.abilities
+        self._spec = spec
+        self._upward = 1.0 if upper else -1.0
         self._keys = tuple(_outputs(spec, self.found))
         self._n_motion = len({*self._keys} & {*spec.MOTION})
         self.state = ForeignState(Motion(0.0, 0.0, 0.0, 0.0), time=times[0])
@@ -188,7 +192,9 @@ class ForeignBody(FmuBody, EndLoaded):
             self.state = self.state._replace(motion=self.state.motion._replace(velocity=velocity))
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        up, sign, start = self._upward, self._spec.force_sign, self.state.motion
+        up = self._upward
+        sign = self._spec.force_sign
+        start = self.state.motion
         load = self._followed(self._on_end, size)
         exchanged = force.combined((up, 1.0), (contact, foundation))
         inputs = self._followed(force.combined((sign * up, sign * up), (exchanged, load)), size)
@@ -211,7 +217,8 @@ class ForeignBody(FmuBody, EndLoaded):
         impulse = () if self._spec.impulse is None else (self.state.pending,)
         self.steps += 1
         self.rewinds += 1
-        given, before = (time, size, load[0], *impulse, *load[1 : 1 + self.abilities.slopes]), self.state
+        given = (time, size, load[0], *impulse, *load[1 : 1 + self.abilities.slopes])
+        before = self.state
         end = self._take(self._port.trial(given), size)
         self.state = before
         return end
@@ -260,7 +267,8 @@ class ForeignBody(FmuBody, EndLoaded):
         from scipy.optimize import newton  # takes a tenth of a second to load: only for who rests on a foundation
 
         size = self.state.size or self.found.H
-        load, self._on_end = self._on_end, NO_FORCE
+        load = self._on_end
+        self._on_end = NO_FORCE
 
         def pushed(upward: float) -> Motion:
             self.rewind()

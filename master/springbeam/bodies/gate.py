@@ -25,7 +25,7 @@ _LACKS = {
     "state": "its state cannot be saved (canGetAndSetFMUstate = false)",
     "any_size": "its steps have one size (canHandleVariableCommunicationStepSize = false)",
     "velocity": "it has no velocity",
-    "integrals": "it has not integral and integral_2, or a body of your own wrong ones in its Motion",
+    "integrals": "its Motion has wrong integrals, or it has not integral and integral_2",
     "impulse": "it has no impulse, or of a body of your own no apply_impulse",
 }
 _TO_BE_STRUCK = ("state", "any_size", "velocity", "impulse")
@@ -38,7 +38,8 @@ def _exchanges(scene: Scene) -> bool:
 
 def _falls_between(scene: Scene) -> bool:
     """Return whether a load jumps or bends between equal macro steps."""
-    H, start = scene.coupling.H, scene.contact_time or 0.0
+    H = scene.coupling.H
+    start = scene.contact_time or 0.0
     kinks = [t for load in scene.loads if not load.is_finer_than(H) for t in load.kinks]
     steps = [(t - start) / H for t in kinks if start <= t < scene.time.t_end]
     return any(abs(n - round(n)) > SAME for n in steps)
@@ -230,7 +231,8 @@ def admit(
     ]
     if scene.stop is not None and (bodies.keys() & {"spring"} or not scene.static):  # else the stop holds the tip up
         table, end = list(bodies.items())[-1]
-        w, floor = end.motion().displacement, scene.stop.position
+        w = end.motion().displacement
+        floor = scene.stop.position
         if floor - w > _SAME_PLACE * max(abs(w), abs(floor)):
             lines.append(
                 f"[stop] position = {floor:g}: the body in [{table}] starts below the foundation, at {w:.9g} m; "
@@ -250,7 +252,9 @@ def admit(
 
 def _joined(scene: Scene, upper: Body, lower: Body) -> list[str]:
     """Join ends that are to be tied, where one takes no impulse; return why, if their velocities forbid it."""
-    v, z, lines = upper.motion().velocity, lower.motion().velocity, []
+    v = upper.motion().velocity
+    z = lower.motion().velocity
+    lines = []
     for table, body, other in (("beam", upper, lower), ("spring", lower, upper)):
         if (abilities := body.can()).impulse:
             continue

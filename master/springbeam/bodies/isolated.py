@@ -41,7 +41,8 @@ class FmuProcess:
     _idle: ClassVar[list[FmuProcess]] = []
 
     def __init__(self, path: str) -> None:
-        self._path, self._master = path, os.getpid()
+        self._path = path
+        self._master = os.getpid()
         self._folder = tempfile.TemporaryDirectory(prefix="springbeam-", ignore_cleanup_errors=True)
         self._errors = Path(self._folder.name) / "errors"
         # Two pipes: by a pair of sockets an exchange takes 1.4 times as long.
@@ -81,7 +82,8 @@ class FmuProcess:
         BodyFailed, StepRefused
             If the FMU fails.
         """
-        began, self.idle = monotonic(), False
+        began = monotonic()
+        self.idle = False
         try:
             self._requests.send(calls)
             if not self._answers.poll(patience):
@@ -182,7 +184,9 @@ class RemotePort(Port):
     def __init__(
         self, path: str, patience: float, occasion: str, make: Callable[..., tuple[Port, Any]], *arguments: Any
     ) -> None:
-        self.path, self.patience, self._occasion = Path(path), patience, occasion
+        self.path = Path(path)
+        self.patience = patience
+        self._occasion = occasion
         self._waiting: list[Request] = []
         self._process: FmuProcess | None = FmuProcess.of(path)
         try:
@@ -193,7 +197,8 @@ class RemotePort(Port):
 
     def _ask(self, doing: str, *call: Any) -> Any:
         assert self._process is not None
-        calls, self._waiting = [*self._waiting, call], []
+        calls = [*self._waiting, call]
+        self._waiting = []
         return self._process.ask(calls, doing + self._occasion, self.patience)
 
     def read(self) -> Any:
@@ -214,7 +219,8 @@ class RemotePort(Port):
         return OK
 
     def close(self) -> bool:
-        process, self._process = self._process, None
+        process = self._process
+        self._process = None
         again = False
         if process is None:
             return again

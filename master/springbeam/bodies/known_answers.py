@@ -54,9 +54,13 @@ def _beam() -> Question:
 
 
 def _spring() -> Question:
-    linear, cubic, amplitude, tolerance = 150.0, 67.0, 0.5, 1e-10
+    linear = 150.0
+    cubic = 67.0
+    amplitude = 0.5
+    tolerance = 1e-10
     square = linear + cubic * amplitude**2
-    larger, smaller = 1.0, sqrt(1.0 - cubic * amplitude**2 / (2.0 * square))
+    larger = 1.0
+    smaller = sqrt(1.0 - cubic * amplitude**2 / (2.0 * square))
     while larger - smaller > 4.0 * float_info.epsilon:
         larger, smaller = 0.5 * (larger + smaller), sqrt(larger * smaller)
     period = 2.0 * pi / (larger * sqrt(square))

@@ -50,7 +50,9 @@ class Bench:
 
     def __init__(self, spec: ForeignFmu, upper: bool, times: tuple[float, float], H: float) -> None:
         start, end = times
-        self.spec, self._start, self.faults = spec, start, list[str]()
+        self.spec = spec
+        self._start = start
+        self.faults = list[str]()
         self._made = partial(_TriedBody, spec, upper, (start, max(end, start + _RECORD * H)))
         #: The present instance; its ``abilities`` are those that are known.
         self.body = self._made(None)
@@ -118,7 +120,8 @@ class Bench:
 
         Raises the StepRefused of the longest if it steps at none.
         """
-        refused, stepped = dict[float, StepRefused](), False
+        refused = dict[float, StepRefused]()
+        stepped = False
         for size in sizes:
             try:
                 value = tried(size)
@@ -158,7 +161,8 @@ def _examined(_changed: int | None, spec: str, upper: bool, times: tuple[float, 
 
 def _examine(bench: Bench, upward: float) -> Findings:
     """Examine the FMU of ``bench``; a positive C acts upward (1) or downward (-1) on its end."""
-    spec, H = bench.spec, bench.sizes[0]
+    spec = bench.spec
+    H = bench.sizes[0]
     promised = bench.body.abilities.slopes
     bench.renew(slopes=0)
     if bench.body.abilities.state:
@@ -213,9 +217,12 @@ def _wrong_outputs(bench: Bench, impetus: float, h: float) -> set[str]:
 
     ``impetus`` is a mass times a length to move it by [kg·m].
     """
-    spec, n = bench.spec, _RECORD
+    spec = bench.spec
+    n = _RECORD
     x, v, once, twice, energy, work = bench.run(h, [(impetus / (n * h) ** 2, 0.0, 0.0)] * n).T
-    moved, gained, received = np.diff(x), np.diff(energy), np.diff(work)
+    moved = np.diff(x)
+    gained = np.diff(energy)
+    received = np.diff(work)
     means = 0.5 * h * (v[:-1] + v[1:])
     first, second = np.array(moments(x[:-1], v[:-1] if spec.velocity else v[1:], x[1:], v[1:], h))
     seen, seen_work = (
@@ -249,7 +256,8 @@ def _try_slopes(bench: Bench, impetus: float) -> None:
         def unfollowed(size: float, order: int = order) -> set[str]:
             force = impetus / size**2
             slopes = (force / size, 0.0) if order == 1 else (0.0, 2.0 * force / size**2)
-            held, grown = bench.change(size, (force, 0.0, 0.0)), bench.change(size, (0.0, *slopes))
+            held = bench.change(size, (force, 0.0, 0.0))
+            grown = bench.change(size, (0.0, *slopes))
             follows = abs(grown - due[order - 1] * held) <= _RESPONSE * due[order - 1] * abs(held)
             said = "canInterpolateInputs = true, but a force that grows over a step is not followed"
             return set() if follows and held else {said}

@@ -233,7 +233,8 @@ class Body:
         if modes is not None:
             _, damping, tip = modes
             return float(tip**2 @ damping) / (float(tip @ tip) or 1.0)
-        before, free = self.state, self.trial_acceleration(time, size)
+        before = self.state
+        free = self.trial_acceleration(time, size)
         if free is None or not self.abilities.impulse:
             return None
         try:

@@ -70,7 +70,8 @@ class QuasiStaticBeam(Body):
         self._load_shape = statics.load_shape(beam, SHAPE_POINTS)
         self._arm = beam.length * (1.0 - SHAPE_POINTS)
         self._load_shear, self._load_moment = statics.load_forces(beam, self._arm)
-        self._rest, self._load_energy = statics.tip_load_deflection(beam), statics.load_energy(beam)
+        self._rest = statics.tip_load_deflection(beam)
+        self._load_energy = statics.load_energy(beam)
         self.state = BendState(tip - self._rest, velocity)
         self._responses = lru_cache(SIZES_REMEMBERED)(self._response)
 
@@ -82,10 +83,12 @@ class QuasiStaticBeam(Body):
         return self._arrive(size, w, velocity, first, second, self._alpha * k * size * mean_square)
 
     def advance_alone(self, time: float, size: float) -> Motion:
-        start, alpha = self.state.w, self._alpha
+        start = self.state.w
+        alpha = self._alpha
         # α_b = 0: at once.
         left, gone = (math.exp(-size / alpha), -math.expm1(-size / alpha)) if alpha > 0.0 else (0.0, 1.0)
-        w, velocity = start * left, -start * left / alpha if alpha > 0.0 else 0.0
+        w = start * left
+        velocity = -start * left / alpha if alpha > 0.0 else 0.0
         first = alpha * start * gone
         lost = 0.5 * self._stiffness * (start * start - w * w)
         return self._arrive(size, w, velocity, first, alpha * (start * size - first), lost)
@@ -100,7 +103,8 @@ class QuasiStaticBeam(Body):
         at_start = (-1.0) ** np.arange(d + 2)
         w = np.linalg.inv(np.vstack([np.eye(d + 1, d + 2) + self._alpha * derivative, at_start]))
         rate = derivative @ w
-        once, twice = size * w[0], 0.5 * size * size * (w[0] - w[1] / 3.0)
+        once = size * w[0]
+        twice = 0.5 * size * size * (w[0] - w[1] / 3.0)
         rows: list[list[float]] = [row.tolist() for row in (w.sum(axis=0), rate.sum(axis=0), once, twice, *rate)]
         return rows
 
@@ -116,7 +120,9 @@ class QuasiStaticBeam(Body):
 
     def energies(self) -> Energies:
         """Return the strain energy of w and the loads together, and the loads' potential, −(their work)."""
-        k, w, rest = self._stiffness, self.state.w, self._rest
+        k = self._stiffness
+        w = self.state.w
+        rest = self._rest
         strain = 0.5 * k * w * w + k * w * rest + 0.5 * self._load_energy
         return Energies(0.0, strain, self.state.dissipated, -k * w * rest - self._load_energy)
 
@@ -124,7 +130,8 @@ class QuasiStaticBeam(Body):
         """See `Body.shape`; without inertia moment and shear force are those of statics."""
         deflection = self._load_shape + self._stiffness * self.state.w * self._tip_shape
         C = self._stiffness * (self.state.w + self._alpha * self.state.velocity)
-        moment, shear = self._load_moment + C * self._arm, self._load_shear + C
+        moment = self._load_moment + C * self._arm
+        shear = self._load_shear + C
         return np.concatenate([deflection, moment, shear])
 
     def stiffness(self, displacement: Any) -> float:

@@ -49,7 +49,8 @@ class Height:
         return self.sign * (ends[self.end].displacement - self.level), self.sign * rate
 
     def means(self, ends: Ends, size: float) -> Means:
-        end, level = ends[self.end], self.level
+        end = ends[self.end]
+        level = self.level
         return self.sign * (end.integral / size - level), self.sign * (end.integral_2 / (size * size) - 0.5 * level)
 
 
@@ -106,13 +107,15 @@ class EventFunctions:
         """f, ḟ of each function of ``phase``."""
         if phase is not self._phase or ends != self._ends:
             functions = self.of(phase)
-            self._ends, self._samples = ends, []
+            self._ends = ends
+            self._samples = []
             for _, function in functions:
                 self._samples.append(function(ends))
         return self._samples
 
     def _built(self, phase: Phase) -> list[tuple[EventKind, EventFunction]]:
-        tip, low = 0, 1
+        tip = 0
+        low = 1
         meets = self._interface
         functions: list[tuple[EventKind, EventFunction]] = []
         share = meets.tip_share if meets.rigid and phase.joint is not Joint.FREE else 0.0
@@ -156,7 +159,9 @@ def locate(evaluate: Callable[[float], Sample], guess: float, size: float, toler
     is only the first guess of df/dh: where both ends differ in velocity, the force of a step, and with it the motion,
     changes with h.
     """
-    low, high, h = 0.0, size, max(guess, EPS * size)
+    low = 0.0
+    high = size
+    h = max(guess, EPS * size)
     last: tuple[float, float] | None = None
     for _ in range(_MAX_EVALUATIONS):
         value, rate = evaluate(h)

@@ -40,7 +40,8 @@ class Exchange(Booked):
     def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
         """Return the step with the force on the upper body; ``guess`` plays no part. Raises StepRefused."""
         tip, low = start
-        p, rate = low.displacement - tip.displacement, low.velocity - tip.velocity
+        p = low.displacement - tip.displacement
+        rate = low.velocity - tip.velocity
         force = (self.law.force(p, rate), self.law.slope(p) * rate if self.degree else 0.0, 0.0)
         upper.rewind()
         tip = upper.advance(time, size, force)

@@ -64,8 +64,10 @@ class Projection:
     """
 
     def __init__(self, law: SoftLaw, degree: int) -> None:
-        self.law, self.degree = law, degree
-        self._damped, self._few = law.damped, _FEW[degree]
+        self.law = law
+        self.degree = degree
+        self._damped = law.damped
+        self._few = _FEW[degree]
         self._is_quotient = degree == 0 and not law.damped
         units = np.eye(degree + 1).tolist()
         #: ∂p̃/∂x_j, and the Legendre coefficients of its projection, by rows.
@@ -83,7 +85,8 @@ class Projection:
             if _changes(start, end):
                 mean = (self.law.potential(end) - self.law.potential(start)) / (end - start)
             else:
-                middle, half = 0.5 * (start + end), 0.5 * (end - start)
+                middle = 0.5 * (start + end)
+                half = 0.5 * (end - start)
                 mean = 0.5 * sum([weight * law(middle + s * half) for s, weight in _OF_LITTLE])
             if not isfinite(mean):
                 raise OverflowError
@@ -126,7 +129,8 @@ class Projection:
         rows = [[0.0] * len(x) for _ in x]
         for s, weight in rule:
             p, rate = _at(path, s, size)
-            by_p, by_rate = law.slope(p), 0.0
+            by_p = law.slope(p)
+            by_rate = 0.0
             if self._damped:
                 _, of_resistance, by_rate = law.resistance(p, rate)
                 by_p += of_resistance
@@ -150,8 +154,11 @@ class Projection:
     def _missing(self, path: _Path, moments: tuple[float, float, float], start: float, end: float) -> float:
         """Return by how much of p̃′ C is to be corrected for ∫ C p̃′ = ΔΦ: quadrature of a power is not exact."""
         _, b1, b2, b3 = path
-        w0, w1, w2 = b1 * moments[0], 2.0 * b2 * moments[1], 3.0 * b3 * moments[2]
-        before, after = self.law.potential(start), self.law.potential(end)
+        w0 = b1 * moments[0]
+        w1 = 2.0 * b2 * moments[1]
+        w2 = 3.0 * b3 * moments[2]
+        before = self.law.potential(start)
+        after = self.law.potential(end)
         missing = after - before - w0 - w1 - w2
         if abs(missing) <= 8.0 * EPS * (before + after + abs(w0) + abs(w1) + abs(w2)):
             return 0.0
@@ -163,7 +170,8 @@ class Projection:
         if not self.law.one_sided:
             return self._few
         _, b1, b2, b3 = path
-        second, third = start + (b1 - 2.0 * b2 + 3.0 * b3) / 1.5, end - (b1 + 2.0 * b2 + 3.0 * b3) / 1.5
+        second = start + (b1 - 2.0 * b2 + 3.0 * b3) / 1.5
+        third = end - (b1 + 2.0 * b2 + 3.0 * b3) / 1.5
         low, high = min(start, second, third, end), max(start, second, third, end)  # of the Bézier points
         if high <= 0.0:
             return ()
@@ -189,7 +197,8 @@ def penetration_series(start: float, x: Vector) -> Vector:
 
 
 def _path(start: float, x: Vector) -> _Path:
-    middle, half_change = 0.5 * (start + x[0]), 0.5 * (x[0] - start)
+    middle = 0.5 * (start + x[0])
+    half_change = 0.5 * (x[0] - start)
     if len(x) == 1:
         return (middle, half_change, 0.0, 0.0)
     bend = middle - x[1]
@@ -218,7 +227,9 @@ class Booked(Coupling):
     """Books what a soft law stores and dissipates; parameters as of `Projection`."""
 
     def __init__(self, law: SoftLaw, degree: int) -> None:
-        self.law, self.degree, self._projection = law, degree, Projection(law, degree)
+        self.law = law
+        self.degree = degree
+        self._projection = Projection(law, degree)
         self.state = Counts()
 
     def accept(self, step: Step) -> None:

@@ -43,13 +43,17 @@ def inverse(A: Matrix) -> Matrix:
     """
     if len(A) == 1:
         ((a,),) = A
-        minors, determinant = [[1.0]], a
+        minors = [[1.0]]
+        determinant = a
     elif len(A) == 2:
         (a, b), (c, d) = A
-        minors, determinant = [[d, -b], [-c, a]], a * d - b * c
+        minors = [[d, -b], [-c, a]]
+        determinant = a * d - b * c
     else:
         (a, b, c), (d, e, f), (g, h, i) = A
-        first, second, third = e * i - f * h, f * g - d * i, d * h - e * g
+        first = e * i - f * h
+        second = f * g - d * i
+        third = d * h - e * g
         minors = [
             [first, c * h - b * i, b * f - c * e],
             [second, a * i - c * g, c * d - a * f],

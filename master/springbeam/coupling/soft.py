@@ -93,7 +93,8 @@ class SoftSolver(Booked, StepSolver):
         ``descent`` is −E, ``flexibility`` a guess of (E + A′)⁻¹, good if it makes corrections shrink as much. Raises
         numpy.linalg.LinAlgError.
         """
-        force, under_a = self._projection.force, x
+        force = self._projection.force
+        under_a = x
         of_law = force(start, size, x)
         missing = list(map(sub, a, of_law))  # −f
         guessed = flexibility is not None
@@ -116,7 +117,8 @@ class SoftSolver(Booked, StepSolver):
                 share *= 0.5
             else:
                 return None
-            x, slow = tried, left > _SLOW * length
+            x = tried
+            slow = left > _SLOW * length
             settled = left * left <= _SETTLED * scale * length or length <= _ROUNDING * scale
             if settled and not (guessed and slow):
                 self.state.last_crossing = (size, flexibility)
@@ -124,10 +126,12 @@ class SoftSolver(Booked, StepSolver):
                 felt = times(descent, following)
                 return list(map(add, x, following)), [c + m + d for c, m, d in zip(of_law, missing, felt, strict=True)]
             if slow:
-                flexibility, guessed = self._flexibility(start, size, x, of_law, descent), False
+                flexibility = self._flexibility(start, size, x, of_law, descent)
+                guessed = False
                 following = times(flexibility, missing)
                 left = max(map(abs, following))
-            change, length = following, left
+            change = following
+            length = left
         return None
 
     def _flexibility(self, start: float, size: float, x: Vector, of_law: Vector, descent: Matrix) -> Matrix:
@@ -151,5 +155,6 @@ class SoftSolver(Booked, StepSolver):
             found = self._newton(start, size, x, [c / softness for c in a], harder)
             if found is None or softness == 1.0:
                 return found
-            x, a = found[0], [softness * c for c in found[1]]
+            x = found[0]
+            a = [softness * c for c in found[1]]
             softness = min(1.0, _STIFFER * softness)

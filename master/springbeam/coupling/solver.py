@@ -116,7 +116,8 @@ class StepSolver(Coupling):
 
     def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
         """Advance both bodies so that the conditions hold, as `Coupling.solve` says."""
-        conditions, derivatives = self._conditions, force.derivatives
+        conditions = self._conditions
+        derivatives = force.derivatives
         a = known = force.legendre(guess, size, self.degree)  # known: where the upper body has been
         acting = derivatives(a, size)
         upper.rewind()
@@ -150,17 +151,20 @@ class StepSolver(Coupling):
                     break
                 upper.rewind()
                 upper_end = upper.advance(time, size, acting)
-                r_upper, predicted = conditions(upper_end, size), False
+                r_upper = conditions(upper_end, size)
+                predicted = False
             else:
                 self.state.iterations += 1
                 a = better
                 acting = derivatives(a, size)
-                r_upper, predicted = list(map(add, r_upper, times(B, step))), True
+                r_upper = list(map(add, r_upper, times(B, step)))
+                predicted = True
                 lower.rewind()
                 lower_end = lower.advance(time, size, acting)
                 r_lower = conditions(lower_end, size)
                 enough = rounding
-            before, gap = gap, list(map(sub, r_upper, r_lower))
+            before = gap
+            gap = list(map(sub, r_upper, r_lower))
             residual = gap if goal is None else list(map(sub, gap, goal))
             norm = max(map(abs, residual))
             if not norm > enough:
@@ -172,14 +176,19 @@ class StepSolver(Coupling):
                 continue
             if not predicted:
                 # The upper body is not linear: what it missed of the prediction corrects both responses.
-                taken, missed = list(map(sub, a, known)), list(map(sub, gap, before))
-                B, descent, known = secant(B, taken, missed), broyden(descent, taken, missed), a
+                taken = list(map(sub, a, known))
+                missed = list(map(sub, gap, before))
+                B = secant(B, taken, missed)
+                descent = broyden(descent, taken, missed)
+                known = a
             elif due:
                 length = 1e-4 * max(abs(lower_end.displacement), size * abs(lower_end.velocity))
                 S = self._measure(lower, time, size, a, r_lower, length)
                 lower.rewind()
                 lower_end = lower.advance(time, size, acting)
-                descent, measured, due = _descent(B, S), True, False
+                descent = _descent(B, S)
+                measured = True
+                due = False
             else:
                 descent = broyden(descent, step, residual)
             goal, step, better = self.aim(gap, a, descent, size, start)
@@ -191,7 +200,8 @@ class StepSolver(Coupling):
             said = "t = %.9g s, H = %.3g s: contact force found in %d iterations, residual %.2g m, %.2g m allowed"
             _log.debug(said, time, size, iteration, norm, enough)
         # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
-        u, y = upper_end[0], lower_end[0]
+        u = upper_end[0]
+        y = lower_end[0]
         state = self.state
         state.reach = max(state.reach, u, -u, y, -y)
         if lower.mass == inf:

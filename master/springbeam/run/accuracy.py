@@ -94,7 +94,8 @@ def pick(scene: Scene) -> Trajectory:
         If the run with these settings would stop early.
     """
     assert scene.accuracy is not None
-    asked, steps = scene.accuracy, _first(scene)
+    asked = scene.accuracy
+    steps = _first(scene)
     pilots: list[Trajectory] = []
     coarse: Trajectory | None = None
     before: dict[str, float] = {}
@@ -225,7 +226,8 @@ def _with_errors(run: Trajectory, asked: float, errors: dict[str, float], pilots
 
     What a scheme has changed of the energy is a doubt about the motion; runs that agree have settled it.
     """
-    coupling, spring = run.scene.coupling, run.scene.spring
+    coupling = run.scene.coupling
+    spring = run.scene.spring
     picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": run.summary["degree"], "macro_step": coupling.H}
     if spring is not None:
         picked["ida_relative_tolerance"] = spring.relative_tolerance

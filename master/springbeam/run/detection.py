@@ -133,7 +133,9 @@ class Detector:
 
     def _pulled(self, state: State, present: Present, ends: Ends) -> EventKind | None:
         """Return the event that is due where a force that can only push would pull by more than rounding."""
-        kind, pair, H = self._pair.let_go_by(state.phase), self._pair, self._steps.size
+        kind = self._pair.let_go_by(state.phase)
+        pair = self._pair
+        H = self._steps.size
         if kind is None or state.met_again == state.time:
             return None
         pull = -present.held_by(kind)
@@ -148,11 +150,13 @@ class Detector:
 
         ``None`` if it pushes all the time; of size 0 if it pulls from the start.
         """
-        pair, H = self._pair, self._steps.size
+        pair = self._pair
+        H = self._steps.size
         kind = pair.let_go_by(state.phase)
         if kind is None:
             return None
-        start, last = max(state.present.held_by(kind), 0.0), step
+        start = max(state.present.held_by(kind), 0.0)
+        last = step
 
         def pushes(size: float) -> float:
             nonlocal last
@@ -160,7 +164,8 @@ class Detector:
             return pair.present(state.phase, last, H).held_by(kind)
 
         present = pair.present(state.phase, step, H)
-        size, end = step.size, present.held_by(kind)
+        size = step.size
+        end = present.held_by(kind)
         mean = pair.mean_of(kind, state.phase, step)
         bend = 3.0 * (start + end - 2.0 * mean)
         slope = end - start - bend  # of the parabola through both ends with the mean of the step
@@ -237,7 +242,8 @@ class Detector:
         """Compliance: a contact that closes and opens inside the step would be missed; it is cut to its middle."""
         if any(step.contact) or not self._pair.divides:
             return step
-        start, end = gap(step.start), gap(step.end)
+        start = gap(step.start)
+        end = gap(step.end)
         if start[0] < 0.0 or end[0] < 0.0:
             return step
         path = Path.through(start, end, step.size, gap.means(step.end, step.size))

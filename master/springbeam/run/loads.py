@@ -55,7 +55,9 @@ class Signal:
 
     def over(self, time: float, size: float) -> Force:
         """Return the projection onto a step of ``size`` [s] from ``time`` [s] on."""
-        load, middle, same = self._load, time + 0.5 * size, SAME * size
+        load = self._load
+        middle = time + 0.5 * size
+        same = SAME * size
         if time >= self._end:
             return NO_FORCE
         cuts = self._edges[bisect_right(self._edges, time + same) : bisect_left(self._edges, time + size - same)]

@@ -170,7 +170,8 @@ class AdaptiveSteps:
         for start, end, (low, high), size in ends:
             means = end.integral / step.size, end.integral_2 / step.size**2
             beside = Path.through(start[:2], end[:2], step.size, means).moments_beside_cubic
-            way, rounding = high - low, _ROUNDING * size
+            way = high - low
+            rounding = _ROUNDING * size
             if way > rounding:
                 spans.append(way)
             elif bent > 0.0:

@@ -73,7 +73,8 @@ class _Errors:
     def __init__(self, modes: Modes, mass: float, damping: float, duration: float) -> None:
         # A free mass is a mode so soft that it does not turn.
         stiffness = np.maximum(modes[0], (1e-4 / duration) ** 2)
-        decay, tip = 0.5 * modes[1], modes[2]
+        decay = 0.5 * modes[1]
+        tip = modes[2]
         root = np.sqrt(decay**2 - stiffness * (1.0 + 1e-12j))  # never 0
         creeps = decay**2 >= stiffness
         self._rates = np.concatenate([root - decay, -(root + decay)[creeps]])
@@ -102,7 +103,8 @@ class _Errors:
         """
         stiffness, decay, _, creeps = self._modes
         moved = np.exp(self._rates * H)
-        impulse, jump = self._impulse.view(complex), self._jump.view(complex)
+        impulse = self._impulse.view(complex)
+        jump = self._jump.view(complex)
         pushed = _reals(impulse * np.expm1(self._rates * H) / self._rates)
         follows = 1.0 / (1.0 + H * (decay + 0.25 * H * stiffness))
         shifted = _reals(moved * (jump + self._damps * impulse) * np.concatenate([follows, follows[creeps]]))
@@ -174,7 +176,8 @@ def _along_soft_law(
 ) -> Iterator[tuple[float, float]]:
     """Yield the errors of both ends [m] along the run: its steps have not the force that ``law`` asks for."""
     made = np.flatnonzero(steps["size"] > 0.0)
-    before, step = steps[made - 1], steps[made]
+    before = steps[made - 1]
+    step = steps[made]
     parts = 1 if degree == 0 else 2  # a force of a higher degree has the law's mean over a step
     defect = _defect(law, before, step, parts)
     at_end = np.ones((3, len(step), parts)) * [[[1.0]], [[0.0]], [[0.0]]]
@@ -203,9 +206,11 @@ def _defect(law: SoftLaw, before: np.ndarray, step: np.ndarray, parts: int) -> n
     found = np.zeros((4, len(step), parts))
     for part, (at, share) in product(range(parts), zip(*_INSIDE, strict=True)):
         s = (part + at) / parts
-        p, rate = path.at(s), path.slope(s) / size
+        p = path.at(s)
+        rate = path.slope(s) / size
         closed = np.flatnonzero((p > 0.0) | (not law.one_sided))
-        force, grows = -applied(step, s * size), np.zeros((2, len(step)))
+        force = -applied(step, s * size)
+        grows = np.zeros((2, len(step)))
         for i, *both in zip(closed.tolist(), p[closed].tolist(), rate[closed].tolist(), strict=True):
             _, *slopes = law.resistance(*both) if law.damped else (0.0, 0.0, 0.0)
             force[i] += law.force(*both)
@@ -281,7 +286,8 @@ def _after_events(interface: Interface, steps: np.ndarray, events: Sequence[Even
         e = interface.restitution
         np.multiply.at(shares, rows, -e)
         at = np.searchsorted(made, rows, side="right") - 1
-        before, step = steps[made - 1], steps[made]
+        before = steps[made - 1]
+        step = steps[made]
         speed = step["v_tip" if interface.alone else "z"][at]
         if interface.alone:  # no force acts on the tip before or after
             changed = (1.0 + e) * _last_acceleration(before[at], step[at])
@@ -296,7 +302,8 @@ def _after_events(interface: Interface, steps: np.ndarray, events: Sequence[Even
 def _last_acceleration(before: np.ndarray, step: np.ndarray) -> Any:
     """Return ü_tip at the end of each step [m/s²], of the path through both ends and the moments."""
     size = step["size"]
-    start, end = (before["u_tip_after"], before["v_tip_after"]), (step["u_tip"], step["v_tip"])
+    start = (before["u_tip_after"], before["v_tip_after"])
+    end = (step["u_tip"], step["v_tip"])
     means = step["u_tip_integral"] / size, step["u_tip_integral_2"] / size**2
     path = Path.through(start, end, size, means)  # type: ignore[arg-type]
     return value(derivative(derivative(path.powers)), 1.0) / size**2

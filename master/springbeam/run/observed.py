@@ -109,7 +109,8 @@ def force_window(scene: Scene, pair: Pair, steps: np.ndarray) -> float:
     """
     if scene.contact.force_window is not None:
         return scene.contact.force_window
-    upper, lower = pair.upper, pair.lower
+    upper = pair.upper
+    lower = pair.lower
     if pair.opens_softly and pair.law is not None:
         deepest = float((steps["y"] - steps["u_tip"]).max(initial=0.0))
         energy = sum(steps[name] for name in _STORED)
@@ -207,7 +208,10 @@ def _swing(load: TableLoad, made: np.ndarray, omega: np.ndarray, weights: np.nda
     points = int(np.clip(_DENSE * (float(omega.max() * size.max()) + lines), *_POINTS))
     nodes, shares = np.polynomial.legendre.leggauss(points)
     P = np.polynomial.legendre.legvander(nodes, 2)
-    share, at, most, bounded = negligible / len(made), np.zeros(len(omega), complex), 0.0, 0.0
+    share = negligible / len(made)
+    at = np.zeros(len(omega), complex)
+    most = 0.0
+    bounded = 0.0
     for first in range(0, len(made), _TOGETHER):
         half = 0.5 * size[first : first + _TOGETHER, None]
         times = made["time"][first : first + _TOGETHER, None] - half + half * nodes

@@ -39,7 +39,9 @@ class RunStopped(RuntimeError):
             residual = None
         at = "" if residual is None else f", residual {residual:.3g} m"
         super().__init__(f"stopped at t = {time:.9g} s: {cause}{at}")
-        self.cause, self.time, self.residual = cause, time, residual
+        self.cause = cause
+        self.time = time
+        self.residual = residual
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Let the error pass from one process to another."""

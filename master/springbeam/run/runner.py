@@ -256,7 +256,8 @@ def _without_own(scene: Scene, **own: Body | None) -> Scene:
     if not given:
         return scene
     for place in given:
-        name, body = {"upper": "beam", "lower": "spring"}[place], own[place]
+        name = {"upper": "beam", "lower": "spring"}[place]
+        body = own[place]
         if not isinstance(body, Body):
             raise TypeError(f"the body in place of the {name} is a {type(body).__name__}, not a springbeam.Body")
         if not body.mass >= 0.0:

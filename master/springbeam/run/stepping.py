@@ -72,7 +72,8 @@ class State:
     def accept(self, step: Step, time: float) -> None:
         """The step that ends at ``time`` is made."""
         _, size, contact, foundation, _, _ = step
-        self.time, self.last_size = time, size
+        self.time = time
+        self.last_size = size
         self.contact = force.shifted(contact, size)
         self.foundation = force.shifted(foundation, size)
 
