@@ -49,6 +49,7 @@ fmi_sim() {
 }
 # Its library needs TBB, which is on PyPI too.
 ecos() { "$python" -m venv "$2/venv" && "$2/venv/bin/pip" install -q "ecospy==$1" tbb==2023.2.0; }
+pathsim() { "$python" -m venv "$2/venv" && "$2/venv/bin/pip" install -q "pathsim==$1" pathsim-fmi==0.1.1 fmpy==0.3.32; }
 fmucontainer() { "$python" -m venv "$2/venv" && "$2/venv/bin/pip" install -q "fmu-manipulation-toolbox==$1"; }
 # FMI4j and JavaFMI; the versions are in java.xml.
 java_importers() {
@@ -63,6 +64,7 @@ attempt vdmcheck 1.1.3 vdmcheck
 attempt maestro 3.1.1 maestro
 attempt ecos 0.7.2 ecos
 attempt fmucontainer 2.0 fmucontainer
+attempt pathsim 0.27.1 pathsim
 attempt java "$(cksum <"$here/java.xml")" java_importers
 attempt fmi-sim 0.7.0 fmi_sim
 exit 0

@@ -195,6 +195,13 @@ def test_ecos(system):
     assert np.array_equal(rows, by_hand[: len(rows)])
 
 
+@pytest.mark.parametrize("system", ["pair", "beam"], indirect=True)
+def test_pathsim(system):
+    """It exchanges after each FMU's step; with the force held back by one step the results are those of a parallel
+    exchange. (It writes 0 to every input, so the spring alone is another case.)"""
+    system.check(system.in_python("pathsim"))
+
+
 @pytest.mark.parametrize(
     ("importer", "file", "within"),
     [("libcosim", "spring_beam", 1e-12), ("ecos", "spring_beam", 0.0), ("ecos", "spring_beam3", 0.0)],
