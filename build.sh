@@ -208,7 +208,7 @@ print(*(name for name in extra if has[name]))')
       shift
       say "numeric tests with OpenBLAS for $kernel"
       OPENBLAS_CORETYPE=$kernel $python -m pytest -n auto --dist worksteal \
-        tests/contract tests/master tests/system "$@" || failed="$failed $kernel"
+        tests/contract tests/master tests/system tests/verdicts "$@" || failed="$failed $kernel"
     }
     grep -qw avx512bw /proc/cpuinfo && numeric_tests SkylakeX "$@" || say "this processor has no AVX-512: no SkylakeX"
     grep -qw avx2 /proc/cpuinfo && numeric_tests Haswell "$@" || say "this processor has no AVX2: no Haswell"

@@ -1,7 +1,7 @@
 """Run in PathSim's own environment. Arguments: a JSON job; prints rows as JSON.
 
-PathSim steps one FMU after the other and transfers outputs at once (Gauss–Seidel). So the spring is stepped first, and a
-sample and hold gives the beam the force that the spring had before its step.
+PathSim steps one FMU after the other and transfers outputs at once (Gauss–Seidel). So the spring is stepped first, and
+a sample and hold gives the beam the force that the spring had before its step.
 """
 
 import json
@@ -36,4 +36,4 @@ blocks = [hold, *fmus.values(), scope] if job["connections"] else [*fmus.values(
 simulation = Simulation(blocks, connections, dt=size, log=False)
 simulation.run(job["end"] - 1.5 * size, adaptive=False)  # its first step is at time 0
 times, (values,) = scope.read()
-print("ROWS " + json.dumps([[float(time) + size, float(value)] for time, value in zip(times, values)]))
+print("ROWS " + json.dumps([[float(time) + size, float(value)] for time, value in zip(times, values, strict=True)]))
