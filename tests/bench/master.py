@@ -136,7 +136,7 @@ def profile(effort):
 
     def recorded(number):
         for _ in range(number):
-            master._record(step, end)
+            master._record(step, end, state.present, changed=False)
         master.flush()
 
     def stepped(body):
@@ -150,7 +150,7 @@ def profile(effort):
         "of it, the spring set back and stepped": lambda: stepped(spring),
         "is an event due at the start": lambda: detector.at_start(state, start),
         "does one come inside": lambda: detector.first_event(state, step),
-        "its record": lambda: master._record(step, end),
+        "its record": lambda: master._record(step, end, state.present, changed=False),
         "of it, energies of both bodies": lambda: (beam.energies(), spring.energies()),
         "1024 records checked and kept, and made": lambda: recorded(1024),
         "a shape (400 a run)": lambda: master._shape(beam, early=False),
@@ -172,7 +172,7 @@ def paper(effort):
     steps = scene.equal_steps[0]
 
     def seconds(program):
-        return float(program.simulate(scene).summary["wall_time"])
+        return float(program.algorithm_1(scene).summary["wall_time"])
 
     for what, program, rounds, beside in (
         (f"`springbeam paper 2`, {steps} steps, 1000 elements", printed, 3,

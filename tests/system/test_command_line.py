@@ -8,10 +8,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from commands import COMMAND, HANGS, printed, ran, refused, swept
 from typer.testing import CliRunner
 
+from springbeam import simulate
 from springbeam.cli import app
 from springbeam.results.files import load_summary
 from springbeam.scene import load_scene, scene_keys, shipped_scenes, with_changes
@@ -20,7 +22,7 @@ from springbeam.studies.stability.predict import predict
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
-#: Arguments of each command that make it print its tables within a second or two. `verify` is in test_verify.py.
+#: Arguments of each command that make it print its tables within a second or two.
 TABLES = {
     "scenes": "",
     "keys": "",
@@ -83,7 +85,10 @@ def place(tmp_path_factory):
     with pytest.MonkeyPatch.context() as there:
         there.chdir(tmp_path_factory.mktemp("place"))
         printed("run", "soft", "--no-plots", "--out", "done")
-        Path("curve.csv").write_text("time,y\n0.1,0.49\n0.5,0.32\n0.9,0.01\n", encoding="utf-8")
+        curve = simulate(load_scene("duffing", ["time.t_end=1"])).y[:101:8]
+        noisy = curve + 0.01 * np.random.default_rng(1).standard_normal(len(curve))
+        rows = "".join(f"{0.08 * k:.2f},{value}\n" for k, value in enumerate(noisy))
+        Path("curve.csv").write_text(f"time,y\n{rows}", encoding="utf-8")
         yield Path.cwd()
 
 
