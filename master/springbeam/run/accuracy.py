@@ -166,13 +166,17 @@ def _peak_beside_law(run: Trajectory) -> float:
         return 0.0
     window = float(run.summary["contact_force_window"])
     begins = float(run.summary["contact_force_max_time"])
+    # Windows near it that lie in the run.
+    low = max(begins - window, float(run.time[0]))
+    high = min(begins + 2.0 * window, float(run.time[-1]))
     points = max(_IN_A_WINDOW, math.ceil(_IN_A_STEP * window / run.scene.coupling.H))
-    times = begins + window * (np.arange(3 * points + 1) / points - 1.0)
-    ends = at(run, np.clip(times, run.time[0], run.time[-1])).columns
+    times = np.linspace(low, high, math.ceil(points * (high - low) / window) + 1)
+    ends = at(run, times).columns
     rates = ends.get("z", 0.0) - ends["v_tip"]
     force = np.array([law.force(*there) for there in zip((-ends["gap"]).tolist(), rates.tolist(), strict=True)])
-    sums = np.append(0.0, np.cumsum(0.5 * (force[1:] + force[:-1])))
-    found = float((sums[points:] - sums[:-points]).max()) / points
+    impulse = np.append(0.0, np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(times)))
+    starts = np.append(times[times < high - window], high - window)
+    found = float((np.interp(starts + window, times, impulse) - np.interp(starts, times, impulse)).max()) / window
     return abs(found - peak) / max(found, peak)
 
 
