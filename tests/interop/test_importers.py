@@ -19,6 +19,9 @@ from commands import ran
 
 HERE = Path(__file__).resolve().parent
 SIZE, END = 1e-3, 0.4
+#: Rounding [m] of importers that exchange more than once before the first step: the beam's forecast, which is that
+#: without a force, is then computed with one set. By hand it is 7e-18.
+TWICE = 1e-17
 #: What is run, and what is seen of it.
 SYSTEMS = {"pair": "spring.displacement", "beam": "beam.tip_displacement", "spring": "spring.displacement"}
 
@@ -188,11 +191,10 @@ def test_libcosim(system):
 def test_ecos(system):
     """In both versions of FMI, to the same bits."""
     libraries = str(installed("ecos") / "venv/lib")
-    system.check(system.in_python("ecos", LD_LIBRARY_PATH=libraries))
-    by_hand = system.by_hand()
+    before = system.in_python("ecos", LD_LIBRARY_PATH=libraries)
+    system.check(before, within=TWICE)
     system.fmus = {name: path.replace(".fmu", "3.fmu") for name, path in system.fmus.items()}
-    rows = system.in_python("ecos", LD_LIBRARY_PATH=libraries)
-    assert np.array_equal(rows, by_hand[: len(rows)])
+    assert np.array_equal(system.in_python("ecos", LD_LIBRARY_PATH=libraries), before)
 
 
 @pytest.mark.parametrize("system", ["pair", "beam"], indirect=True)
@@ -204,7 +206,7 @@ def test_pathsim(system):
 
 @pytest.mark.parametrize(
     ("importer", "file", "within"),
-    [("libcosim", "spring_beam", 1e-12), ("ecos", "spring_beam", 0.0), ("ecos", "spring_beam3", 0.0)],
+    [("libcosim", "spring_beam", 1e-12), ("ecos", "spring_beam", TWICE), ("ecos", "spring_beam3", TWICE)],
 )
 def test_system_file(system, fmu_folder, importer, file, within):
     """Components, connections and parameters as the .ssp has them: the pair that is connected by hand."""
@@ -318,7 +320,7 @@ def test_fmucontainer(system, tmp_path):
     )
     container = str(tmp_path / "container.fmu")
     result = fmpy.simulate_fmu(container, stop_time=END, output_interval=SIZE, output=["y"], validate=False)
-    system.check(result["y"][1:])
+    system.check(result["y"][1:], within=TWICE)
 
 
 # -- binaries that FMPy compiles from what is packed in sources/ do the same as those that are shipped ----------------
