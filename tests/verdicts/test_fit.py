@@ -265,7 +265,7 @@ def test_an_interrupted_fit_goes_on_where_it_was(here, monkeypatch):
 
 
 def test_a_fit_that_sigterm_ends_keeps_its_runs(here):
-    """Of a process of its own: exit code 3 within a few runs, with what was computed in its directory."""
+    """A process ends with exit code 3 within a few runs, and keeps what it has computed."""
     written(here / "m.csv", "time,y", TIMES, simulate(load_scene("duffing")).at(TIMES)["y"])
     line = [*FIT[:5], "--set", "time.t_end=0.6", "--set", "coupling.macro_step=2e-4", "--out", "f"]
     process = subprocess.Popen([sys.executable, "-m", "springbeam", *line], stderr=subprocess.PIPE, text=True)

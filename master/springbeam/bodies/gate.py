@@ -126,7 +126,7 @@ OFFERED = (
 )
 
 
-#: Length of a trial step over a macro step, and how far a force moves a body in it, over its way or 1 m.
+#: Length of a trial step over a macro step; how far a force moves a body in it, over its displacement or 1 m.
 _TRIAL, _MOVED = 2.0**-8, 1e-6
 
 

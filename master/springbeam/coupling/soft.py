@@ -123,8 +123,10 @@ class SoftSolver(Booked, StepSolver):
             if settled and not (guessed and slow):
                 self.state.last_crossing = (size, flexibility)
                 # The correction after the next would be left²/length. For the next one the law's slope tells the force.
-                felt = times(descent, following)
-                return list(map(add, x, following)), [c + m + d for c, m, d in zip(of_law, missing, felt, strict=True)]
+                change = times(descent, following)
+                return list(map(add, x, following)), [
+                    c + m + d for c, m, d in zip(of_law, missing, change, strict=True)
+                ]
             if slow:
                 flexibility = self._flexibility(start, size, x, of_law, descent)
                 guessed = False

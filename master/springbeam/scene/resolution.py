@@ -87,14 +87,14 @@ def not_resolved(
     scene
         The scene as run.
     misplaced
-        How far an end is from where the law of the contact would have it, over its way.
+        How far an end is from where the law of the contact would have it, relative to its displacement.
     shortest_contact
         How long the shortest contact, touch or rest on the foundation has lasted [s]; of a soft law it counts where the
         force is exchanged once per macro step.
     left_out
-        How far what the steps leave out of tables moves an end, over its way.
+        How far what the steps leave out of tables moves an end, relative to its displacement.
     between_rows
-        How far an end may be from its curve between the rows, over its way.
+        How far an end may be from its curve between the rows, relative to its displacement.
     H
         Steps of one length that make waves as late as those of the run [s]; needed if these follow from tolerances.
     oscillations

@@ -49,7 +49,7 @@ _CHANCE = 1e-3
 _LAGS = 20
 _FEWEST = 12
 #: What is left of a curve, over its spread: no more than this is no error of the run, no less than that is no fit.
-_EXACT = 1e-4
+_EXACT = 1e-6
 _APART = 0.5
 #: Share of the run within which shifts of the clock belong together.
 _NEAR = 0.01
