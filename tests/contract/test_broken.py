@@ -11,7 +11,7 @@ from pathlib import Path
 from zipfile import ZipFile, ZipInfo
 
 import pytest
-from commands import ran, refused
+from commands import ran
 
 import springbeam
 from springbeam.bodies import archive
@@ -169,15 +169,6 @@ def test_links_and_devices_become_files(tmp_path, kind):
     assert found.read_bytes() == b"/etc"
 
 
-def test_what_a_run_does_not_use_has_no_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr(archive, "MOST_BYTES", 1000)
-    with ZipFile(tmp_path / "large.fmu", "w") as file:
-        for name in ("binaries/win64/large.dll", "sources/large.c", "binaries/linux64/small.so"):
-            file.writestr(name, bytes(1000))
-    unpack(tmp_path / "large.fmu", tmp_path / "in", HERE)
-    assert [path.name for path in (tmp_path / "in").rglob("*") if path.is_file()] == ["small.so"]
-
-
 def test_a_program_among_the_resources_can_be_executed(tmp_path):
     modes = {"resources/tool": 0o4755, "resources/data": 0o644, "resources/mine": 0o700}
     with ZipFile(tmp_path / "tool.fmu", "w") as file:
@@ -229,14 +220,6 @@ def test_what_our_own_need_is_unpacked_to_the_last_byte(fmu_folder, tmp_path, na
     unused = ("documentation/", "extra/", "model.png", "sources/")
     files = {name: content for name, content in files.items() if not name.startswith(unused)}
     assert {str(p.relative_to(tmp_path)): p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == files
-
-
-def test_the_command_names_file_and_member(folder):
-    with ZipFile(folder / "spring.fmu", "a") as file:
-        file.writestr(named("../../evil"), b"evil")
-    said = f"error: {folder / 'spring.fmu'}: not a usable FMU: member '../../evil' is no plain name"
-    assert refused("run", "soft", "--out", folder / "out").startswith(said)
-    assert not (folder / "out").exists()
 
 
 # -- the cache ---------------------------------------------------------------------------------------------------------

@@ -258,13 +258,6 @@ def test_a_tool_that_passes_start_values_but_forgets_the_first_exchange_is_told(
         ] * begun
 
 
-@pytest.mark.parametrize("first", ["beam", "spring"])
-def test_a_delay_of_one_step_mends_what_passes_within_a_step(beam, spring, first):
-    pair, right = (Pair(beam, spring, 1e-3).start() for _ in range(2))
-    assert gauss_seidel(pair, first, delayed=True) == list(right.run(0.1)[1])
-    assert pair.spring.get("warnings") == 0
-
-
 @pytest.mark.parametrize("version", ["2.0"])
 @pytest.mark.parametrize("slope", [-1.0, 0.0])
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """The command: exit codes, what it prints and where, and what an interruption leaves."""
 
 import errno
-import json
 import os
 import signal
 import subprocess
@@ -12,7 +11,7 @@ from pathlib import Path
 import pytest
 import typer
 from bodies import simulate
-from commands import command, printed
+from commands import command
 from matplotlib.figure import Figure
 from runs import block
 
@@ -61,21 +60,6 @@ def replace_run(monkeypatch, error):
 
 
 # -- a run that ends well -----------------------------------------------------------------------------------------
-
-
-def test_a_run_leaves_results_and_pictures_and_says_where(here, unpainted):
-    shown = printed("run", "soft")
-    assert sorted(path.name for path in (here / "results" / "soft").iterdir()) == sorted(
-        ["trajectory.csv", "events.csv", "shapes.csv", "steps.bin", "summary.json", "overview.png"]
-    )
-    assert "results   results/soft\n" in shown
-    assert "picture   results/soft/overview.png" in shown
-    assert "largest relative residual 3.0e-14" in shown
-    assert "31 macro steps" in shown
-    (event,) = [line for line in shown.splitlines() if line.startswith("impact")]
-    assert event.split() == ["impact", "0.10000000", "0.5", "-1", "0.25", "0.125"]
-    summary = json.loads((here / "results" / "soft" / "summary.json").read_text(encoding="utf-8"))
-    assert {key: summary[key] for key in SUMMARY} == SUMMARY
 
 
 def test_a_picture_that_cannot_be_written_ends_with_3_and_loses_nothing(here, monkeypatch):
@@ -136,27 +120,6 @@ def test_an_output_without_room_is_one_error(here, fmu_folder, arguments, unbuff
 
 
 # -- the other commands -------------------------------------------------------------------------------------------
-
-
-def test_runs_are_compared_by_the_keys_and_results_that_differ(here, monkeypatch):
-    """Keys that are alike are left out; a result that one run lacks is told nevertheless."""
-    peaks = iter(({"contact_force_max": 3.0, "contact_force_window": 1e-3}, {}))
-
-    def run(scene, recorder, *args, **kwargs):
-        fake_run(scene, recorder)
-        recorder.finish({**SUMMARY, "rebound_velocity": 2, **next(peaks)})
-
-    monkeypatch.setattr(springbeam.run.runner, "run", run)
-    printed("run", "soft", "--no-plots", "--out", "a")
-    printed("run", "soft", "--no-plots", "--out", "b", "--set", "spring.mass=2.5", "--set", "spring.damping=0.0")
-    found = json.loads(printed("compare", "a", "b", "--out", "p.png", "--json"))
-    assert found["keys"] == {"spring.mass": [1.0, 2.5]}
-    assert found["results"] == {
-        "contact_force_max [N]": [3.0, None], "contact_force_window [s]": [1e-3, None],
-        "rebound_velocity [m/s]": [2, 2], "warnings": [0, 0],
-    }  # fmt: skip
-    assert Path("p.png").stat().st_size > 10_000
-    assert "spring.mass" in printed("compare", "a", "b", "--no-plots")
 
 
 def test_peaks_are_compared_over_one_window():

@@ -13,7 +13,6 @@ from springbeam.contact.phases import (
     Transitions,
 )
 from springbeam.motion.events import EventKind
-from springbeam.results.steps import PHASE_NAMES
 from springbeam.scene.laws import Compliance, Link, depth
 
 
@@ -83,13 +82,6 @@ def test_what_lies_on_the_foundation_at_rest_is_held_there(scene, joint, e):
     ends = (Motion(-0.015, 0.0, 0.0, 0.0),) * 2
     found = transitions.after(EventKind.STOP_IMPACT, Phase(), ends, 0.0, ends, 0.0, 1e-17)
     assert repr(found) == repr((EventKind.SEATED, Phase(joint, seated=True), Impact()))
-
-
-@pytest.mark.parametrize("seated", [False, True])
-@pytest.mark.parametrize("joint", Joint)
-def test_a_phase_has_its_name_in_a_record(joint, seated):
-    phase = Phase(joint, seated)
-    assert PHASE_NAMES[int(phase.number)] == phase.name == ("seated" if seated else joint.value)
 
 
 @pytest.mark.parametrize("v", [0.19, -3.0])

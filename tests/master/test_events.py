@@ -18,8 +18,6 @@ from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair, Present
 from springbeam.scene import load_scene, with_changes
 
-SIZE = 0.02
-
 
 class Counted:
     """f = cos τ − level; falls through zero at acos(level). Its rate is told ``slope`` times as large."""

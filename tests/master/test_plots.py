@@ -17,12 +17,7 @@ from springbeam.pictures.drawing import (
     EVENT_LOOKS,
     NOT_RESOLVED,
     decimated,
-    phase_intervals,
-    power_of_ten,
-    readable_unit,
 )
-from springbeam.pictures.frames import frames_of, sketches
-from springbeam.pictures.panels import panels
 from springbeam.pictures.plots import figure_of, plot_run
 from springbeam.results.directory import PICTURES
 
@@ -31,17 +26,6 @@ DRAWN = {
     **dict.fromkeys(("all", "no stop", "no spring", "beam"), (OVERVIEW, A, B, C, D, E, F, G)),
     **dict.fromkeys(("no beam", "spring"), (OVERVIEW, C, D, E, F)),
 }  # fmt: skip
-
-
-def test_the_overview_is_drawn_without_a_formula(tmp_path, monkeypatch):
-    """A formula takes as long as all other texts together."""
-    monkeypatch.setattr(matplotlib.mathtext.MathTextParser, "parse", None)
-    assert plot_run(a_trajectory(events=EVERY_EVENT), tmp_path)
-
-
-@pytest.mark.parametrize(("value", "text"), [(1e-12, "10⁻¹²"), (1.0, "10⁰"), (1e3, "10³")])
-def test_a_power_of_ten_is_plain_text(value, text):
-    assert power_of_ten(value) == text
 
 
 @pytest.mark.parametrize("has", SCENES)
@@ -96,14 +80,6 @@ def test_axes_have_quantities_and_units_and_the_key_names_phases_and_events(pict
         assert (NOT_RESOLVED in texts(marked)) is not summary.get("resolved", True)
 
 
-def test_every_panel_is_in_one_picture():
-    run = a_trajectory(events=EVERY_EVENT)
-    drawn = [
-        ax.get_ylabel() for picture in plots._OVER_TIME if picture != "overview" for ax in figure_of(run, picture).axes
-    ]
-    assert sorted(drawn) == sorted(panel.axis for panel in panels(run))
-
-
 def written(figure):
     """What is written but numbers at axes: title, mark, keys and quantities."""
     keys = [legend for legend in (*figure.legends, *(ax.get_legend() for ax in figure.axes)) if legend is not None]
@@ -139,57 +115,7 @@ def test_nothing_written_over_time_is_cut_off_or_lies_on_anything_else(picture, 
     assert_nothing_collides(figure)
 
 
-def test_the_overview_is_one_page_of_positions_velocities_forces_and_energy():
-    figure = figure_of(a_trajectory(events=EVERY_EVENT), "overview")
-    assert [ax.get_ylabel().split(" [")[0] for ax in figure.axes] == [
-        "position", "velocity", "force", "impulse", "energy"
-    ]  # fmt: skip
-    assert figure.get_figheight() < 11.7  # A4
-
-
-def test_a_short_beam_is_drawn_in_the_unit_of_its_axis():
-    run = a_trajectory(with_changes(PAIR, beam={"length": 0.05}))
-    ax = figure_of(run, "shapes_later").axes[0]
-    assert (ax.get_xlabel(), ax.get_xlim()) == ("position along the beam x [mm]", (0.0, pytest.approx(50.0)))
-    assert ax.collections[0].get_segments()[0][-1, 0] == pytest.approx(50.0)
-    beam = sketches(run, frames_of(run))[0].strokes[2]
-    assert (beam.part, beam.x[-1]) == ("beam", pytest.approx(50.0))
-
-
 # -- panels: what plots and report draw over time ---------------------------------------------------------------------
-
-
-def panel(name, run):
-    (found,) = (panel for panel in panels(run) if panel.name == name)
-    return found
-
-
-def words_in(found):
-    return {curve.look.words for curve in found.curves}
-
-
-def test_energies_are_stacked_to_the_total_unless_one_is_negative():
-    """By more than rounding."""
-    found = panel("energies", a_trajectory())
-    *parts, total = found.curves
-    assert [curve.stacked for curve in found.curves] == [True] * 5 + [False]  # all but the loads, which are zero
-    assert np.allclose(sum(curve.values for curve in parts), total.values, rtol=1e-14)
-    assert panel("energies", a_trajectory(e_beam=np.full(400, 4.5e9))).axis == "energy [GJ]"
-    assert panel("energies", a_trajectory(e_load=np.full(400, -1e-13))).curves[0].stacked
-    lines = panel("energies", a_trajectory(e_spring=np.linspace(-1.0, 1.0, 400)))
-    assert "spring" in words_in(lines)
-    assert not any(curve.stacked for curve in lines.curves)
-
-
-def test_the_residual_is_over_the_largest_energy_where_it_is_not_zero():
-    zero, off = np.zeros(400), np.where(np.arange(400) % 2, -6e-9, 0.0)
-    run = a_trajectory(e_beam=zero + 2.0, e_spring=zero + 1.0, e_contact=zero, e_total=zero + 3.0, energy_residual=off)
-    found = panel("residual", run)
-    assert found.axis == "energy residual [–]"
-    assert found.curves[0].values == pytest.approx([2e-9] * 200, rel=1e-12)
-    assert found.logarithmic == pytest.approx((0.6e-9, 6e-9), rel=1e-12)
-    least = panel("residual", a_trajectory(energy_residual=1e-300 * run.time)).logarithmic[0]
-    assert least == pytest.approx(0.3e-18, rel=1e-12, abs=0.0)
 
 
 # -- thinning -----------------------------------------------------------------------------------------------------
@@ -211,33 +137,3 @@ def test_thinning_keeps_ends_order_and_the_extremes_of_every_column_of_pixels(va
         if len(span):
             kept = values[rows[np.isin(rows, span)]]
             assert (kept.min(), kept.max()) == (values[span].min(), values[span].max())
-
-
-def test_phases_hold_until_the_next_row_and_are_sampled_in_proportion():
-    few = np.array(["free", "free", "tied", "tied", "touch", "free"])
-    intervals = phase_intervals(np.array([0.0, 1.0, 2.0, 3.0, 3.0, 4.0]), few)
-    assert intervals == [("free", 0.0, 2.0), ("tied", 2.0, 3.0), ("touch", 3.0, 4.0)]
-    time, phase = 7.0 + np.arange(40_000) / 4.0, np.where(np.arange(40_000) % 4 == 0, "tied", "free")
-    intervals = phase_intervals(time, phase, 999)
-    assert len(intervals) <= 1000
-    assert (intervals[0][1], intervals[-1][2]) == (time[0], time[-1])
-    half = 0.5 * np.ptp(time) / 999
-    assert [name for name, _, _ in intervals] == [phase[int(4.0 * (at + half - 7.0))] for _, at, _ in intervals]
-
-
-@pytest.mark.parametrize(
-    ("largest", "unit", "expected"),
-    [
-        (0.0, "m", (1.0, "m")),
-        (0.1, "m", (1.0, "m")),
-        (9999.0, "N", (1.0, "N")),
-        (0.015, "m", (1e3, "mm")),
-        (4.4e-6, "m", (1e6, "µm")),
-        (4.5e9, "J", (1e-9, "GJ")),
-        (1e-30, "J", (1e12, "pJ")),
-        (1e30, "J", (1e-12, "TJ")),
-    ],
-)
-def test_readable_units(largest, unit, expected):
-    factor, name = readable_unit([np.array([0.0, -largest]), np.array([])], unit)
-    assert (factor, name) == (pytest.approx(expected[0], rel=1e-15), expected[1])

@@ -1,7 +1,5 @@
 """The references: exact solutions, extended precision, and scipy."""
 
-from types import SimpleNamespace
-
 import exact
 import numpy as np
 import pytest
@@ -9,13 +7,8 @@ from exact import coupled, laws
 from exact.alone import clamped_free_frequencies
 from references import dips
 from scenes import kinds, soft
-from scipy.integrate import quad
 
 from springbeam.monolithic import event_driven
-from springbeam.monolithic.event_driven import first_event
-from springbeam.monolithic.exponential import Segment
-from springbeam.monolithic.laws import ReferencePhase, Watch
-from springbeam.monolithic.oscillators import GAUSS
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.scene import Beam, load_scene, with_changes
 
@@ -63,21 +56,6 @@ def test_the_reference_of_a_bar_on_a_stop_approaches_the_exact_impact(monkeypatc
     assert [check.quantity for check in exact.bar_impact.solution(10) if not check.passed] == []
 
 
-def test_the_closed_forms_are_those_of_the_oscillator_and_of_the_quadrature():
-    """q = 1: half a period of √(λ/μ), damping without closed form as Hertz's in the limit; q = 1.5: ∫ dp/v."""
-    reduced, stiffness = 0.4, 1e4
-    omega = np.sqrt(stiffness / reduced)
-    found = laws.impact(reduced, 3.0, stiffness, 1.0)
-    assert (found.duration, found.penetration) == pytest.approx((np.pi / omega, 3.0 / omega), rel=1e-14)
-    hertz = laws.impact(reduced, 3.0, stiffness, 1.5)
-    # p = p_max (1 − s²) takes the singularity of 1/ṗ at p_max away.
-    half, _ = quad(lambda s: 2.0 * s * hertz.penetration / 3.0 / np.sqrt(1.0 - (1.0 - s * s) ** 2.5), 0.0, 1.0)
-    assert hertz.duration == pytest.approx(2.0 * half, rel=1e-9)
-    weak = laws.impact(reduced, 3.0, stiffness, 1.5, 1e-4)
-    assert weak.penetration == pytest.approx(hertz.penetration, rel=2e-4)
-    assert weak.rebound == pytest.approx(3.0 * (1.0 - 2e-4), rel=1e-7)  # e = 1 − 2χv/3 + …, whatever q
-
-
 @pytest.mark.parametrize("alpha", [0.0, 1e-3])
 @pytest.mark.parametrize(("stiffness", "damping"), [(0.0, 3.0), (1e2, 0.0), (1e4, 3.0)])
 def test_a_beam_on_a_link_is_the_matrix_exponential(stiffness, damping, alpha):
@@ -118,39 +96,6 @@ def test_a_tip_that_starts_on_the_stop_strikes_it_only_downward(speed, kinds_the
     beam = {"n_elements": 8, "initial_deflection_slope": 0.0, "initial_velocity_slope": -speed, "approach": "elastic"}
     scene = with_changes(load_scene("beam-on-stop"), beam=beam, stop={"position": 0.0})
     assert kinds(event_driven.integrate(scene, sample_times=[0.0], t_end=1e-6)) == kinds_then
-
-
-def wave(tau, bottom):
-    """Zero at ``bottom``, where the polynomial through the nodes of a step is 2e-8 (0.5) or −3e-9 (0.43)."""
-    return 1.0 - np.cos(6.0 * (tau - bottom))
-
-
-@pytest.mark.parametrize(
-    ("function", "expected"),
-    [
-        (lambda tau: 0.37 - tau, 0.37),
-        (lambda tau: 1.0 - tau / 0.37 + 2.0 * tau**2, None),
-        (lambda tau: (tau - 0.5) ** 2 - 1e-8, 0.4999),
-        (lambda tau: wave(tau, 0.5) - 1e-10, 0.5 - np.sqrt(2e-10) / 6.0),
-        (lambda tau: wave(tau, 0.43) + 1e-10, None),
-        (lambda tau: tau * (1e-3 - tau), 1e-3),  # rises, and falls before the first node
-        (lambda tau: tau - 5e-16, None),  # of rounding
-        (lambda tau: -1e3 * tau, 0.0),
-        (lambda tau: -1.0 - tau, 0.0),
-        (lambda tau: 1.0 - tau - 1e-16, None),  # at the very end, and not yet below it
-    ],
-)
-def test_an_event_is_where_its_function_first_falls_below_rounding(function, expected):
-    """Sizes of a step that are not 1 scale the time."""
-    for size in (1.0, 0.01):
-        nodes = size * np.r_[0.0, GAUSS.nodes, 1.0]
-        system = SimpleNamespace(motion=lambda _, X: X[..., 0] / size, noise=lambda *_: 1e-15)  # noqa: B023
-        segment = Segment(nodes, nodes[:, None], lambda tau: np.array([tau]))
-        later = Watch("later", lambda tau: 0.9 - tau, "m")
-        found = first_event(system, ReferencePhase("free"), [Watch("it", function, "m"), later], segment)
-        assert (found[0].name, found[1] / size) == (
-            ("later", pytest.approx(0.9)) if expected is None else ("it", pytest.approx(expected, abs=1e-11))
-        )
 
 
 def test_a_dip_between_nodes_is_not_missed():

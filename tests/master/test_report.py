@@ -8,15 +8,12 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from commands import printed, refused
 from lxml import html
 from runs import EVERY_EVENT, PAIR, SCENES, a_trajectory
 
-from springbeam.pictures.drawing import EVENT_LOOKS, NOT_RESOLVED, PIXEL_COLUMNS
-from springbeam.pictures.frames import MOST_FRAMES
+from springbeam.pictures.drawing import NOT_RESOLVED
 from springbeam.pictures.panels import panels
 from springbeam.pictures.report import page
-from springbeam.results.directory import REPORT
 from springbeam.results.trajectory import BODY_COLUMNS
 from springbeam.scene import scene_from_dict, with_changes
 from springbeam.scene.files import tomllib
@@ -120,36 +117,6 @@ def test_curves_are_the_columns_bit_for_bit_in_single_precision(scene):
     assert {curve.name for _, curve in drawn} >= DRAWN & run.columns.keys()
 
 
-def test_a_long_run_is_thinned_without_losing_an_extreme_and_the_page_says_so():
-    wild = np.zeros(100_000)
-    wild[12_345] = -7.0
-    run = a_trajectory(n=len(wild), gap=wild)
-    text = page(run)
-    found = Page(text)
-    for name in ("gap", "u_tip", "contact_force", "e_beam"):
-        curve = array(curves(found.data)[name]["y"])
-        assert len(curve) <= 4 * PIXEL_COLUMNS * 6  # stacked curves share the rows of all
-        factor = 1.0 if name == "gap" else 1e3
-        ends = factor * np.array([run[name].min(), run[name].max()])
-        assert [curve.min(), curve.max()] == ends.astype(curve.dtype).tolist()
-    assert re.search("Drawn from 100000 rows.*thinned", found["about"])
-    assert "thinned" not in shown()["about"]
-    assert len(found.data["motion"]["time"]) <= MOST_FRAMES
-    assert len(text) < 7.5e6
-
-
-def test_events_are_marked_when_they_happened():
-    found = shown(a_trajectory(events=EVERY_EVENT))
-    for curve in found.data["charts"]["timeline"]["data"]:
-        (expected,) = [event.time for event in EVERY_EVENT if event.kind == curve["meta"]]
-        assert array(curve["x"]).tolist() == [expected]
-    for look in EVENT_LOOKS.values():
-        assert look.words in found["events"]
-        assert f"{look.words} (1)" in found["over-time"]
-    for name, size in (("impulse_contact", 0.1), ("impulse_foundation", 0.2)):
-        assert array(curves(found.data)[name]["y"]).tolist() == [np.float32(size)] * len(EVERY_EVENT)
-
-
 # -- motion -------------------------------------------------------------------------------------------------------
 
 
@@ -195,14 +162,3 @@ def test_the_scene_as_run_is_on_the_page():
 
 
 # -- the command --------------------------------------------------------------------------------------------------
-
-
-def test_the_command_writes_the_page_and_overwrites_none_unasked(tmp_path):
-    directory = a_trajectory(events=EVERY_EVENT).save(tmp_path / "run")
-    (directory / REPORT).write_text("mine")
-    assert f"{directory / REPORT} already exists; --force" in refused("report", directory)
-    assert (directory / REPORT).read_text() == "mine"
-    printed("report", directory, "--out", directory.parent / "other.html")
-    assert printed("report", directory, "--force") == f"{directory / REPORT}\n"
-    assert "positions" in Page((directory / REPORT).read_text(encoding="utf-8")).ids
-    assert (directory / REPORT).read_bytes() == (directory.parent / "other.html").read_bytes()

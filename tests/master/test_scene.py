@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import SOFT, scene_from_dict
+from scenes import scene_from_dict
 
 import springbeam
-from springbeam.scene import Beam, Scene, SceneError, load_scene, messages, with_changes
+from springbeam.scene import Beam, Scene, SceneError, load_scene, with_changes
 from springbeam.scene.files import tomllib
 from springbeam.scene.suspicions import implausible, suspicions
 
@@ -269,13 +269,3 @@ def test_what_is_wrong_or_doubtful_of_a_load_names_it(tmp_path):
     assert scene_from_dict(changed(**late, loads=[{**push, "amplitude": 0.0}])).contact_time == 0.6
     with pytest.raises(SceneError, match=r"signal = \"constant\": acts before the tip arrives at t = 0\.6 s"):
         scene_from_dict(changed(**late, loads=[push]))
-
-
-def test_what_scenes_no_longer_have_says_what_to_do_instead(monkeypatch):
-    for place in ("[contact] friction", '[contact] law = "glue"'):
-        monkeypatch.setitem(messages.GONE, place, "is gone; use another")
-    for changes in ({"friction": 0.5}, {"law": "glue"}):
-        with pytest.raises(SceneError, match=r"is gone; use another$"):
-            with_changes(SOFT, contact=changes)
-    with pytest.raises(SceneError, match=r"is gone; use another$"):
-        messages.key_kind("contact", "friction")

@@ -8,7 +8,6 @@ from scenes import kinds, scene_from_dict
 import springbeam
 from springbeam.bodies.gate import admit
 from springbeam.bodies.protocol import Abilities, StepRefused
-from springbeam.contact.phases import Joint, Phase
 from springbeam.results.steps import STEP
 from springbeam.run.ledger import Balance, bounds, errors
 from springbeam.run.setup import set_up
@@ -223,39 +222,6 @@ def test_an_undeformed_tip_may_miss_what_it_meets_by_the_rounding_of_its_way(mis
     for u, time in ((miss, 0.0), (4.0 * miss, 0.5)):
         with pytest.raises(SceneError, match="the upper end starts at"):
             admit(scene, time, Upper(1.0, y=u, z=-1.0), DuffingBody(1.0))
-
-
-@pytest.mark.parametrize(("times", "continued"), [(3.9, True), (4.1, False)])
-def test_a_force_is_continued_over_four_times_its_step_and_held_beyond(times, continued, monkeypatch):
-    """After steps that dying impacts have cut to 1e-9 H its slope would throw the ends as far as rounding lets them."""
-    pair = Pair(set_up(with_changes(load_scene("soft"), coupling={"degree": 2})), Upper(1.0), DuffingBody(1.0))
-    state = pair.initial_state(0.0)
-    state.phase, state.contact, state.last_size = Phase(Joint.TIED), (2.0, 3.0, 5.0), 1e-3
-    guesses = []
-    monkeypatch.setattr(pair.joined, "solve", lambda *given: guesses.append(given[-1]))
-    pair.attempt(state, times * 1e-3, state.ends)
-    assert guesses == [(2.0, 3.0, 5.0) if continued else (2.0, 0.0, 0.0)]
-
-
-class Rigid(Upper):
-    """One that steps by one size alone."""
-
-    abilities = Abilities(any_size=False)
-
-
-def test_a_body_of_the_callers_starts_at_0_with_steps_that_are_counted_from_there():
-    """The beam of its scene would arrive at 0.1501 s, between two steps; 0.3 s are 30 whole ones from 0 on."""
-    scene = with_changes(
-        load_scene("soft"),
-        time={"t_end": 0.3},
-        beam={"initial_deflection_slope": 0.1501},
-        contact={"law": "compliance", "stiffness": 10.0, "exponent": 1.0},
-        coupling={"macro_step": 0.01},
-        stop=None,
-    )
-    run = springbeam.simulate(scene, upper=Rigid(1.0, 0.0, 0.0, y=0.1501, z=-1.0))
-    assert run.time[0] == 0.0
-    assert run.steps["size"][1:] == pytest.approx(np.full(30, 0.01), rel=1e-12)
 
 
 @pytest.mark.parametrize("law", ["compliance", "link"])

@@ -7,7 +7,7 @@ from bodies import bodies
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.motion.events import Event, EventKind
 from springbeam.results.steps import STEP
-from springbeam.results.totals import TOTALS, in_words, shortest_contact, totals
+from springbeam.results.totals import shortest_contact, totals
 from springbeam.run.observed import force_window
 from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair
@@ -161,12 +161,6 @@ def test_of_windows_with_one_mean_the_first_is_told(force):
     numbers = found(steps_with(lambda t: (force if t >= 0.3 else 0.0, 0.0, 0.0), ends), window=0.19)
     assert numbers["contact_force_max"] == pytest.approx(force, rel=1e-12)
     assert numbers["contact_force_max_time"] == pytest.approx(0.3, rel=1e-12)
-
-
-def test_words_say_what_is_not_zero_and_any_count_and_the_window_beside_the_peak():
-    words = dict(in_words({**dict.fromkeys(TOTALS, 0.0), "contact_force_max": 3.0, "contact_force_window": 0.5}))
-    counts = {"contacts": "0", "strokes on the foundation": "0"}
-    assert words == {"peak contact force, mean over 0.5 s": "3 N", **counts}
 
 
 def test_the_window_is_a_fiftieth_of_the_slowest_period():

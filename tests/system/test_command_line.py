@@ -179,15 +179,6 @@ def asked_by_a_shell(what, **environment):
     return CliRunner(env=environment).invoke(app, prog_name="springbeam").stdout
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
-def test_there_is_a_completion_script_for(shell):
-    script = asked_by_a_shell(f"source_{shell}")
-    assert "_SPRINGBEAM_COMPLETE" in script
-    assert f"complete_{shell}" in script
-    if shell == "bash":
-        assert subprocess.run(["bash", "-n"], input=script, text=True).returncode == 0
-
-
 @pytest.mark.parametrize(
     ("line", "completed"),
     [

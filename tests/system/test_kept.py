@@ -78,14 +78,6 @@ def test_the_last_derivative_alone_acts():
         body.close()
 
 
-def test_loads_add_to_the_constant_ones():
-    constant = {"beam": {"distributed_load": -2.0}, "spring": {"external_force": -3.0}}
-    added = [{"on": "beam", "amplitude": 0.5}, {"on": "spring", "amplitude": 0.25}]
-    summed = {"beam": {"distributed_load": -1.5}, "spring": {"external_force": -2.75}}
-    one, other = (simulate(with_changes(SOFT, **tables)) for tables in ({**constant, "loads": added}, summed))
-    assert one.y == pytest.approx(other.y, rel=1e-9, abs=1e-12)
-
-
 def test_few_are_kept_and_the_oldest_is_freed(monkeypatch):
     closed = []
     close = fmu.Fmu.close

@@ -125,12 +125,6 @@ def test_elements_start_at_rest_under_their_loads(gap):
     assert np.abs(run.energy_residual).max() < 1e-15
 
 
-def test_an_element_below_a_beam_rests_as_our_spring():
-    ours, element = (run_in_memory(scene(spring=lower)) for lower in (SPRING, ELEMENT))
-    assert element.u_tip[-1] == pytest.approx(ours.u_tip[-1], rel=1e-12)
-    assert element.contact_force[-1] == pytest.approx(ours.contact_force[-1], rel=1e-8)
-
-
 def test_a_shock_on_a_linear_pair_at_rest_is_the_shock_alone_beside_its_statics():
     shock = {"on": "base", "signal": "half_sine", "amplitude": 300.0, "duration": 5e-3}
     tie = {"spring": SPRING, "contact": {"law": "tie"}}
@@ -177,11 +171,6 @@ def test_a_reference_of_its_own_starts_at_the_same_rest(tables):
     assert reference.columns["u_tip"][0] == pytest.approx(run.columns["u_tip"][0], rel=1e-11)
     assert reference.columns["u_tip"][-1] == pytest.approx(run.columns["u_tip"][-1], rel=1e-7)
     assert reference.columns["y"][-1] == pytest.approx(run.columns["y"][-1], rel=1e-7)
-
-
-def test_a_contact_that_is_closed_at_the_start_is_told():
-    columns = run_in_memory(scene(spring=SPRING, **link("compliance", exponent=1.0)))
-    assert [(event.kind, event.time) for event in columns.events] == [(EventKind.IMPACT, 0.0)]
 
 
 @pytest.mark.parametrize(

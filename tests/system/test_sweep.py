@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-from itertools import product
 from time import sleep
 
 import numpy as np
@@ -15,10 +14,9 @@ from runs import a_trajectory
 from springbeam.motion.events import Event, EventKind
 from springbeam.run.runner import run_in_memory
 from springbeam.scene import load_scene, scene_from_dict, with_changes
-from springbeam.studies import picture, study, sweep
+from springbeam.studies import sweep
 from springbeam.studies.design import design, parse_axis, with_keys
 from springbeam.studies.metrics import METRICS as METRICS_THERE_ARE
-from springbeam.studies.picture import Scale
 
 METRICS = ("y_min", "first_stop_impact", "energy_residual")
 
@@ -108,26 +106,6 @@ def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
         assert rows["first_stop_impact"][k] == next(e.time for e in run.events if e.kind == "stop_impact")
 
 
-def drawn(count):
-    """The panels and colours of a grid of ``count`` axes with two values each, and one metric: the row's number."""
-    names = "abcdef"[:count]
-    values = enumerate(product((1.0, 2.0), repeat=count))
-    rows = [dict(zip(names, several, strict=True)) | {"y": float(k)} for k, several in values]
-    figure = picture.multiples(rows, [Scale(name, name) for name in names], {"y": "y"}, "")
-    return [ax for ax in figure.axes if ax.get_title()]
-
-
-def test_any_number_of_axes_is_drawn():
-    """Three were drawn as nothing. Of more than two there is a map over the first two for each pick of the others."""
-    panels = [drawn(count) for count in (1, 2, 3, 4)]
-    assert [*map(len, panels)] == [1, 1, 2, 4]
-    first, second = (ax.collections[0] for ax in panels[2])
-    assert first.get_array().tolist() == [[0.0, 4.0], [2.0, 6.0]]  # b upward, a to the right, where c = 1
-    assert second.get_array().tolist() == [[1.0, 5.0], [3.0, 7.0]]
-    assert first.get_clim() == second.get_clim() == (0.0, 7.0)
-    assert panels[2][1].get_title().strip() == "y, c = 2"
-
-
 def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_doubled_period(tmp_path):
     """A damped oscillator: A sin(2πft) at phase 0 is −A sin φ, its peak A; the bumper doubles the period at 45 Hz."""
     drive = {"on": "spring", "signal": "harmonic", "frequency": 2.0, "amplitude": 3.0, "start": 0.05}
@@ -152,21 +130,6 @@ def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_dou
     dots = found.pictures["sweep"]().axes[0].lines[0]
     assert dots.get_linestyle() == "None"
     assert dots.get_ydata().tolist() == [x for points in columns["stroboscopic"] for x in points]
-
-
-def test_a_cluster_with_another_springbeam_is_bad_input(tmp_path, monkeypatch):
-    """Its rows would be those of another program."""
-    from distributed import LocalCluster
-
-    own = study.metadata.version
-    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0") as local:
-        monkeypatch.setattr(study.metadata, "version", lambda name: "9.9" if name == "springbeam" else own(name))
-        cluster = ["--scheduler", local.scheduler_address, "--out", tmp_path / "out"]
-        result = command("sweep", "duffing", "--vary", "spring.mass=1,2", *cluster)
-    assert result.exit_code == 2
-    assert "the workers need springbeam 9.9, as is here; " in result.stderr
-    assert f" has {own('springbeam')}" in result.stderr
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_worker_of_a_cluster_that_is_killed_costs_no_row(tmp_path):
