@@ -18,6 +18,10 @@ class Compliance {
   Compliance(double stiffness, double exponent, double damping = 0.0)
       : lambda_(stiffness), p_(exponent), chi_(damping) {}
 
+  double stiffness() const { return lambda_; }
+  double exponent() const { return p_; }
+  double damping() const { return chi_; }
+
   double elastic(double depth) const;  ///< λ δ₊^p [N]
   double energy(double depth) const;   ///< Φ [J]
   bool damped() const { return chi_ > 0.0; }

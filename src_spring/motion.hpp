@@ -62,9 +62,7 @@ class Motion {
   double elongation(double y) const { return y - unloaded_; }  ///< x [m]
   /// k1 x + k2 x³ [N]
   double spring_force(double y) const { return (k1_ + k2_ * elongation(y) * elongation(y)) * elongation(y); }
-  /// Force that would hold the top at y, at rest, under F and C: −F + k1 x + k2 x³ + C [N].
-  double holding_force(double y, double force, double contact) const { return spring_force(y) - force + contact; }
-  /// The same with its first two derivatives [N, N/s, N/s²].
+  /// Force that would hold the top at y, at rest, −F + k1 x + k2 x³ + C, and its first two derivatives [N, N/s, N/s²].
   Polynomial holding_force(double y, const Loads& loads, bool touching, double depth) const;
 
   double potential_energy(double y) const;

@@ -1,8 +1,10 @@
 #include "rest.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "events.hpp"
@@ -11,24 +13,104 @@ namespace spring {
 namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr int parts = 8;  ///< of a stretch in which N is smooth: instants at which it is looked at
 
-struct Distance {
-  double value, rate;
+/// Part of a rest, in s = τ/size, in which the tip presses on the top all the time, or never.
+struct Stretch {
+  double from, to;
+  bool pressed;
 };
 
-/// Where the distance `at(s)` falls through 0 between `low` and `high`: it is below 0 at `high`, where it is `end`, or
-/// at its minimum, if the rate turns from `rate` ≤ 0 at `low` to one above 0.
-template <class At>
-std::optional<double> fall(double low, double high, double rate, const Distance& end, double resolution, const At& at) {
-  double under = high;
-  if (!(end.value < 0.0)) {
-    if (!(rate <= 0.0 && end.rate > 0.0)) return {};
-    under = last_before(low, high, resolution, [&](double s) { return at(s).rate > 0.0; });
-    if (!(at(under).value < 0.0)) return {};
+/// N over s. Its derivative of order k is, where the tip presses,
+///     P⁽ᵏ⁾ + λ Q_k δ^{p−k},   Q_0 = 1 + χ δ̇,   Q_{k+1} = Q_k′ δ + (p − k) Q_k δ′,
+/// with P = −F + k1 (y − y₀) + k2 (y − y₀)³ of degree 2. So the third one is 0 where the polynomial Q_3 is, whatever p
+/// is: between these places the second derivative is monotone and has one zero at most, and so on down to N itself.
+class HoldingForce {
+ public:
+  HoldingForce(const Motion& motion, double y, double depth, const Loads& loads, double size)
+      : law_(motion.compliance()),
+        size_(size),
+        spring_force_(motion.spring_force(y)),
+        load_(scaled(loads.force, size)),
+        depth_{depth, -size * loads.tip[1], -size * size * loads.tip[2] / 2} {
+    const double p = law_.exponent(), chi = law_.damping();
+    factors_[0] = {1.0 + chi * depth_[1] / size, 2.0 * chi * depth_[2] / size};
+    for (std::size_t k = 0; k + 1 < factors_.size(); ++k)
+      for (std::size_t i = 0; i <= k + 1; ++i)
+        for (std::size_t j = i > 0 ? 0 : 1; j <= 2; ++j) {
+          const double factor = static_cast<double>(i) + (p - static_cast<double>(k)) * static_cast<double>(j);
+          factors_[k + 1][i + j - 1] += factor * factors_[k][i] * depth_[j];
+        }
   }
-  return last_before(low, under, resolution, [&](double s) { return at(s).value < 0.0; });
-}
+
+  double depth(double s) const { return sum_of_powers(depth_, s, 0, 2); }                           ///< [m]
+  double rate(double s) const { return (depth_[1] + 2.0 * s * depth_[2]) / size_; }                 ///< δ̇ [m/s]
+  double contact(double s) const { return law_.force(depth(s), rate(s)); }                          ///< [N]
+  double damping_power(double s) const { return (contact(s) - law_.elastic(depth(s))) * rate(s); }  ///< [W]
+
+  /// The tip arrives or leaves, turns, or leaves so fast that damping takes all of the force.
+  std::vector<Stretch> stretches(bool compliant) const {
+    if (!compliant) return {{0.0, 1.0, false}};
+    std::vector<double> cuts{0.0, 1.0};
+    const auto cut = [&cuts](const Series& distance, int degree) {
+      for (const double s : sign_changes(distance, degree)) cuts.push_back(s);
+    };
+    cut(depth_, 2);
+    cut({depth_[1], 2.0 * depth_[2]}, 1);
+    cut(factors_[0], 1);
+    std::sort(cuts.begin(), cuts.end());
+    std::vector<Stretch> parts;
+    for (std::size_t i = 1; i < cuts.size(); ++i)
+      if (cuts[i] > cuts[i - 1]) parts.push_back({cuts[i - 1], cuts[i], contact((cuts[i - 1] + cuts[i]) / 2) > 0.0});
+    return parts;
+  }
+
+  /// The last place in the stretch before N is below 0; nothing if it never is.
+  std::optional<double> first_fall(const Stretch& stretch) const {
+    std::vector<double> ends;  // of the parts in which the derivative of order k is monotone
+    if (stretch.pressed)
+      for (const double s : sign_changes(factors_[3], 4))
+        if (stretch.from < s && s < stretch.to) ends.push_back(s);
+    ends.push_back(stretch.to);
+    for (int k = 2; k >= 0; --k) {
+      std::vector<double> changes;
+      double low = stretch.from;
+      for (const double high : ends) {
+        const auto negative = [&](double s) { return derivative_sign(k, s, stretch.pressed) < 0.0; };
+        const bool at_low = negative(low);
+        if (negative(high) != at_low)
+          changes.push_back(last_before(low, high, 2.0 * epsilon, [&](double s) { return negative(s) != at_low; }));
+        if (k == 0 && negative(high)) return changes.empty() ? stretch.from : changes.back();
+        low = high;
+      }
+      ends = changes;
+      ends.push_back(stretch.to);
+    }
+    return {};
+  }
+
+ private:
+  /// What has the sign of the derivative of order k: nothing in it grows without bound at δ = 0. N counts as negative
+  /// only where it is so by more than its rounding.
+  double derivative_sign(int k, double s, bool pressed) const {
+    const double force = value(load_, s);
+    const double plain = k == 0 ? spring_force_ - force : k == 1 ? -spring::rate(load_, s) : -load_[2];
+    double sum = plain;
+    double contact = 0.0;
+    if (pressed) {
+      const double over = law_.exponent() - k, deep = std::max(depth(s), 0.0);
+      const auto& Q = factors_[static_cast<std::size_t>(k)];
+      contact = law_.stiffness() * sum_of_powers(Q, s, 0, k + 1) * std::pow(deep, std::max(over, 0.0));
+      sum = plain * std::pow(deep, std::max(-over, 0.0)) + contact;
+    }
+    return k > 0 ? sum : sum + 8.0 * epsilon * (std::abs(force) + std::abs(spring_force_) + std::abs(contact));
+  }
+
+  const Compliance& law_;
+  double size_, spring_force_;
+  Polynomial load_;                  ///< F over s
+  Series depth_;                     ///< δ over s
+  std::array<Series, 4> factors_{};  ///< Q_k over s
+};
 
 /// ∫ f over a … b to 1e-14, where f may behave as a power at both ends: double-exponential quadrature (Takahasi & Mori,
 /// "Double exponential formulas for numerical integration", Publ. RIMS 9, 1974, 721–741).
@@ -48,52 +130,21 @@ double integral(const Function& f, double a, double b) {
 }  // namespace
 
 Rest rest(const Motion& motion, double y, double depth, bool compliant, const Loads& loads, double size) {
-  const Compliance& law = motion.compliance();
-  const double slope = loads.tip[1], curvature = loads.tip[2];
-  const auto deep = [&](double t) { return depth - t * (slope + t * curvature / 2); };
-  const auto rate = [&](double t) { return -(slope + t * curvature); };
-  const auto contact = [&](double t) { return compliant ? law.force(deep(t), rate(t)) : 0.0; };
-  // N, above 0 by its rounding, and its rate.
-  const auto N = [&](double t) {
-    const double D = deep(t), C = contact(t), F = value(loads.force, t);
-    const double rounding = 8.0 * epsilon * (std::abs(F) + std::abs(motion.spring_force(y)) + C);
-    const double rate = motion.holding_force(y, loads.from_time(t), compliant && D > 0.0, D)[1];
-    return Distance{motion.holding_force(y, F, C) + rounding, rate};
-  };
-
-  // Where N is not smooth: the tip arrives or leaves, turns, or damping holds the contact force at 0.
-  std::vector<double> cuts{0.0, size};
-  if (compliant) {
-    const Series deep_over_s{depth, -slope * size, -curvature / 2 * size * size};
-    const auto cut = [&](const Series& distance, int degree) {
-      for (const double s : sign_changes(distance, degree)) cuts.push_back(s * size);
-    };
-    cut(deep_over_s, 2);
-    cut({-slope, -curvature * size}, 1);
-    if (law.damped()) cut({law.release_speed() - slope, -curvature * size}, 1);
-    std::sort(cuts.begin(), cuts.end());
-  }
-
+  const HoldingForce N(motion, y, depth, loads, size);
   Rest result{size, false, 0.0, 0.0};
-  Distance before = N(0.0);
-  for (std::size_t i = 1; i < cuts.size(); ++i)
-    for (int k = 0; k < parts && !result.released; ++k) {
-      const double part = (cuts[i] - cuts[i - 1]) / parts, from = cuts[i - 1] + k * part;
-      const double to = k + 1 < parts ? from + part : cuts[i];
-      const Distance after = N(to);
-      if (const auto release = fall(from, to, before.rate, after, 2.0 * epsilon * size, N))
-        result = {*release, true, 0.0, 0.0};
-      before = after;
+  for (auto [from, to, pressed] : N.stretches(compliant)) {
+    const auto fall = N.first_fall({from, to, pressed});
+    if (fall) to = *fall;
+    if (from < to && N.depth((from + to) / 2) > 0.0) {
+      result.impulse += size * integral([&N](double s) { return N.contact(s); }, from, to);
+      result.dissipated += size * integral([&N](double s) { return N.damping_power(s); }, from, to);
     }
-
-  result.impulse = result.size * (motion.spring_force(y) - mean(loads.force, result.size));
-  for (std::size_t i = 1; i < cuts.size(); ++i) {
-    const double from = cuts[i - 1], to = std::min(cuts[i], result.size);
-    if (!compliant || from >= to || deep(from + (to - from) / 2) <= 0.0) continue;
-    result.impulse += integral(contact, from, to);
-    if (law.damped())
-      result.dissipated += integral([&](double t) { return (contact(t) - law.elastic(deep(t))) * rate(t); }, from, to);
+    if (!fall) continue;
+    result.size = to * size;
+    result.released = true;
+    break;
   }
+  result.impulse += result.size * (motion.spring_force(y) - mean(loads.force, result.size));
   return result;
 }
 

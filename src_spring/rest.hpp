@@ -1,6 +1,7 @@
 // The top at rest on the foundation, y = φ, under loads that are quadratic in time. The force that holds it there,
 //     N(τ) = −F(τ) + k1 (y − y₀) + k2 (y − y₀)³ + C(δ(τ), δ̇(τ)),   δ(τ) = φ − u_tip(τ),
-// is known, so there is nothing to integrate numerically but the contact force, by quadrature.
+// is known, so there is nothing to integrate numerically but the contact force, by quadrature. Its first fall below 0
+// is isolated by the zeros of its derivatives, as those of a flight are (events.hpp).
 #pragma once
 
 #include "motion.hpp"

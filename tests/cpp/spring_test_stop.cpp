@@ -393,6 +393,37 @@ TEST(SpringStop, SeatedUnderATipThatComesAndGoes) {
   }
 }
 
+// N = λ δ^p − F with F through three points of λ δ^p, δ linear: it is 0 there and nowhere else, as the third derivative
+// keeps its sign. It rises at first, is below 0 from 1/50 to 3/50 of the step, then above it to the end.
+TEST(SpringStop, ADipOfTheHoldingForceSoonAfterTheStartCounts) {
+  for (const double exponent : {1.5, 2.5, 3.0, 4.0, 5.5}) {
+    for (const double damping : {0.0, 0.5}) {
+      const double H = 0.5, speed = exponent < 2.0 ? -0.01 : 0.01;  // so that the third derivative is above 0
+      Parameters p = ball(0.0, 0.0, 0.0);
+      p.linear_stiffness = 0.0;
+      p.contact_law = ContactLaw::normal_compliance;
+      p.compliance_stiffness = 1e4 / std::pow(0.05, exponent);
+      p.compliance_exponent = exponent;
+      p.compliance_damping = damping;
+      const auto contact = [&](double s) {
+        return p.compliance_stiffness * std::pow(0.05 + speed * H * s, exponent) * (1.0 + damping * speed);
+      };
+      const double a = -0.005, b = 0.02, c = 0.06;
+      const double first = (contact(b) - contact(a)) / (b - a), second = (contact(c) - contact(b)) / (c - b);
+      const double bend = (second - first) / (c - a);
+      Inputs inputs;
+      inputs.tip_displacement = {-0.05, -speed, 0.0};
+      inputs.external_force = {contact(a) - a * first + a * b * bend, (first - (a + b) * bend) / H, 2 * bend / H / H};
+      Spring s(p);
+      const auto left = s.step_to_event(H, inputs, 0.0, true);
+      EXPECT_TRUE(left.event);
+      // N falls there with a rate of some 1e-5 N over the step; rounding is 1e-12 N.
+      EXPECT_NEAR(left.size, b * H, 1e-6 * H) << exponent;
+      EXPECT_FALSE(s.seated());
+    }
+  }
+}
+
 // y is what the motion says, whatever the distance of a stop that is never reached.
 TEST(SpringStop, ADistantStopDoesNotQuantiseTheDisplacement) {
   for (const double amplitude : {1e-3, 1e-9}) {
