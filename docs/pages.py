@@ -19,15 +19,20 @@ def _row(cells: Sequence[str]) -> str:
     return "|" + "|".join(f" {cell} " if cell else " " for cell in cells) + "|"
 
 
-def write_section(page: str, name: str, lines: Iterable[str]) -> None:
-    """Put ``lines`` into the page, between ``<!-- NAME: who writes it -->`` and ``<!-- end of NAME -->``."""
-    path = DOCS / page
+def with_section(text: str, name: str, lines: Iterable[str]) -> str:
+    """Return a page with ``lines`` between ``<!-- NAME: who writes it -->`` and ``<!-- end of NAME -->``."""
     marks = rf"(<!-- {re.escape(name)}: [^>]*-->\n).*?(<!-- end of {re.escape(name)} -->)"
     content = "".join(f"{line}\n" for line in lines)
-    text, count = re.subn(marks, lambda m: m[1] + content + m[2], path.read_text(encoding="utf-8"), flags=re.S)
+    text, count = re.subn(marks, lambda m: m[1] + content + m[2], text, flags=re.S)
     if count != 1:
-        raise SystemExit(f"{path}: {count} places for {name}, wanted is one")
-    path.write_text(text, encoding="utf-8")
+        raise SystemExit(f"{count} places for {name} in the page, wanted is one")
+    return text
+
+
+def write_section(page: str, name: str, lines: Iterable[str]) -> None:
+    """Write ``lines`` into a page of this folder, as `with_section` does."""
+    path = DOCS / page
+    path.write_text(with_section(path.read_text(encoding="utf-8"), name, lines), encoding="utf-8")
 
 
 def shrink(picture: Path) -> None:

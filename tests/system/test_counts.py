@@ -88,7 +88,7 @@ def test_a_tied_step_costs_two_steps_of_each_body(counted, H, degree):
 
 
 def test_a_tied_step_passes_at_most_49_functions_in_12_files():
-    """The walk of docs/architecture.md. What happens now and then is not in a usual step: a shape that is kept, or a
+    """The loop of docs/architecture.md. What happens now and then is not in a usual step: a shape that is kept, or a
     search for a dip in the first steps after an impact."""
     passed: list[set[tuple[str, str, int]]] = []
 

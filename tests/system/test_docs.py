@@ -29,15 +29,11 @@ PROGRAMS = {
     ("api.md", 0): r"contact_impulse    0\.9873\ncontact_force_max  9\.97\d?\ncontact_duration   0\.1444\n.*\n\[-0\.00",
     ("api.md", 1): r"^0\.1 tied \[-0\.00874",
     ("api.md", 2): r"^[1-9]\d* strokes?, energy residual \d\.\de-1[0-9]",
-    (
-        "tools.md",
-        0,
-    ): r"'tip_response': 7\.655\d+e-05, 'tip_response_2': 0\.000140\d+, 'tip_velocity_forecast': -0\.9912",
-    ("tools.md", 1): r"y\(1\.0 s\) = -0\.075\d+ m",
-    ("tools.md", 2): r"^y = -0\.0\d+ m",
-    ("tools.md", 3): r"^y = 0\.0193\d+ m",
-    ("tools.md", 4): r"^t = 0\.100167 s: -0\.99\d+ m/s, then 0\.49\d+ m/s$",
-    ("tools.md", 5): r"u = -0\.003318 m, load_work 0\.035174 J, energy - load_work -?\de-1[67] J",
+    ("tools.md", 0): r"y\(1\.0 s\) = -0\.075\d+ m",
+    ("tools.md", 1): r"^y = -0\.0\d+ m",
+    ("tools.md", 2): r"^y = 0\.0193\d+ m",
+    ("tools.md", 3): r"^t = 0\.100167 s: -0\.99\d+ m/s, then 0\.49\d+ m/s$",
+    ("tools.md", 4): r"u = -0\.010876 m, load_work 0\.010088 J, energy - load_work -?\de-1[67] J",
 }
 #: Lines of shell blocks that are not run here, and why.
 NOT_RUN = {
@@ -201,7 +197,7 @@ def test_what_is_not_run_is_still_there_and_understood():
                 )  # raises if an option or a value is wrong
 
 
-@pytest.mark.parametrize("name", ["fmu_variables", "scene"])
+@pytest.mark.parametrize("name", ["fmu_variables", "lists", "scene"])
 def test_generated_pages_are_current(name, monkeypatch):
     monkeypatch.syspath_prepend(DOCS)
     for path, text in module(name).files().items():

@@ -55,7 +55,7 @@ Ends = tuple[Motion, Motion]
 
 
 class Energies(NamedTuple):
-    """All in J; ``dissipated`` since the start; ``load_potential`` is −(the work of the loads), up to a constant."""
+    """Energies [J]: ``dissipated`` since the start, ``load_potential`` minus the work of loads, up to a constant."""
 
     kinetic: float
     potential: float
@@ -64,7 +64,7 @@ class Energies(NamedTuple):
 
 
 class InnerForces(NamedTuple):
-    """What happens inside a beam at the end of its last step, under the forces that act there."""
+    """Inner forces of a beam at the end of its last step."""
 
     acceleration: float  #: of its tip [m/s²]
     clamp_force: float  #: of the clamp on the beam, upward [N]
@@ -74,15 +74,15 @@ class InnerForces(NamedTuple):
 
 @dataclass(frozen=True)
 class Abilities:
-    """What a body can do; the default is that of our own."""
+    """Abilities of a body; the defaults are those of our own."""
 
     state: bool = True  #: its state can be saved and restored
     any_size: bool = True  #: its steps may have any size
-    velocity: bool = True  #: it tells its velocity
-    integrals: int = 2  #: it tells ∫x (1) and ∫∫x (2) over a step
+    velocity: bool = True  #: it returns its velocity
+    integrals: int = 2  #: it returns ∫x (1) and ∫∫x (2) over a step
     slopes: int = 2  #: highest derivative of a force over a step that it follows
     impulse: bool = True  #: it takes impulses
-    energies: bool = True  #: it tells its energies
+    energies: bool = True  #: it returns its energies
 
 
 #: Abilities that a body has by a method, which it may leave out.
@@ -90,43 +90,39 @@ _BY_METHOD = {"impulse": "apply_impulse", "energies": "energies"}
 
 
 class Body:
-    """A body with one interface end and a state that can be rewound; a body of one's own derives from it.
+    """A body with one interface end and a state that can be restored; a body of your own derives from it.
 
-    ``advance`` prescribes the contact force C on the step: the upper body takes it as +C, the lower one as −C.
     Impulses act at once: ``motion`` and ``energies`` show the state after them. Every method but ``close`` may raise
     BodyFailed.
     """
 
     #: All of the body that changes, a value that is replaced and never changed in place.
     state: Any = None
-    #: What an impulse at the end meets [kg].
+    #: Mass that an impulse on the end moves [kg].
     mass: float
-    #: Whether columns tell its acceleration and the forces inside it: of our own beam and spring.
+    #: Whether columns have its acceleration and inner forces: true of our own beam and spring.
     tells = False
 
-    #: What resists the velocity of the end [N·s/m]; ``None`` where that is not known.
+    #: Damping of the velocity of the end [N·s/m]; ``None`` if unknown.
     damping: float | None = None
-    #: A displacement of the end that is to be expected [m], 0 where that is not known.
+    #: Expected displacement of the end [m]; 0 if unknown.
     reach = 0.0
     #: Relative tolerance of the solver of its motion.
     tolerance = 0.0
 
     @property
     def inertia(self) -> float:
-        """What a force meets that acts for long beside the waves inside the body [kg]."""
+        """Mass [kg] that a force moves which acts for long compared with the waves inside the body."""
         return self.mass
 
     def stiffness(self, displacement: Any) -> Any:
-        """Return ∂F/∂w of the force that holds the end at ``displacement`` [N/m], also of an array of them.
-
-        ``None`` where that is not known.
-        """
+        """Return ∂F/∂w [N/m] of `holding_force` at ``displacement`` [m], a float or an array; ``None`` if unknown."""
         return None
 
     def oscillation(self, displacement: Any = 0.0) -> tuple[float, float] | None:
-        """Return the lowest frequency of the body alone [rad/s] and its damping ratio, 0 where nothing oscillates.
+        """Return the lowest frequency of the body alone [rad/s] and its damping ratio; 0 if nothing oscillates.
 
-        Of an array of displacements [m] it is where the body is stiffest; ``None`` where that is not known.
+        For an array of displacements [m]: those where the body is stiffest. ``None`` if unknown.
         """
         stiffness = self.stiffness(displacement)
         if stiffness is None or self.damping is None:
@@ -138,9 +134,9 @@ class Body:
         return omega, 0.5 * self.damping / (self.mass * omega)
 
     def modes(self, displacement: Any = 0.0) -> Modes | None:
-        """Return the modes of the end, as of a linear body; ``None`` where they are not known.
+        """Return the modes of the linearised body at its end; ``None`` if unknown.
 
-        Of an array of displacements [m] they are those where the body is stiffest.
+        For an array of displacements [m]: those where the body is stiffest.
         """
         stiffness = self.stiffness(displacement)
         if stiffness is None or self.damping is None:
@@ -151,28 +147,27 @@ class Body:
         return np.array([stiffest / self.mass]), np.array([self.damping / self.mass]), np.array([self.mass**-0.5])
 
     def moved_by(self, load: Load) -> float:
-        """Return the largest force on a mode of a ``load`` of 1, over the displacement of the end in that mode.
+        """Return the largest force of a unit ``load`` on a mode, over the mode's displacement of the end.
 
-        0 where that is not known.
+        0 if unknown.
         """
         return 0.0
 
     @property
     def massless(self) -> bool:
-        """Whether the end has no inertia: it then has the velocity of what it is joined to, and springs back alone."""
+        """Whether the end has no inertia: it takes the velocity of the end that it is joined to."""
         return self.mass == 0.0
 
-    #: What the body says that it can do; `can` has the answer. Where its state cannot be saved, a step is made once, by
-    #: the schemes that never repeat one.
+    #: Declared abilities; `can` returns the actual ones.
     abilities = Abilities()
-    #: Steps begun so far, and how often the state was set back; ``None`` where nobody counts.
+    #: Steps begun and states restored so far; ``None`` if not counted.
     steps: int | None = None
     rewinds: int | None = None
-    #: Work that the end has received so far [J], of a body by which the coupling is judged, not by its energies.
+    #: Work that the end has received so far [J], if the energy of the interface judges the coupling.
     received: float | None = None
 
     def can(self) -> Abilities:
-        """Return what the body can do: its `abilities` without those whose methods it leaves out."""
+        """Return the `abilities` without those whose methods the class leaves out."""
         left_out = {
             ability: False
             for ability, method in _BY_METHOD.items()
@@ -181,20 +176,28 @@ class Body:
         return replace(self.abilities, **left_out)
 
     def take_place(self, *, upper: bool) -> None:
-        """Learn, before the run, whether it is the upper body; one that fits in either place needs to know."""
+        """Receive, before the run, whether the body is the upper one."""
 
     def mark(self) -> None:
-        """Remember `state` as the one ``rewind`` returns to."""
+        """Save `state`: a value that the body replaces and never changes in place."""
         if self.state is None:
             raise NotImplementedError(f"{type(self).__name__} has neither mark nor state")
         self._marked = self.state
 
     def rewind(self) -> None:
-        """Return to the marked state."""
+        """Restore the saved state; any number of times."""
         self.state = self._marked
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        """Advance from ``time`` by ``size`` [s] and return `motion`. Raises StepRefused; ``rewind`` then recovers."""
+        """Advance from ``time`` by ``size`` [s] and return the `motion`.
+
+        Parameters
+        ----------
+        contact, foundation
+            C, which acts as +C on an upper body and −C on a lower one, and N, upward: (F, Ḟ, F̈) at ``time`` [N, s].
+
+        Raises StepRefused to ask for a shorter step; ``rewind`` then recovers.
+        """
         raise NotImplementedError
 
     def advance_alone(self, time: float, size: float) -> Motion:
@@ -202,19 +205,20 @@ class Body:
         return self.advance(time, size, NO_FORCE)
 
     def motion(self) -> Motion:
+        """Return the `Motion` at the end of the last step."""
         raise NotImplementedError
 
     def acceleration(self) -> float | None:
         """Return ẅ of the end [m/s²] in its present state, under the forces at the end of its last step.
 
-        ``None`` if the body cannot tell: `trial_acceleration` then may.
+        ``None`` if unknown; `trial_acceleration` may find it.
         """
         return None
 
     def trial_acceleration(self, time: float, size: float) -> float | None:
         """Return ẅ of the end [m/s²] in its present state at ``time`` [s], with the loads but no other force on it.
 
-        A trial step of a small share of ``size`` [s] tells it, to second order; the body stays where it is. ``None`` if
+        It follows, to second order, from a trial step of a small share of ``size`` [s], which is undone. ``None`` if
         the body makes no such step.
         """
         if not (self.abilities.state and self.abilities.any_size and self.abilities.velocity):
@@ -224,10 +228,10 @@ class Body:
         return None if end is None else 6.0 * (end.displacement - w - h * v) / (h * h) - 2.0 * (end.velocity - v) / h
 
     def decay(self, time: float, size: float, speed: float) -> float | None:
-        """Return by how much ẅ of the end falls for each unit of velocity that an impulse gives it [1/s].
+        """Return the decrease of ẅ of the end per unit of velocity that an impulse adds [1/s].
 
-        It follows from the modes. Of a body that has none, two trial steps at ``time`` [s] as of `trial_acceleration`
-        tell it, one of them after an impulse that changes its velocity by ``speed`` [m/s]. ``None`` if it makes none.
+        It follows from the modes, or without them from two trial steps at ``time`` [s] as of `trial_acceleration`, one
+        of them after an impulse that adds ``speed`` [m/s]. ``None`` if the body makes no such steps.
         """
         modes = self.modes()
         if modes is not None:
@@ -245,7 +249,7 @@ class Body:
         return None if struck is None else (free - struck) / speed
 
     def _trial(self, time: float, size: float) -> Motion | None:
-        """Return the motion after a step with nothing at the end, which is then undone; ``None`` if it cannot be."""
+        """Return the motion after a step without force on the end, and undo it; ``None`` if it cannot be undone."""
         if self.state is None:
             return None
         before = self.state
@@ -254,63 +258,54 @@ class Body:
         return end
 
     def energies(self) -> Energies:
-        """Return what the body stores and has dissipated; a body that cannot tell stores nothing."""
+        """Return the stored and dissipated `Energies`; without this method the run warns that it cannot check them."""
         return Energies(0.0, 0.0, 0.0, 0.0)
 
     def inner_forces(self) -> InnerForces:
-        """Return what a beam that `tells` feels, asked once a step."""
+        """Return the inner forces of a beam that `tells`; called once a step."""
         raise NotImplementedError(f"{type(self).__name__} has no inner_forces, and says that it tells")
 
     def shape(self) -> np.ndarray | None:
         """Return deflections [m], bending moments [N·m] and shear forces [N] one after another, shape (63,).
 
-        They are those at `springbeam.scene.statics.SHAPE_POINTS`; ``None`` of a body that shows no shape.
+        Points are `springbeam.scene.statics.SHAPE_POINTS`; ``None`` for a body without a shape.
         """
         return None
 
     def apply_impulse(self, impulse: float) -> None:
-        """Change the velocity of the end at once by an upward impulse [N·s].
+        """Apply an upward impulse [N·s] on the end.
 
-        A body that leaves it out is refused where a scene needs impulses (`springbeam.bodies.gate`); an impulse that
-        changes nothing but by rounding is none.
+        The law ``transmission``, ``[stop]`` and a tie of ends of two velocities need it (`springbeam.bodies.gate`). An
+        impulse within rounding counts as none.
         """
         if abs(impulse) > ROUNDED_IMPULSE * self.mass * abs(self.motion().velocity):
             raise BodyFailed(f"{type(self).__name__} has no apply_impulse, and meets an impulse of {impulse:.6g} N·s")
 
     def holding_force(self, displacement: float, velocity: float) -> float:
-        """Return the upward force [N] that keeps the end at ``displacement`` [m] and ``velocity`` [m/s].
-
-        The force on a spring seated on a stop comes from here.
-        """
+        """Return the upward force [N] that holds the end, as a stop does, at a displacement [m] and velocity [m/s]."""
         raise NotImplementedError(f"{type(self).__name__} has no holding_force, which a body seated on a stop needs")
 
     def expect_loads(self, loads: Sequence[Load]) -> None:
-        """Say once, before the first step, which of a scene's loads act on this body.
-
-        Raises SceneError for a load that it does not take.
-        """
+        """Receive, before the first step, the loads that act on the body. Raises SceneError if it does not take one."""
         first = loads[0]
         raise SceneError(f'[[loads]] on = "{first.on}": {type(self).__name__} has no expect_loads, and takes no loads')
 
     def set_loads(self, forces: Sequence[Force]) -> None:
-        """Let the loads act on every step from here on, rewound or not, each a polynomial over the step.
+        """Set (q, q̇, q̈) of the loads at the start of the next steps, in the order of `expect_loads`.
 
-        They are in the order of `expect_loads`, and in the unit of each: N, N/m or, of the base, m/s².
+        Units are N, N/m or, for the base, m/s².
         """
 
     def load_on_end(self) -> Force:
-        """Return what the loads of `set_loads` amount to at the end of a body that is a mass there [N], upward.
-
-        The foundation bears it while the body is seated.
-        """
+        """Return these loads as an upward force on the end [N], which the foundation bears while the body is seated."""
         return NO_FORCE
 
     def join(self, velocity: float) -> None:
-        """Let a massless end take the velocity [m/s] of what it is joined to; other ends keep theirs."""
+        """Set the velocity [m/s] of a massless end to that of the end it is joined to; other ends keep theirs."""
 
     def release(self) -> float:
-        """Let go of a massless end, which may spring back; return the energy that this loses [J]."""
+        """Release a massless end, which may spring back; return the energy lost [J]."""
         return 0.0
 
     def close(self) -> None:
-        """Free what the body holds; it is not used afterwards."""
+        """Free the resources of the body; it is not used afterwards."""

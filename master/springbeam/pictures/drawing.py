@@ -71,20 +71,33 @@ EVENT_LOOKS = {
     EventKind.UNSEATED: Look(GREY, "unseated", marker=Marker("▶", ">", "triangle-right")),
 }
 assert (tuple(PHASE_LOOKS), tuple(EVENT_LOOKS)) == (PHASES, tuple(EventKind))
-#: What phases, events and other words of a report mean.
+#: What phases, events and other words of messages, reports and pages mean.
 GLOSSARY = {
+    "tip": "the free end of the beam, x = L; its deflection is u_tip",
+    "spring top": "the mass on the spring, at y",
+    "foundation": "the rigid stop below, at the height φ; [stop] in a scene file",
+    "gap": "u_tip − y; without a spring u_tip − φ",
+    "penetration": "p = y − u_tip, the negative gap, of a soft contact",
+    "contact force": "C, which lifts the tip and presses the spring top",
+    "foundation force": "N, which lifts the lower end; 0 unless it is seated",
+    "rigid law, soft law": "joined ends share one position; or the force follows from the penetration",
     "free": "phase: no force acts between the tip and what lies below it",
     "tied": "phase: tip and spring top move as one, whatever the sign of the force; with the law transmission below Ψ",
     "touch": "phase: the ends are in contact, which can push and not pull",
-    "seated": "phase: the lower end rests on the foundation; as an event, it strikes it and stays there",
+    "seated": "phase: the lower end rests on the foundation; event: it strikes the foundation and stays there",
     "impact": "event: tip and spring top meet; ends that a rigid law joins get one velocity at once",
     "stop_impact": "event: the lower end strikes the foundation and rebounds",
     "release": "event: tied ends rise through Ψ; from then on the contact can only push",
     "retie": "event: the ends go below Ψ together and are tied again",
     "separation": "event: the ends part",
     "unseated": "event: the lower end leaves the foundation",
-    "foundation": "the rigid stop below, at the height φ; [stop] in a scene file",
-    "window": "how long a force is averaged before its largest value is told; an instant's force means little",
+    "macro step": "the time H over which the contact force is one polynomial, of the degree 0, 1 or 2",
+    "mismatch": "v_tip − z of joined ends",
+    "window": "the time over which a force is averaged before its largest value is taken",
+    "reference": "the same equations solved by another method, both bodies as one system",
+    "energy residual": "change of the sum of all energies, losses and works; it should be zero",
+    "not resolved": "halving the macro step would change the motion visibly",
+    "settled": "a driven motion repeats itself; its period is that of the drive, or a multiple",
 }
 #: More events than this are not drawn through all panels.
 MANY_EVENTS = 60

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from importlib import import_module
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -21,36 +21,46 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-#: Columns of a whole pair, in file order: the unit of each, and the part of a scene without which it is left out.
-#: ``phase`` has no unit; the loads of a scene follow.
+
+class Column(NamedTuple):
+    """A column of a run: its unit, the part of a scene without which it is left out, and its meaning."""
+
+    unit: str  #: "" of ``phase``
+    part: str
+    words: str
+
+
+#: Columns of a whole pair, in file order; the loads of a scene follow.
 COLUMNS = {
-    "time": ("s", ""),
-    "u_tip": ("m", "beam"),
-    "v_tip": ("m/s", "beam"),
-    "y": ("m", "spring"),
-    "z": ("m/s", "spring"),
-    "contact_force": ("N", "pair"),
-    "compliance_force": ("N", "pair"),
-    "tie_reaction": ("N", "pair"),
-    "foundation_force": ("N", "stop"),
-    "gap": ("m", "gap"),
-    "phase": ("", ""),
-    "e_beam": ("J", "beam"),
-    "e_spring": ("J", "spring"),
-    "e_contact": ("J", "pair"),
-    "e_dissipated": ("J", ""),
-    "e_impact_loss": ("J", ""),
-    "e_load": ("J", ""),
-    "e_total": ("J", ""),
-    "energy_residual": ("J", ""),
+    "time": Column("s", "", "time of the row"),
+    "u_tip": Column("m", "beam", "position of the tip"),
+    "v_tip": Column("m/s", "beam", "velocity of the tip, or the common velocity of ends that a rigid law joins"),
+    "y": Column("m", "spring", "position of the spring top"),
+    "z": Column("m/s", "spring", "velocity of the spring top, or the common velocity"),
+    "contact_force": Column("N", "pair", "contact force C; it lifts the tip and presses the spring"),
+    "compliance_force": Column("N", "pair", "transmission: λ_nc(Ψ − u_tip)₊^p; soft laws: C; tie: 0"),
+    "tie_reaction": Column("N", "pair", "contact_force − compliance_force"),
+    "foundation_force": Column("N", "stop", "force N of the foundation, upward; 0 unless seated"),
+    "gap": Column("m", "gap", "u_tip − y; without a spring u_tip − φ"),
+    "phase": Column("", "", "free, tied, touch or seated"),
+    "e_beam": Column("J", "beam", "mechanical energy of the beam"),
+    "e_spring": Column("J", "spring", "mechanical energy of the spring"),
+    "e_contact": Column("J", "pair", "energy stored by the contact law"),
+    "e_dissipated": Column("J", "", "energy lost to damping"),
+    "e_impact_loss": Column("J", "", "energy lost in impacts"),
+    "e_load": Column("J", "", "minus the work of the loads"),
+    "e_total": Column("J", "", "sum of the six energies"),
+    "energy_residual": Column("J", "", "change of e_total since the start; it should be zero"),
 }
-#: Columns after the loads: the unit of each, and the body that tells it. A body that does not tell leaves it out.
+#: Columns after the loads; a body that does not tell them leaves them out.
 BODY_COLUMNS = {
-    "a_tip": ("m/s²", "beam"),
-    "clamp_force": ("N", "beam"),
-    "clamp_moment": ("N·m", "beam"),
-    "bending_stress": ("Pa", "section"),
-    "a_y": ("m/s²", "spring"),
+    "a_tip": Column(
+        "m/s²", "beam", "acceleration of the tip relative to the base; of the lower end while a law joins them"
+    ),
+    "clamp_force": Column("N", "beam", "force of the clamp on the beam, upward"),
+    "clamp_moment": Column("N·m", "beam", "moment of the clamp on the beam, counter-clockwise"),
+    "bending_stress": Column("Pa", "section", "largest bending stress along the beam, from height or diameter"),
+    "a_y": Column("m/s²", "spring", "acceleration of the spring top relative to the base"),
 }
 #: What the column ``phase`` may hold.
 PHASES = ("free", "tied", "touch", "seated")
@@ -89,12 +99,12 @@ def columns_of(scene: Scene) -> dict[str, str]:
         "stop": stop and not scene.elastic_stop,
         "gap": beam and (spring or stop),
     }
-    units = {name: unit for name, (unit, part) in COLUMNS.items() if there[part]}
+    units = {name: column.unit for name, column in COLUMNS.items() if there[column.part]}
     units |= {f"load_{i}": load.unit for i, load in enumerate(scene.loads)}
     own = scene.beam is not None and not scene.massless
     section = own and scene.beam is not None and scene.beam.section_height > 0.0
     there_is = {"beam": own, "section": section, "spring": scene.spring is not None}
-    return units | {name: unit for name, (unit, body) in BODY_COLUMNS.items() if there_is[body]}
+    return units | {name: column.unit for name, column in BODY_COLUMNS.items() if there_is[column.part]}
 
 
 def rounded(value: float, scale: float) -> str:

@@ -106,7 +106,7 @@ def _stroboscopic(run: Trajectory) -> list[float] | None:
 
 
 #: Columns with a unit, whose largest magnitudes are metrics.
-_UNITS = {name: unit for name, (unit, _) in (COLUMNS | BODY_COLUMNS).items() if unit and name != "time"}
+_UNITS = {name: column.unit for name, column in (COLUMNS | BODY_COLUMNS).items() if column.unit and name != "time"}
 
 METRICS: dict[str, Metric] = {
     "u_tip_min": Metric("m", "lowest place of the tip", _extreme("u_tip", attrgetter("lowest"))),
