@@ -2,84 +2,16 @@
 
 import ctypes as ct
 import math
+from pathlib import Path
 
 import pytest
 
-AHEAD = {"contact_law": 2, "communication_step": 1e-3}
-# Base points: between them every declared dependency shows.
-BASES = {
-    "beam": [
-        {},
-        {"n_modes": 3},
-        {"n_modes": 3, "tip_load_coefficient": 0.0, "initial_deflection_slope": 0.0, "initial_velocity_slope": 0.0},
-        {"mass_matrix": 2},
-        {"integrator": 2},
-        {"integrator": 2, "reduced_integration": True},
-        {"communication_step": 1e-3},
-        {"communication_step": 0.1, "integrator": 2, "alpha_b": 1e-3},
-        {"initial_state": 2, "communication_step": 1e-3},
-        {"initial_state": 2, "integrator": 2, "reduced_integration": True, "element_degree": 2},
-        {"initial_state": 2, "n_modes": 3, "mass_matrix": 2},
-    ],
-    "spring": [
-        {},
-        {"contact_law": 2},
-        {"contact_law": 2, "compliance_damping": 0.2},
-        {**AHEAD, "compliance_damping": 0.2},
-        {"contact_law": 2, "displacement": 0.0},
-        AHEAD,
-        {**AHEAD, "stop_enabled": False},
-        {**AHEAD, "stop_position": 0.2995},  # met within the step
-        {**AHEAD, "displacement": 0.0},
-    ],
-}
-#: At rest on the foundation, where no displacement below it can be tried.
-SEATED = {"beam": [], "spring": [{"stop_position": 0.3, "velocity": 0.0}]}
-COMMON = {
-    "beam": {
-        "young_modulus": 100.0,
-        "shear_modulus": 70.0,
-        "n_elements": 10,
-        "initial_deflection_slope": 0.3,
-        "initial_velocity_slope": -1.0,
-        "distributed_load": 0.5,
-        **{f"point_force[{i}]": 0.1 * i for i in range(1, 5)},
-        "tip_load_coefficient": 0.2,
-        "tip_force": 0.1,
-        "gravity": 0.4,
-        "section_height": 0.1,
-    },
-    "spring": {
-        "mass": 1.2,
-        "damping": 0.1,
-        "linear_stiffness": 3.0,
-        "cubic_stiffness": -0.2,
-        "displacement": 0.3,
-        "velocity": -1.0,
-        "tip_displacement": 0.1,
-        "tip_velocity": 0.2,
-        "tip_velocity_forecast": 0.2,
-        "contact_force": 0.3,
-        "stop_enabled": True,
-        "tip_response": 1e-4,
-    },
-}
-# Values that are not a factor of the base's.
-CHANGES = {
-    "n_elements": [12],
-    "element_degree": [3],
-    "n_modes": [0, 4, 19],
-    "reduced_integration": [True, False],
-    "integrator": [1, 2],
-    "mass_matrix": [1, 2],
-    "initial_state": [1, 2],
-    "contact_law": [1, 2],
-    "stop_enabled": [True, False],
-    "restitution": [0.5],
-    "stop_position": [-0.5],
-    "relative_tolerance": [1e-8],
-    "absolute_tolerance": [1e-9],
-}
+from springbeam.scene.files import tomllib
+
+VALUES = tomllib.loads(Path(__file__).with_name("values.toml").read_text(encoding="utf-8"))
+BASES = VALUES["bases"]
+COMMON = VALUES["common"]
+CHANGES = VALUES["changes"]
 
 
 def started(case, values):
@@ -181,7 +113,7 @@ def test_directional_derivatives_are_those_of_the_outputs(case):
     """Derivatives of every output by every continuous input, against differences: before the first step and after."""
     found = []
     change = {"beam": 1e-3, "spring": 1e-6}[case.name]
-    for base in BASES[case.name] + SEATED[case.name]:
+    for base in BASES[case.name] + BASES[f"{case.name} at rest"]:
         k = case.running(**{**COMMON[case.name], **base})
         for step in (False, True):
             if step:

@@ -1,9 +1,12 @@
 """Inputs over a step, and the inner forces of the beam: derivatives hold for one step, impulses act once."""
 
 import ctypes as ct
+from pathlib import Path
 
 import numpy as np
 import pytest
+
+from springbeam.scene.files import tomllib
 
 # -- inputs over a step: derivatives hold for one step, impulses act once; output derivatives -------------------------
 
@@ -66,23 +69,8 @@ def test_an_impulse_acts_once_at_the_start_of_the_next_step(case):
         assert sum(k.get(*stored)) - before == pytest.approx(J * (2 * velocity + J / mass) / 2, rel=1e-9)
 
 
-LOADED = {
-    "beam": [
-        {
-            "tip_force": 0.7,
-            "distributed_load": -0.4,
-            "tip_load": 0.2,
-            "base_acceleration": 0.3,
-            "integrator": integrator,
-            "communication_step": 0.02,
-        }
-        for integrator in (1, 2)
-    ],
-    "spring": [
-        {"contact_force": 0.3, "external_force": -0.2, "base_acceleration": 0.4},
-        {"contact_law": 2, "compliance_damping": 0.3, "tip_displacement": 0.45, "tip_velocity": 0.1, "velocity": 0.6},
-    ],
-}
+VALUES = tomllib.loads(Path(__file__).with_name("values.toml").read_text(encoding="utf-8"))
+LOADED = VALUES["loaded"]
 
 
 @pytest.mark.parametrize("variant", [0, 1])
@@ -151,22 +139,9 @@ def test_rates_of_what_follows_forces_at_once_count_rates_of_forces(beam, load):
         assert partial != 0.0 or (load, output) == ("tip_force", "tip_velocity_forecast"), output
 
 
-SAME = {
-    "beam": [
-        ("base_acceleration", "distributed_load", -6.0, {"density": 3.0, "area": 2.0}),  # -density*area
-        ("tip_load", "tip_force", 1.0, {}),
-        ("tip_load", "point_force[3]", 1.0, {"point_force_position[3]": 1.0}),
-    ],
-    "spring": [
-        ("external_force", "contact_force", -1.0, {}),
-        ("base_acceleration", "external_force", -2.5, {"mass": 2.5, "stop_enabled": True}),
-    ],
-}
-
-
 def test_inputs_that_are_another_times_a_factor(case):
     H, f = 0.2, (0.8, -3.0, 11.0)
-    for one, other, factor, values in SAME[case.name]:
+    for one, other, factor, values in VALUES["same"][case.name]:
         a, b = case.moving(**values), case.moving(**values)
         for i in range(5):
             polynomial(a, one, f)

@@ -17,6 +17,8 @@ from fmpy.util import read_csv
 from fmpy.validation import validate_fmu
 from lxml import etree
 
+from springbeam.scene.files import tomllib
+
 # -- what is in the .fmu files, and what their binaries need and show -------------------------------------------------
 
 
@@ -229,26 +231,7 @@ def test_c_host(case, linux_host):
     assert repeated[:4] == repeated[4:]
 
 
-LAW = {"contact_law": 2, "tip_displacement": -1e-3, "tip_velocity": 0.1}
-HELD = {**LAW, "communication_step": 0.01, "tip_response": 1e-5, "tip_response_2": 2e-5, "tip_velocity_forecast": 0.1}
-STOP = {"stop_enabled": 1, "stop_position": 0.0, "restitution": 0.5}
-#: Start values under which the spring is, or begins, where a division by what is 0 lies near.
-SPECIAL = {
-    "at rest": {},
-    "at rest, preloaded": {"unloaded": 0.1, "external_force": -0.1},
-    "on its stop": STOP,
-    "pressed on its stop": {**STOP, "external_force": -1.0},
-    "touching": {**LAW, "tip_displacement": 0.0, "tip_velocity": 0.0},
-    "touching, a power by IDA": {**LAW, "tip_displacement": 0.0, "compliance_exponent": 1.5},
-    "in contact": {**LAW, "compliance_exponent": 1.5, "compliance_damping": 0.5},
-    "in contact, on its stop": {**LAW, **STOP},
-    "held, not yet in contact": {**HELD, "tip_displacement": 1e-3},
-    "held": HELD,
-    "held, damped": {**HELD, "compliance_damping": 0.5},
-    "held, on its stop": {**HELD, **STOP},
-    "without a spring": {"linear_stiffness": 0.0},
-    "damped": {"damping": 1e6},
-}
+SPECIAL = tomllib.loads(HERE.joinpath("values.toml").read_text(encoding="utf-8"))["special"]
 
 
 @pytest.mark.parametrize("version", ["2.0"])

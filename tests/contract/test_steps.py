@@ -2,9 +2,12 @@
 
 import ctypes as ct
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+
+from springbeam.scene.files import tomllib
 
 # -- fmi2DoStep: which steps are refused, and what a refused step leaves behind ---------------------------------------
 
@@ -43,23 +46,13 @@ def test_what_is_more_than_rounding_is_refused(case, time, size, why):
 
 
 AHEAD = {"contact_law": 2, "communication_step": 1e-3, "tip_response": 1e-4}
-#: FMU, parameters, inputs of a step that is refused, its size, the size of one that is not, and what is said.
-REFUSALS = [
-    ("beam", {}, {"tip_impulse": 1e308}, 0.1, 0.1, "not finite"),
-    ("beam", {}, {"tip_impulse": 1.0, "tip_force": 1e308}, 0.1, 0.1, "not finite"),
-    ("beam", {"integrator": 2}, {"tip_force": 1e308}, 0.1, 0.1, "not finite"),
-    ("beam", {"communication_step": 1e-3}, {"tip_force": 1e308}, 1e-3, 1e-3, "not finite"),
-    ("spring", {"linear_stiffness": 3.0, "cubic_stiffness": -0.2}, {"impulse": 100.0}, 1.0, 1e-3, "past its hilltop"),
-    ("spring", {"linear_stiffness": 1e6}, {"contact_force": 1.0}, 1e6, 1e-3, "too much of the motion"),
-    ("spring", {"linear_stiffness": 3.0}, {"contact_force": 1e308}, 0.1, 0.1, "range of floating-point numbers"),
-    ("spring", AHEAD, {"tip_displacement": -1e-3}, 2e-3, 1e-3, "a step of 0.002 s, but communication_step = 0.001 s"),
-    ("spring", AHEAD, {"tip_velocity_forecast": -1e308}, 1e-3, 1e-3, "no contact force was found"),
-]
+VALUES = tomllib.loads(Path(__file__).with_name("values.toml").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize(("name", "parameters", "inputs", "size", "smaller", "why"), REFUSALS)
-def test_after_any_refusal_a_master_goes_on(loaded, name, parameters, inputs, size, smaller, why):
+@pytest.mark.parametrize("step", VALUES["refused"], ids=lambda step: step["said"])
+def test_after_any_refusal_a_master_goes_on(loaded, step):
     """With another step or other inputs, without restoring a state, as if the refused step had not been tried."""
+    name, parameters, inputs, (size, smaller) = (step[key] for key in ("fmu", "parameters", "inputs", "sizes"))
     k, twin = (loaded[name].running(**parameters) for _ in range(2))
     for slave in (k, twin):
         slave.step(0.0, 1e-3)
@@ -71,7 +64,7 @@ def test_after_any_refusal_a_master_goes_on(loaded, name, parameters, inputs, si
         k.set(i, value)
     assert k.try_step(1e-3, size) == DISCARD
     assert k.messages[-1][:2] == (DISCARD, "logStatusDiscard")
-    assert why in k.message
+    assert step["said"] in k.message
     assert k.get("warnings") == told + 1  # in the results, where messages are hidden
     # Nothing was done: the last time that holds is the start of the step.
     assert k.reached() == 1e-3

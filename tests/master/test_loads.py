@@ -161,9 +161,6 @@ def test_loads_are_changed_by_their_number_and_tables_lie_beside_the_scene(tmp_p
         load_scene(folder / "one.toml", ["loads.2.frequency=7"])
 
 
-LEAVE_OUT = "leave the line out, or begin it with #"
-
-
 def test_a_table_ends_with_its_last_line_and_a_ramp_stays():
     Path("record.csv").write_text("time [ms],acceleration [g]\n0,1\n10,-2\n")
     table = load_of(on="base", signal="table", file="record.csv")
@@ -171,38 +168,3 @@ def test_a_table_ends_with_its_last_line_and_a_ramp_stays():
     assert table.peak == pytest.approx(2.0 * 9.80665)
     ramp = load_of(on="tip", signal="ramp", duration=0.01, amplitude=3.0)
     assert ramp.value([-1e-9, 0.005, 0.01, 7.0]) == pytest.approx([0.0, 1.5, 3.0, 3.0])
-
-
-FILL_IN = 'missing = "drop" leaves such lines out, "interpolate" fills them'
-ONE_OF = 'repeats = "first" leaves such lines out, "mean" sorts them and takes means'
-AS_MANY = "there must be as many as the first line, and two at least, with , or ; or a tab between"
-
-
-@pytest.mark.parametrize(
-    ("text", "error"),
-    [
-        ("0,1\n1,two\n", f"line 2, column 2: 'two' is not a finite number; {LEAVE_OUT}"),
-        ("t,f\n0,1\n\n# a note\n0,nan\n", f"line 5, column f: the value is missing; {FILL_IN}"),
-        (
-            "0;1\n1;2,5\n",
-            "line 2, column 2: '2,5' is not a finite number; decimals have a point, or give decimal = \",\"",
-        ),
-        ("0,1\n1,2,3\n", f"line 2: 3 columns; {AS_MANY}"),
-        ("0,1,2\n1,2,3\n", "3 columns; a table has two, time and value"),
-        ("0 1\n1 2\n", f"line 1: 1 columns; {AS_MANY}"),
-        ("0,1\n2,2\n1,3\n", f"line 3: time 1 is not after that of the line before; {ONE_OF}"),
-        ("0,1\n2,2\n2,3\n", f"line 3: time 2 is not after that of the line before; {ONE_OF}"),
-        ("time,value\n0,1\n", "1 lines with numbers; there must be two at least"),
-        ("0,1\n1,\udcff\n", 'line 2: it is no text in utf-8 (byte 0xff); give its encoding, as encoding = "latin-1"'),
-        (
-            "time,force [kg]\n0,1\n1,1",
-            "column force: [kg] is no unit of what a run has in N: Cannot convert from "
-            "'kilogram' ([mass]) to 'newton' ([mass] * [length] / [time] ** 2)",
-        ),
-    ],
-)
-def test_a_bad_table_is_named_with_line_and_column(text, error):
-    Path("record.csv").write_bytes(text.encode(errors="surrogateescape"))
-    with pytest.raises(SceneError) as refused:
-        soft("linear")
-    assert str(refused.value) == f'scene: [loads.0] file = "record.csv": {error}'

@@ -19,26 +19,14 @@ from springbeam.scene.files import tomllib
 
 PATH = Path(__file__).with_name("faults.toml")
 SCENE = tomllib.loads(PATH.read_text(encoding="utf-8"))
-COMPLIANCE = {"law": "compliance", "stiffness": 1e3, "exponent": 1.5}
-#: Tables that differ, and where the master comes by.
-LAWS = {
-    "energy": ({"coupling": {"degree": 0}}, ("free", "tied", "touch", "seated", "location")),
-    "energy 2": (
-        {"coupling": {"degree": 2}},
-        ("free", "tied", "touch", "seated", "location"),
-    ),
-    "compliance": ({"contact": COMPLIANCE}, ("free", "touch", "seated", "location")),
-    "jacobi": ({"contact": COMPLIANCE, "coupling": {"scheme": "jacobi"}}, ("free", "touch", "seated")),
-}
-#: What halving one step changes at the end [m]: its error at H against that at H/2, of order 2 and 6 and none.
-HALVED = {"energy": 1e-5, "energy 2": 1e-10, "compliance": 1e-5, "jacobi": 1e-4}
+TABLE = tomllib.loads(PATH.with_name("faults_of_fmus.toml").read_text(encoding="utf-8"))
+LAWS = TABLE["laws"]
 
 
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     def started(law, *faults, name="faulty"):
-        changes, _ = LAWS[law]
-        scene = SCENE | {table: {**SCENE[table], **change} for table, change in changes.items()}
+        scene = SCENE | {table: {**SCENE[table], **change} for table, change in LAWS[law]["change"].items()}
         (tmp_path / "scene.toml").write_text(tomli_w.dumps(scene))
         with monkeypatch.context() as patch:
             script = installed(patch, *faults)
@@ -62,7 +50,7 @@ def whole(run, law):
         assert code == 0
         script.check()
         trajectory = load_trajectory(directory)
-        assert {where for where in LAWS[law][1] if where != "location"} <= set(trajectory.phase)
+        assert {where for where in LAWS[law]["places"] if where != "location"} <= set(trajectory.phase)
         _WHOLE[law] = written(directory)
     return _WHOLE[law]
 
@@ -80,47 +68,10 @@ def check_stopped(code, directory, expected, cause):
     assert np.isfinite(summary["max_energy_residual"])
 
 
-EVERYWHERE = [(law, where) for law, (_, places) in LAWS.items() for where in places]
-THOROUGH = [("energy", "tied"), ("energy", "location")]
-ELSEWHERE = [place for place in EVERYWHERE if place not in THOROUGH]
-#: What may go wrong anywhere, and what is said; elsewhere two of the first three are tried, in turn.
-COMMON = [
-    ("fmi2DoStep", "Discard", "fmi2DoStep returned discard"),
-    ("fmi2GetReal", "nan", "not finite: "),
-    ("fmi2SetReal", "Error", "cannot set "),
-    ("fmi2DoStep", "Error", "fmi2DoStep returned error"),
-    ("fmi2DoStep", "Fatal", "cannot step at t = "),
-    ("fmi2GetReal", "Fatal", "cannot read "),
-]
-LASTING = [
-    *((*place, *fault) for place in THOROUGH for fault in COMMON),
-    *((*place, *fault) for k, place in enumerate(ELSEWHERE) for fault in COMMON[k % 2 : k % 2 + 2]),
-    ("energy", "tied", "fmi2DoStep", "unknown", "it returned fatal"),
-    ("energy", "tied", "fmi2SetFMUstate", "Discard", "cannot restore the state"),
-    ("energy 2", "touch", "fmi2SetFMUstate", "raise", "ZeroDivisionError"),
-    ("energy", "location", "fmi2SetFMUstate", "Error", "cannot restore the state"),
-    ("compliance", "touch", "fmi2SetFMUstate", "Fatal", "cannot restore the state"),
-    ("energy", "start", "fmi2GetFMUstate", "Discard", "cannot save the state"),
-    ("energy", "start", "fmi2GetFMUstate", "Fatal", "cannot save the state"),
-    ("jacobi", "start", "fmi2GetFMUstate", "Error", "cannot save the state"),
-    ("energy 2", "tied", "fmi2SetRealInputDerivatives", "Discard", "cannot set input derivatives"),
-    ("energy 2", "touch", "fmi2SetRealInputDerivatives", "Error", "cannot set input derivatives"),
-    ("energy 2", "location", "fmi2SetRealInputDerivatives", "Fatal", "cannot set input derivatives"),
-    ("energy", "tied", "fmi2SetReal", "Error", "impulse"),
-    ("energy 2", "touch", "fmi2SetReal", "Fatal", "impulse"),
-    ("energy", "tied", "fmi2GetReal", "Discard", "displacement, "),
-    ("energy", "row", "fmi2GetReal", "Error", "cannot read "),
-    ("energy", "row", "fmi2GetReal", "Fatal", "cannot read "),
-    ("energy", "row", "fmi2GetReal", "nan", "the beam's shape is not finite"),
-    ("energy", "tied", "fmi2GetReal", "inf", "not finite: "),
-]
+EVERYWHERE = [(law, where) for law, about in LAWS.items() for where in about["places"]]
 
 
-@pytest.mark.parametrize(
-    ("fmu", "law", "where", "function", "kind", "cause"),
-    # One FMU or the other in turn. With a row only the beam is read, for its shape.
-    [(FMUS[k % 2 * (case[1] != "row")], *case) for k, case in enumerate(LASTING)],
-)
+@pytest.mark.parametrize(("fmu", "law", "where", "function", "kind", "cause"), TABLE["faults"]["lasting"])
 def test_a_lasting_fault_stops_the_run(run, fmu, law, where, function, kind, cause):
     expected = whole(run, law)
     fault = Fault(fmu, function, where, kind)
@@ -162,7 +113,7 @@ def test_a_fault_that_passes_is_stepped_over(run, fmu, place, fault):
     assert trajectory.summary["halved_steps"] == 1
     assert trajectory.time[-1] == SCENE["time"]["t_end"]
     last = [float(cell) for cell in undisturbed["trajectory.csv"].split()[-1].split(b",")[1:4:2]]
-    assert [trajectory.u_tip[-1], trajectory.y[-1]] == pytest.approx(last, abs=HALVED[law])
+    assert [trajectory.u_tip[-1], trajectory.y[-1]] == pytest.approx(last, abs=LAWS[law]["halved"])
     if law != "jacobi":
         assert trajectory.summary["max_energy_residual"] < 1e-10
 
