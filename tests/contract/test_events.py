@@ -80,20 +80,6 @@ def test_event_mode_keeps_the_derivatives_of_inputs(spring):
     assert k.outputs() == twin.outputs()
 
 
-def test_an_impulse_on_the_beam_in_event_mode_is_seen_at_once(beam):
-    k, H = started(beam, **beam.parameters, communication_step=1e-3), 1e-3
-    k.step(0.0, H)
-    assert told(k) == (False, False, False)
-    k.set("tip_impulse", 0.3)
-    before = k.get("tip_acceleration")
-    handle(k)
-    acceleration, u, forecast = k.get("tip_acceleration", "tip_displacement", "tip_velocity_forecast")
-    assert acceleration == pytest.approx(k.derivative("tip_velocity"), rel=1e-9) != before
-    for i in (1, 2):
-        k.step(i * H, H)
-    assert forecast == pytest.approx((k.get("tip_displacement") - u) / (2 * H), rel=1e-9)
-
-
 @pytest.mark.parametrize("events", [True, False])
 def test_where_early_return_is_forbidden_steps_are_those_of_fmi_2(spring, fmus, events):
     k, old = started(spring, events=events, early=False, **FALLING), fmus["2.0"]["spring"].running(**FALLING)

@@ -5,7 +5,6 @@ import os
 import re
 import shutil
 import sys
-import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
 
@@ -163,25 +162,6 @@ def test_reference_result_is_reproduced(case):
     for name in names:
         # 12 digits are written; the beam's modes differ by rounding between compilers.
         assert result[name] == pytest.approx(expected[name], rel=1e-9, abs=1e-11)
-
-
-def test_reference_files_are_announced_as_the_layered_standard_asks(case):
-    """FMI-LS-REF 1.0.0-alpha.1: a manifest of that name and folder, whose sources are files relative to itself."""
-    folder = case.folder / "extra" / "org.fmi-standard.fmi-ls-ref"
-    root = ET.parse(folder / "fmi-ls-manifest.xml").getroot()
-    prefix = "{http://fmi-standard.org/fmi-ls-manifest}"
-    assert (root.tag, root.get(prefix + "fmi-ls-name")) == ("fmiReferences", "org.fmi-standard.fmi-ls-ref")
-    assert root.get(prefix + "fmi-ls-version") == "1.0.0-alpha.1"
-    assert root.get(prefix + "fmi-ls-description") == (
-        "Layered Standard providing information on related files included in an FMU."
-    )
-    related = {(folder / item.get("source", "")).resolve(): item.get("role") for item in root.iter("Related")}
-    assert all(path.is_file() for path in related)
-    assert sorted(related.values()) == ["experiment/smoke-test", "result", "testcase"]
-    experiment = ET.parse(folder / "experiments.xml").getroot().find("Experiment")
-    assert experiment is not None
-    named = {(folder / item.get("source", "")).resolve() for item in experiment}
-    assert named == {path for path, role in related.items() if role != "experiment/smoke-test"}
 
 
 # -- the Windows binaries under Wine, by the same C host as the Linux ones --------------------------------------------

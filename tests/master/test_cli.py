@@ -12,7 +12,6 @@ import pytest
 import typer
 from bodies import simulate
 from commands import command
-from matplotlib.figure import Figure
 from runs import block
 
 import springbeam.run.runner
@@ -60,25 +59,6 @@ def replace_run(monkeypatch, error):
 
 
 # -- a run that ends well -----------------------------------------------------------------------------------------
-
-
-def test_a_picture_that_cannot_be_written_ends_with_3_and_loses_nothing(here, monkeypatch):
-    """All that the run has come to is said before pictures are drawn."""
-    said = []
-
-    def full(*_, **__):
-        sys.stdout.flush()
-        said.append(sys.stdout.buffer.getvalue().decode())
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(Figure, "savefig", full)
-    result = command("run", "soft")
-    assert result.exit_code == 3
-    assert said == [result.stdout]
-    assert result.stdout.endswith("results   results/soft\n")
-    assert "no picture: " in result.stderr
-    assert "No space left on device; what was computed is in results/soft" in " ".join(result.stderr.split())
-    assert len(load_trajectory(here / "results" / "soft")) == 31
 
 
 # -- stopped early: exit code 3, what was computed is there -------------------------------------------------------

@@ -6,7 +6,6 @@ from bodies import bodies, simulate
 from scenes import scene_from_dict
 from scipy.sparse.linalg import spsolve
 
-from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.protocol import Motion
 from springbeam.bodies.quasi_static import QuasiStaticBeam
 from springbeam.contact.events import Holding
@@ -14,7 +13,6 @@ from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import assemble, constant_forces
 from springbeam.scene import Beam, Coupling, statics
 from springbeam.scene.statics import SHAPE_POINTS
-from springbeam.scene.suspicions import suspicions
 
 BEAM = Beam.with_ones(
     density=2.0, area=0.5, second_moment_of_area=0.3, young_modulus=30.0, shear_modulus=50.0, shear_coefficient=0.8,
@@ -92,14 +90,6 @@ def scene(**tables):
     return scene_from_dict({table: {**data.get(table, {}), **tables.get(table, {})} for table in {**data, **tables}})
 
 
-def test_it_arrives_where_the_spring_is_as_it_was_thrown():
-    """From 0.2 m to 5 cm above where it is straight, without loads, by 1 m/s."""
-    thrown = {"initial_deflection_slope": 0.2, "distributed_load": 0.0, "alpha_b": 0.2}
-    above = scene(beam=thrown, spring={"equilibrium": 0.05, "initial_velocity": 0.0})
-    beam, _ = load_bodies(above.model_copy(update={"lower": None}), above.contact_time, above.degree)
-    assert beam.motion()[:2] == pytest.approx((0.05, -1.0), rel=1e-12)
-
-
 @pytest.mark.parametrize(
     "coupling",
     [{"macro_step": 0.02, "degree": 0}, {"macro_step": 0.02, "degree": 1}, {"relative_tolerance": 1e-4, "degree": 2}],
@@ -115,19 +105,6 @@ def test_where_the_force_vanishes_as_the_spring_falls_through_its_equilibrium_th
     lags = coupling == {"macro_step": 0.02, "degree": 0}
     assert off < (0.03 if lags else 1e-3)
     assert run.summary["resolved"] is not lags
-
-
-# -- what is said ----------------------------------------------------------------------------------------------------
-
-
-def test_what_is_left_out_is_said_with_its_size():
-    """Inertia: 33/140 ρAL of a slender beam beside the spring's mass. Blow: ½ρA s² L³/3."""
-    slender = {"second_moment_of_area": 1e-8, "young_modulus": 1e9, "shear_modulus": 1e9, "density": 2.0}
-    inertia, blow = suspicions(scene(beam=slender))
-    assert "0.24 of the spring's mass" in inertia
-    assert "11%" in inertia  # √(1 + 33/140) − 1
-    assert "0.333 J" in blow
-    assert suspicions(scene(beam={**slender, "density": 0.01, "initial_velocity_slope": 0.0})) == []
 
 
 def test_what_holds_the_ends_is_the_force_of_the_reference_over_the_stiffness():

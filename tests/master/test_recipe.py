@@ -9,10 +9,8 @@ from bodies import DuffingBody, beam_body, simulate
 
 from springbeam.monolithic import event_driven
 from springbeam.monolithic import laws as references
-from springbeam.pictures.panels import forces
-from springbeam.pictures.report import described
 from springbeam.run import runner
-from springbeam.scene import Scene, SceneError, laws, load_scene, with_changes
+from springbeam.scene import Scene, laws, load_scene, with_changes
 from springbeam.scene.linearised import contact_energy
 from springbeam.scene.resolution import WINDOW
 from springbeam.scene.statics import tip_inertia
@@ -84,16 +82,3 @@ def test_the_window_of_its_peak_force_and_its_frequency_are_its_own():
     assert found["contact_frequency"] == pytest.approx(
         np.sqrt(slope * (1.0 / found["tip_mass"] + 1.0 / scene.spring.mass)), rel=1e-12
     )
-
-
-@pytest.mark.usefixtures("stiffening")
-def test_pictures_report_and_messages_call_it_what_it_is():
-    run = simulate(bumper())
-    legends = {curve.name: curve.look.words for curve in forces(run).curves}
-    assert legends["compliance_force"] == "of the bumper k p₊ + h p₊³"
-    assert dict(described(run.scene))["contact"] == "stiffening: a bumper that stiffens, stiffness 300"
-    with pytest.raises(
-        SceneError,
-        match=r'damping = 1.0: is for "compliance" or "link", this is law = "stiffening"',
-    ):
-        with_changes(bumper(), contact={"damping": 1.0})

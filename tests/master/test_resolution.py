@@ -9,7 +9,6 @@ from scenes import scene_from_dict
 
 from springbeam import simulate
 from springbeam.contact.phases import Joint, Phase
-from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.results.steps import STEP
 from springbeam.run.observed import least_momentum
@@ -77,21 +76,6 @@ def test_the_shortest_contact_of_a_tie_has_a_limit_from_degree_1_on(degree, shar
         assert (told is None) is (resolved or degree == 0)
 
 
-def test_what_alternates_while_ends_are_tied_matters_where_they_part():
-    """`soft`, degree 0, 4 ms: tied, the velocities differ by 0.15 of 1 m/s, which hardly moves the ends; later the pair
-    strikes the foundation and parts."""
-    coarse = with_changes(PAIR, coupling={"degree": 0, "macro_step": 4e-3})
-    run, whole = (simulate(with_changes(coarse, time={"t_end": t_end})) for t_end in (0.06, 0.6))
-    tied = run.steps["phase"] == 1.0
-    assert np.abs(run.steps["v_tip_after"] - run.steps["z_after"])[tied].max() > 0.15
-    assert [event.kind for event in run.events] == ["impact"]
-    assert run.summary["resolved"] is True
-    exact = event_driven.integrate(run.scene, sample_times=run.time)
-    assert np.abs(run.y[1:] - exact.y[-len(run) + 1 :]).max() < 1e-3 * np.ptp(exact.y)
-    assert whole.summary["resolved"] is False
-    assert "moves an end by about 2.1 %" in whole.summary["warnings"][0]
-
-
 def test_a_soft_contact_within_a_macro_step_is_lost_to_an_exchange_alone():
     """It finds the force at the ends of the step, where the contact is over: a cell of the grid was 110 % off."""
     for scheme, resolved in (("energy", True), ("gauss_seidel", False), ("jacobi", False)):
@@ -112,28 +96,6 @@ def test_what_creeps_or_has_no_inertia_has_nothing_to_resolve():
         for share in (0.99, 1.01):
             swings = [found for found, *_ in slow_oscillations(with_changes(PAIR, **{name: {key: share * damping}}))]
             assert (name in swings) is (share < 1.0)
-
-
-def test_the_step_that_is_named_resolves_the_motion():
-    """`soft`, energy 0, at 4 ms, is off by 1.7 %: the warning's H cures it."""
-    coarse = simulate(with_changes(PAIR, coupling={"macro_step": 4e-3}))
-    assert coarse.summary["resolved"] is False
-    (warning,) = coarse.summary["warnings"]
-    cured = simulate(with_changes(PAIR, coupling={"macro_step": float(warning.split("macro_step <= ")[1].split()[0])}))
-    assert cured.summary["resolved"] is True
-    assert [text for text in cured.summary["warnings"] if "depends on the mesh" not in text] == []
-
-
-@pytest.mark.parametrize(("tolerance", "resolved"), [(1e-2, False), (1e-4, True)])
-def test_errors_of_steps_within_the_tolerance_add_up(tolerance, resolved):
-    """A link that swings 16 times; each step errs by a phase."""
-    link = with_changes(PAIR, time={"t_end": 1.0}, beam={"n_elements": 10}, contact={"law": "link", "stiffness": 1e3})
-    run = simulate(with_changes(link, coupling={"relative_tolerance": tolerance}))
-    rows = slice(None, None, max(len(run) // 200, 1))
-    exact = event_driven.integrate(with_changes(link, coupling={"degree": 2}), sample_times=run.time[rows])
-    off = np.abs(run.u_tip[rows] - exact.u_tip).max() / np.ptp(exact.u_tip)
-    assert run.summary["resolved"] is resolved
-    assert (off < 0.01) == resolved
 
 
 # -- soft contacts --------------------------------------------------------------------------------------------------
@@ -301,18 +263,6 @@ def test_a_table_in_resonance_with_a_mode_that_turns_far_in_a_step_is_said(tmp_p
     if not coupling:
         assert off > 0.3
         assert run(macro_step=float(told[0].split("macro_step <= ")[1].split()[0])).summary["resolved"] is True
-
-
-@pytest.mark.parametrize(("size", "degree"), [(1e-3, 0), (1e-3, 2), (7.8125e-4, 2)])
-def test_a_contact_that_is_not_resolved_is_said(size, degree):
-    """60 rad a step (u_tip 11 % off); with 128 steps of degree 2 no row is in contact, only what lies between them."""
-    run = simulate(with_changes(STIFF, coupling={"macro_step": size, "degree": degree}))
-    assert run.summary["resolved"] is False
-    (warning,) = run.summary["warnings"]
-    assert "more than all of its way" in warning
-    named = float(warning.split("macro_step <= ")[1].split()[0])
-    omega = np.sqrt(1e8 * (modal_beam(STIFF.beam).inverse_tip_mass + 1.0))
-    assert 0.02 < named * omega < 0.6
 
 
 def test_a_stiff_link_that_does_not_swing_has_nothing_to_resolve():

@@ -84,15 +84,6 @@ def wrapped(**overrides):
     return wrap
 
 
-@pytest.mark.parametrize("known", [True, False])
-def test_a_run_warns_where_a_body_can_say_no_acceleration(known):
-    """Then C of joined ends is that of the steps; a body that says one, or makes a trial step, needs no warning."""
-    silent = {} if known else {name: lambda own, *_: None for name in ("acceleration", "trial_acceleration")}
-    run = simulate(soft(stop=None, time={"t_end": 0.01}), wrapped(**silent))
-    said = [warning for warning in run.summary["warnings"] if "does not say its acceleration" in warning]
-    assert [warning.split(" does")[0] for warning in said] == ([] if known else ["the body in [spring]"])
-
-
 @pytest.mark.parametrize(("any_size", "halvings"), [(True, 20), (False, 0)])
 def test_a_step_that_stays_refused_is_halved_20_times(any_size, halvings):
     """If it may have any size. The run then stops where that step begins; what was made before is kept."""

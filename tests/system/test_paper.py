@@ -1,17 +1,13 @@
 """Algorithm 1: what the paper reports of it; the program through the FMUs beside the one as one system; its command."""
 
-import json
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import command
 from scenes import SOFT, kinds, soft
 
-from springbeam import load, load_scene, simulate, with_changes
-from springbeam.bodies import fmu_bodies
-from springbeam.bodies.protocol import StepRefused
+from springbeam import load_scene, simulate, with_changes
 from springbeam.paper import co_simulation, monolithic
 from springbeam.paper.problem import AlgorithmFailure
 from springbeam.scene.files import tomllib
@@ -89,12 +85,6 @@ def resolved(**tables):
     return with_changes(with_changes(SOFT, beam={**beam, **moving}, spring=spring, **given), **tables)
 
 
-def test_an_elastic_approach_that_begins_at_the_spring_begins_in_contact():
-    for program in PROGRAMS.values():
-        run = program.algorithm_1(resolved(time={"t_end": 5e-3}))
-        assert (run.phase[0], kinds(run)[0], run.events[0].time) == ("tied", "impact", 0.0)
-
-
 @pytest.mark.parametrize(
     ("at_contact", "slope", "speed", "stop", "stiffness", "phases"),
     [
@@ -154,38 +144,4 @@ def test_a_solution_that_grows_beyond_all_bounds_keeps_what_came_before():
         assert np.isfinite(failed.value.trajectory.energy_residual).all()
 
 
-def test_a_body_that_refuses_a_step_stops_the_command_and_what_was_computed_stays(tmp_path, monkeypatch):
-    advance, calls = fmu_bodies.OwnBody.advance, []
-
-    def failing(self, *given):
-        calls.append(given)
-        if len(calls) > 100:
-            raise StepRefused("the spring breaks")
-        return advance(self, *given)
-
-    monkeypatch.setattr(fmu_bodies.OwnBody, "advance", failing)
-    result = command("paper", 2, "--set=beam.n_elements=4", "--set=beam.n_modes=0", "-q", "-o", tmp_path, "--no-plots")
-    assert result.exit_code == 3
-    assert "error: the run stopped early: the spring breaks at t = 0.6" in result.stderr
-    run = load(tmp_path)
-    assert (run.summary["status"], len(run) > 10) == ("stopped", True)
-
-
 # -- the command
-
-
-@pytest.mark.parametrize("options", [(), ("--monolithic",)])
-def test_the_command_writes_what_a_run_writes(options, tmp_path):
-    settings = ("--set=beam.n_elements=20", "--set=beam.n_modes=0", "--set=time.t_end=0.6")
-    result = command("paper", 4, *options, *settings, "--out", tmp_path / "four", "--json")
-    assert (result.exit_code, json.loads(result.stdout)["macro_steps"]) == (0, 25)
-    names = {file.name for file in (tmp_path / "four").iterdir()}
-    assert {"trajectory.csv", "events.csv", "shapes.csv", "summary.json"} <= names
-    for letter in "abcde":
-        assert [name for name in names if name.startswith(f"{letter}_") and name.endswith(".png")], letter
-    run = load(tmp_path / "four")
-    with_law = command("run", "paper-fig4", *settings, "--out", tmp_path / "law", "--no-plots", "-q")
-    assert with_law.exit_code == 0
-    told = ("a_tip", "clamp_force", "clamp_moment", "a_y")  # by bodies at the end of a step of a run
-    columns = [name for name in load(tmp_path / "law").columns if name not in told]
-    assert list(run.columns) == [*columns, "case", "e_injected_beam", "e_injected_spring"]

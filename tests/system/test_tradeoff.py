@@ -1,11 +1,8 @@
 """The trade between error and cost, on the FMUs: what is swept, judged and named."""
 
-import csv
-import json
-
 import numpy as np
 import pytest
-from commands import HANGS, printed
+from commands import HANGS
 from scenes import kinds, soft
 
 from springbeam.monolithic import event_driven
@@ -47,16 +44,6 @@ def test_what_a_configuration_costs_and_where_it_errs_is_that_of_its_run():
     assert row["error_impulse"] == pytest.approx(off, rel=1e-9)
 
 
-@pytest.mark.parametrize(("quick", "seconds", "left_out"), [
-    (False, 9.9, False), (False, 10.1, True), (True, 0.9, False), (True, 1.1, True),
-])  # fmt: skip
-def test_what_is_finer_than_one_that_took_too_long_is_left_out(quick, seconds, left_out):
-    records = {"energy 0, H = 0.1": {"cost_wall_time": seconds}, "energy 1, H = 0.1": {"cost_wall_time": 99.0}}
-    skipped = Tradeoff(scene=soft(), quick=quick).skipped({"family": "energy 0"}, records)
-    assert (skipped is not None) is left_out
-    assert not left_out or skipped["error"] == f"energy 0, H = 0.1 took more than {1 if quick else 10} s"
-
-
 def test_front_and_choices_are_of_what_is_a_result():
     """One that nothing is quicker and better than is on the front; 0.1 is no result.
 
@@ -94,18 +81,6 @@ def test_every_axis_is_swept_that_the_law_has(law, there, absent):
     families = {case["family"] for case in study.cases().values()}
     assert ENERGY | {"energy 2 adaptive"} | there <= families
     assert absent not in families
-
-
-def test_command(tmp_path):
-    arguments = ["tradeoff", "duffing", "--until", "0.2", "--repeats", "2", "--json", "--out", str(tmp_path / "out")]
-    table = json.loads(printed(*arguments))
-    assert list(table["cheapest"]) == ["0.01", "0.0001", "1e-06", "1e-08"]
-    assert table["cheapest"]["1e-08"]["error_motion"] <= 1e-8
-    rows = list(csv.DictReader((tmp_path / "out" / "tradeoff.csv").open()))
-    assert {row["family"] for row in rows} >= {"energy 0", "energy 2"}
-    assert all(float(row["error_motion"]) >= 0.0 for row in rows if row["status"] == "done")
-    assert all(len(json.loads(row["times"])) == 2 for row in rows if row["status"] == "done")
-    assert (tmp_path / "out" / "tradeoff.png").stat().st_size > 10_000
 
 
 def test_bounces_that_die_out_end_no_comparison():
