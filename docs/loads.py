@@ -36,7 +36,7 @@ def shock() -> None:
     )
     upper.plot(1e3 * run.time, 1e3 * run.u_tip, color=BLUE, label="end of the board")
     upper.plot(1e3 * run.time, 1e3 * run.y, color=VERMILLION, label="top of the pad")
-    upper.set_ylabel("beside the base [mm]")
+    upper.set_ylabel("relative to the base [mm]")
     upper.legend(frameon=False)
     lower.plot(1e3 * run.time, run["load_0"], color=BLACK)
     lower.set(xlabel="time [ms]", ylabel="base [m/s²]")

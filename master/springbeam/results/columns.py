@@ -127,17 +127,18 @@ def normal_compliance(scene: Scene, u: np.ndarray, first: np.ndarray) -> np.ndar
 def ledger(steps: np.ndarray, received: Collection[str] = ()) -> dict[str, np.ndarray]:
     """Return the columns from ``e_beam`` to ``e_total`` [J]: energies, what was lost, minus the work of the loads.
 
-    The energy of a body in ``received``, "beam" or "spring", is the work that it has received: its own account may be
-    off.
+    The energy of a body in ``received``, "beam" or "spring", is the work that it has received, because its own account
+    may be wrong.
     """
 
     def account(body: str) -> tuple[Any, Any, Any]:
-        """Return what a body stores, dissipates and has from its loads [J]."""
+        """Return the energies [J] that a body stores, dissipates and gets from its loads."""
         if body in received:
-            return steps[f"{body}_received"], 0.0, 0.0
+            return steps[f"{body}_received"], nothing, nothing
         stored = steps[f"{body}_kinetic"] + steps[f"{body}_potential"]
         return stored, steps[f"{body}_dissipated"], steps[f"{body}_load"]
 
+    nothing = np.zeros(len(steps))
     e_beam, lost_beam, load_beam = account("beam")
     e_spring, lost_spring, load_spring = account("spring")
     found = {

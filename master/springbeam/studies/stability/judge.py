@@ -1,16 +1,4 @@
-"""Judge a run: put it into a class by what it recorded, and compare it with the event-driven reference.
-
-===========  ==========================================================================================================
-conserved    done, energy constant to `ledger.EXACT`, nothing lost
-dissipative  done, energy plus booked losses constant to `ledger.EXACT`
-approximate  done, energy changed by more: within the bound of its scheme (`ledger.bounds`), or the run says so
-refused      a scene that cannot be run, with the reason
-stopped      ended early, with the cause
-garbage      anything else: a run that is wrong beside the reference and does not warn; a coupling that changes no
-             energy and has changed it; energy changed without a warning, numbers that are not finite, bodies that
-             overlap, damping that returns energy, a crash
-===========  ==========================================================================================================
-"""
+"""Judge a run: put it into a class by what it recorded, and compare it with the event-driven reference."""
 
 from __future__ import annotations
 
@@ -34,8 +22,18 @@ from ...scene.suspicions import suspicions
 from ..comparison import perturbed
 from ..tables import Row
 
-#: In the order in which pictures and tables show them; the last must stay empty.
-CLASSES = ("conserved", "dissipative", "approximate", "refused", "stopped", "garbage")
+#: Classes of runs (bounds: `ledger.EXACT`, `ledger.bounds`), in the order of pictures and tables; the last must stay
+#: empty.
+MEANINGS = {
+    "conserved": "is done; the energy is constant to 10⁻⁸ of the largest so far, without losses",
+    "dissipative": "is done; energy plus losses is constant to 10⁻⁸",
+    "approximate": "is done; the energy changed by more, but within the bound of its scheme or with a warning",
+    "refused": "was rejected before the start",
+    "stopped": "ended early, with the cause",
+    "garbage": "is anything else: it is wrong, or its energy has changed, without a warning; numbers are not finite, "
+    "bodies overlap or tear, damping returns energy, or it crashed",
+}
+CLASSES = tuple(MEANINGS)
 #: A run without an accuracy is wrong if an end is further from the reference than this share of its largest change:
 #: what `springbeam.run.misplaced` is to warn of.
 WRONG = 0.01
