@@ -1,6 +1,9 @@
 """Scenes of tests: `soft` with changes; and scenes in units of their own, where what a body does not say is 1."""
 
+from pathlib import Path
+
 from springbeam import scene
+from springbeam.scene.files import tomllib
 from springbeam.scene.laws import LAW
 from springbeam.scene.loads import SIGNALS
 
@@ -28,6 +31,41 @@ def completed(tables):
 def scene_from_dict(tables):
     """Return the scene of `completed` tables."""
     return scene.scene_from_dict(completed(tables))
+
+
+def table(name):
+    """Return a table of this folder."""
+    return tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+
+
+TABLE = table("scenes.toml")
+
+
+def without_false(tables):
+    """Return tables of the table of scenes, where false takes one out."""
+    return {
+        key: without_false(value) if isinstance(value, dict) else None if value is False else value
+        for key, value in tables.items()
+    }
+
+
+def made(tables):
+    """Return the scene of tables; ``of`` names the scene that they change."""
+    above = tables.get("of")
+    changes = without_false({name: content for name, content in tables.items() if name != "of"})
+    return scene_from_dict(changes) if above is None else scene.with_changes(named(above), **changes)
+
+
+def named(name):
+    """Return a scene of the table, one of a group as ``group/name``, or one that is shipped."""
+    group, _, member = name.rpartition("/")
+    own = TABLE["groups"][group][member] if group else TABLE["scenes"].get(name)
+    return scene.load_scene(name) if own is None or own.get("of") == name else made(own)
+
+
+def group(name):
+    """Return the scenes of a group, by their names, but for the one that the others change."""
+    return {member: named(f"{name}/{member}") for member in TABLE["groups"][name] if member != "base"}
 
 
 def load_of(**keys):

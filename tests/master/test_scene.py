@@ -3,24 +3,19 @@
 import math
 import re
 from copy import deepcopy
-from pathlib import Path
 
 import numpy as np
 import pytest
+import scenes
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import scene_from_dict
+from scenes import TABLE, scene_from_dict, without_false
 
 import springbeam
 from springbeam.scene import Beam, Scene, SceneError, load_scene, with_changes
-from springbeam.scene.files import tomllib
 from springbeam.scene.suspicions import suspicions
 
-TABLE, BAD = (
-    tomllib.loads(Path(__file__).parents[1].joinpath(name).read_text(encoding="utf-8"))
-    for name in ("scenes.toml", "bad_inputs.toml")
-)
-DOUBTS = BAD["doubts"]
+DOUBTS = scenes.table("bad_inputs.toml")["doubts"]
 
 
 def changed(**tables):
@@ -39,14 +34,6 @@ def changed(**tables):
 
 def load_pair():
     return deepcopy(TABLE["pair"])
-
-
-def without_false(tables):
-    """Return tables of the table of scenes, where false takes one out."""
-    return {
-        key: without_false(value) if isinstance(value, dict) else None if value is False else value
-        for key, value in tables.items()
-    }
 
 
 GOOD = {name: changed(**without_false(changes)) for name, changes in TABLE["accepted"].items()}

@@ -5,6 +5,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+import scenes
 from faulty import installed
 
 from springbeam import Simulation, load_scene, simulate, with_changes
@@ -28,39 +29,21 @@ def counted(monkeypatch):
     release()  # what is kept would go on counting
 
 
-SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 1e-3})
-APART = with_changes(SOFT, beam={"approach": "elastic", "initial_deflection_slope": 0.5}, time={"t_end": 0.05})
-PULSE = {"on": "tip", "signal": "half_sine", "start": 0.01, "duration": 0.01}
-PAIR = ("beam", "spring")
-#: Scenes without contact or impact, how many macro steps they have, and their FMUs.
-FLIGHTS = {
-    "energy 0": (with_changes(APART, coupling={"degree": 0}), 50, PAIR),
-    "energy 2": (with_changes(APART, coupling={"degree": 2}), 50, PAIR),
-    "compliance": (with_changes(APART, contact={"law": "compliance"}), 50, PAIR),
-    "loads": (with_changes(APART, loads=[PULSE, {"on": "beam", "at": 0.5, "amplitude": 0.1}]), 50, PAIR),
-    "spring alone": (with_changes(load_scene("duffing"), time={"t_end": 0.2}), 20, ("spring",)),
-    "beam alone": (with_changes(load_scene("beam-on-stop"), time={"t_end": 0.02}, stop=None), 20, ("beam",)),
-    "quasi-static": (
-        with_changes(
-            SOFT,
-            beam={"fidelity": "quasi_static", "approach": "elastic", "initial_velocity_slope": 0.0},
-            spring={"equilibrium": -0.01, "initial_velocity": -0.001},
-            time={"t_end": 0.04},
-        ),
-        40,
-        ("spring",),
-    ),
-}
+FLIGHTS = scenes.group("flights")
+#: The FMUs of those that do not need both.
+FMUS = {"spring alone": {"spring"}, "beam alone": {"beam"}, "quasi-static": {"spring"}}
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_flight_costs_one_step_of_each_fmu(counted, name):
     """Nothing is iterated, nothing taken back; no slope of an input is set, but of a load in the 10 steps it varies."""
-    scene, n, fmus = FLIGHTS[name]
+    scene = FLIGHTS[name]
+    n = round(scene.duration / scene.coupling.H)
+    fmus = FMUS.get(name, {"beam", "spring"})
     run, calls = counted(scene)
     assert set(run.phase) == {"free"}
     assert (run.summary["macro_steps"], run.summary["iterations"]) == (n, 0)
-    assert {body for body, _ in calls} == set(fmus)
+    assert {body for body, _ in calls} == fmus
     for body in fmus:
         # Values are set with the parameters, then with each force; no load and no impulse by itself. The state is saved
         # for a later run, then before each step.

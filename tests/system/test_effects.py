@@ -2,38 +2,13 @@
 
 import numpy as np
 import pytest
+import scenes
 
-from springbeam import SceneError, load_scene, simulate, with_changes
+from springbeam import SceneError, simulate, with_changes
 from springbeam.scene.suspicions import EFFECTS, suspicions
 
 #: The tip meets the spring at once, and the spring strikes the stop after some ms.
-SOFT = with_changes(
-    load_scene("soft"),
-    time={"t_end": 0.03},
-    beam={"n_elements": 4},
-    spring={"initial_velocity": -0.3},
-    stop={"position": -1e-3, "restitution": 0.5},
-    coupling={"macro_step": 1e-3},
-)
-LAW = {"stiffness": 1e3, "exponent": 1.5}
-SCENES = {
-    "transmission": SOFT,
-    "compliance": with_changes(SOFT, contact={"law": "compliance", **LAW}, coupling={"degree": 0}),
-    "link": with_changes(SOFT, contact={"law": "link", "stiffness": 1e3}),
-    "tie": with_changes(SOFT, contact={"law": "tie"}),
-    "exchange": with_changes(SOFT, contact={"law": "compliance", **LAW}, coupling={"scheme": "jacobi"}),
-    "midpoint": with_changes(SOFT, beam={"integrator": "midpoint"}),
-    "without inertia": with_changes(SOFT, beam={"fidelity": "quasi_static", "n_elements": 50}),
-    "a hat load without inertia": with_changes(
-        SOFT, beam={"fidelity": "quasi_static", "n_elements": 50, "tip_load_coefficient": -1.0}
-    ),
-    "beam and stop": with_changes(SOFT, spring=None, beam={"distributed_load": -50.0}),
-    "beam and soft stop": with_changes(
-        SOFT, spring=None, stop={"restitution": 1.0}, contact={"law": "compliance", **LAW}, coupling={"degree": 2}
-    ),
-    "beam": with_changes(SOFT, spring=None, stop=None),
-    "spring": with_changes(SOFT, beam=None),
-}
+SCENES = scenes.group("effects")
 VALUES = {
     "beam.n_elements": 3,
     "beam.element_degree": 2,
@@ -98,13 +73,13 @@ def test_every_row_of_the_table_is_looked_at():
 
 
 def test_a_load_that_begins_after_the_run_is_told():
-    late = with_changes(SOFT, loads=[{"on": "tip", "signal": "step", "start": 0.03}])
+    late = with_changes(SCENES["transmission"], loads=[{"on": "tip", "signal": "step", "start": 0.03}])
     assert suspicions(late) == ["[loads.0] start = 0.03: plays no part here; the run ends at [time] t_end = 0.03"]
-    assert np.array_equal(simulate(late).y, simulate(SOFT).y)
+    assert np.array_equal(simulate(late).y, simulate(SCENES["transmission"]).y)
 
 
 def test_a_law_between_no_two_bodies_is_told():
-    scene = with_changes(SCENES["spring"], contact={"law": "compliance", **LAW})
+    scene = with_changes(SCENES["spring"], contact={"law": "compliance", "stiffness": 1e3, "exponent": 1.5})
     assert [line.partition(":")[0] for line in suspicions(scene)] == [
         '[contact] law = "compliance"',
         "[contact] stiffness = 1000.0",

@@ -5,6 +5,7 @@ from math import nan
 
 import numpy as np
 import pytest
+import scenes
 
 from springbeam import PointMass, RunStopped, SceneError, load_scene, simulate, with_changes
 from springbeam.bodies import fmu, fmu_bodies
@@ -12,17 +13,8 @@ from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.fmu import MOST_KEPT, release
 from springbeam.bodies.protocol import NO_FORCE, StepRefused
 
-SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 1e-3}, time={"t_end": 0.25})
-PULSE = {"on": "tip", "signal": "half_sine", "start": 0.01, "duration": 0.05, "amplitude": 3.0}
-SCENES = {
-    "transmission": SOFT,
-    "degree 2": with_changes(SOFT, coupling={"degree": 2}),
-    "midpoint": with_changes(SOFT, beam={"integrator": "midpoint"}),
-    "compliance": with_changes(SOFT, contact={"law": "compliance"}),
-    "loads": with_changes(SOFT, loads=[PULSE, {"on": "beam", "at": 0.5}, {"on": "spring", "amplitude": -2.0}]),
-    "spring alone": with_changes(load_scene("duffing"), time={"t_end": 1.0}),
-    "bouncing": with_changes(load_scene("beam-on-stop"), time={"t_end": 0.1}),
-}
+SCENES = scenes.group("kept")
+SOFT = SCENES["transmission"]
 
 
 pytestmark = pytest.mark.usefixtures("none_kept")

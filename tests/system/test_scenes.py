@@ -1,7 +1,5 @@
 """Scenes beside what they are compared with: a case of tests/scenes.toml each."""
 
-from pathlib import Path
-
 import bodies
 import numpy as np
 import pytest
@@ -11,19 +9,8 @@ from references import integrated_anew
 from springbeam import RunStopped, load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
 from springbeam.results.contact_times import contact_changes
-from springbeam.scene.files import tomllib
 
-TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("scenes.toml").read_text(encoding="utf-8"))
-CASES = TABLE["cases"]
-
-
-def scene_of(name):
-    """Return a scene of the table, or one that is shipped."""
-    tables = dict(TABLE["scenes"].get(name, {"of": name}))
-    above = tables.pop("of", None)
-    if above is None:
-        return scenes.scene_from_dict(tables)
-    return with_changes(scene_of(above) if name != above else load_scene(name), **tables)
+CASES = scenes.TABLE["cases"]
 
 
 def beside_reference(scene, run_of, bounds, _):
@@ -97,9 +84,9 @@ ORACLES = {"reference": beside_reference, "limits": within_limits, "scipy": besi
 def test_a_scene_is_that_of_its_oracle(name, monkeypatch):
     case = CASES[name]
     left_out = dict.fromkeys(case.get("without", []))
-    scene = with_changes(scene_of(case["of"]), **case.get("change", {}), **left_out)
+    scene = with_changes(scenes.named(case["of"]), **case.get("change", {}), **left_out)
     run_of = bodies.simulate if case.get("bodies") == "exact" else simulate
-    bounds = {**TABLE["bounds"].get(case.get("within"), {}), **case.get("bounds", {})}
+    bounds = {**scenes.TABLE["bounds"].get(case.get("within"), {}), **case.get("bounds", {})}
     ORACLES[case["oracle"]](scene, run_of, bounds, monkeypatch)
 
 
