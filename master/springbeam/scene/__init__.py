@@ -1,10 +1,10 @@
-"""What is simulated: scene files, their keys, and what follows from them before anything is built or loaded.
+"""Scenes: files, their keys, and values that follow from them before anything is built or loaded.
 
-Imports nothing else of the package. Floors, from below: ``tables`` (the keys), ``laws`` and ``loads`` (those of
+Imports nothing else of the package. Modules, from below: ``tables`` (the keys), ``laws`` and ``loads`` (those of
 ``[contact]`` and ``[[loads]]``; ``recorded`` reads the file of a load) → ``scene`` (all tables) → ``messages`` (keys
 and errors in words): these load numpy when they compute. ``statics`` → ``linearised`` (energies), ``frequencies`` →
-``rules`` (errors and warnings) → ``reading`` (files, overrides; start here) → ``resolution`` (are steps short enough,
-which scheme). ``files`` reads TOML; ``shipped/`` has the scenes that come with the package.
+``rules`` (errors and warnings) → ``reading`` (files, overrides; start here) → ``resolution`` (are steps short
+enough). ``files`` reads TOML; ``shipped/`` has the scenes that come with the package.
 """
 
 from typing import TYPE_CHECKING

@@ -21,7 +21,7 @@ def shipped_scenes() -> dict[str, Path]:
 
 
 def tables_of(path: Path) -> dict[str, Any]:
-    """Return what the TOML file ``path`` holds. Raises ValueError, RecursionError or OSError if it cannot be read."""
+    """Return the content of a TOML file. Raises ValueError, RecursionError or OSError if it cannot be read."""
     found: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     return found
 

@@ -1,4 +1,4 @@
-"""Frequencies of our beam, and of the waves that an impact sets off, without making its mesh.
+"""Frequencies of our beam, and of the waves that an impact excites, without the mesh.
 
 `springbeam.studies.stability.predict` has those of the mesh.
 """
@@ -31,7 +31,7 @@ def joined_frequency(scene: Scene) -> float:
 
 
 def impact_frequency(beam: Beam) -> float:
-    """Return the highest frequency of the waves that an impact sets off and that do not die out at once [rad/s]."""
+    """Return the highest frequency of the waves that an impact excites and that do not die out at once [rad/s]."""
     return min(shear_frequency(beam), lasting_frequency(beam))
 
 
@@ -46,7 +46,7 @@ def fastest_frequency(beam: Beam) -> float:
     high = mesh_frequency(beam)
     if beam.integrator != "modal" or beam.n_modes == 0 or modes_below(beam, high) <= beam.n_modes:
         return high
-    from scipy.optimize import bisect  # takes long to load: only for who leaves modes out
+    from scipy.optimize import bisect  # takes long to load: only if modes are left out
 
     return float(bisect(lambda omega: modes_below(beam, omega) - beam.n_modes + 0.5, 0.0, high, rtol=1e-3))
 
@@ -59,7 +59,7 @@ def mesh_frequency(beam: Beam) -> float:
 
 
 def shear_frequency(beam: Beam) -> float:
-    """Return an estimate of the highest frequency of shear waves on the mesh [rad/s], which an impact sets off."""
+    """Return an estimate of the highest frequency of shear waves on the mesh [rad/s], which an impact excites."""
     return sqrt(_gradient(beam) * beam.shear_coefficient * beam.shear_modulus / beam.density)
 
 

@@ -1,14 +1,14 @@
-"""Interface laws: which contact force belongs to the penetration of the two ends, and what it stores and dissipates.
+"""Interface laws: the contact force as a function of the penetration of the ends, its potential and dissipation.
 
-The penetration p = y − u_tip [m] is positive where the tip has sunk into what lies below it, its rate ṗ = z − v_tip
-[m/s]; the contact force C [N] lifts the tip and presses the lower end. ``docs/model.md`` states the laws. A *rigid* law
-has no force of its own: it holds the ends together, and C is whatever that takes. A *soft* one is a function of both,
+The penetration p = y − u_tip [m] is positive if the tip has sunk into the body below it; its rate is ṗ = z − v_tip
+[m/s]. The contact force C [N] lifts the tip and presses the lower end. ``docs/model.md`` states the laws. A *rigid* law
+holds the ends together, and C is the reaction. A *soft* law is a function of penetration and rate,
 
     C = F(p) + D(p, ṗ),     F = Φ′,     D ṗ ≥ 0,
 
-so that Φ is what it stores and ∫ D ṗ dt what it dissipates. A law is one table of keys, a `Contact` named in `LAWS`; a
-soft one makes its force, a `SoftLaw`. Nothing outside this module and `springbeam.monolithic.laws`, which has each law
-again, independently, asks for a law's name. ``docs/contributing.md`` says how a law is added.
+with the potential Φ and the dissipation ∫ D ṗ dt. A law is one table of keys, a `Contact` named in `LAWS`; a soft one
+makes its force, a `SoftLaw`. Only this module and `springbeam.monolithic.laws`, which implements each law again,
+independently, compare names of laws. ``docs/contributing.md`` shows how to add a law.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class SoftLaw:
         raise NotImplementedError
 
     def resistance(self, p: float, rate: float) -> tuple[float, float, float]:
-        """Return D [N], ∂D/∂p [N/m] and ∂D/∂ṗ [N·s/m]; asked for only if `damped`."""
+        """Return D [N], ∂D/∂p [N/m] and ∂D/∂ṗ [N·s/m]; called only if `damped`."""
         raise NotImplementedError
 
 
@@ -163,7 +163,7 @@ def stiffest(law: SoftLaw, energy: float) -> float:
 
 
 class Contact(Table):
-    """What force C belongs to the penetration p = y − u_tip (``docs/model.md``, "Interface laws")."""
+    """The contact force C as a function of the penetration p = y − u_tip (``docs/model.md``, "Interface laws")."""
 
     law: str
     force_window: float | None = key(
@@ -174,16 +174,16 @@ class Contact(Table):
         "m", "height of the unbent beam above the unloaded spring: equilibrium and unloaded of [spring] are −gap", 0.0
     )
 
-    #: Whether ends that have met share one position, so that C is a reaction.
+    #: Whether ends that have met share one position; C is then a reaction.
     rigid: ClassVar[bool] = True
     #: Whether the law joins the ends from the start and for good, for either sign of C.
     lasting: ClassVar[bool] = False
-    #: Legend of the column ``compliance_force``, and what it has besides where the law is damped.
+    #: Legend of the column ``compliance_force``, and its addition for a damped law.
     legend: ClassVar[str] = ""
     damper: ClassVar[str] = ""
 
     def force(self) -> SoftLaw | None:
-        """Return C as a function of the penetration and its rate; ``None`` of a rigid law."""
+        """Return C as a function of the penetration and its rate; ``None`` for a rigid law."""
         return None
 
     def compliance(self, p: np.ndarray) -> np.ndarray:
@@ -195,12 +195,12 @@ class Contact(Table):
 
     @property
     def words(self) -> str:
-        """What the law does, in a few words."""
+        """A description of the law in a few words."""
         return str(type(self).model_fields["law"].description)
 
     @property
     def own_keys(self) -> dict[str, float]:
-        """Keys that the law has beside those of any law."""
+        """Keys of the law beyond those of any law."""
         fields = type(self).model_fields
         return {name: getattr(self, name) for name in fields if name not in Contact.model_fields}
 
@@ -216,7 +216,7 @@ class Contact(Table):
 
     @property
     def strikes(self) -> bool:
-        """Whether ends that meet are struck: their velocities differ before, and are one from then on."""
+        """Whether ends that meet have an impact: different velocities before it, one velocity after it."""
         return self.rigid and not self.lasting
 
     @property
@@ -257,7 +257,7 @@ class ComplianceContact(Contact):
 
 
 class TieContact(Contact):
-    """Ends that are one from the start and for good."""
+    """Ends that are joined from the start to the end."""
 
     law: Literal["tie"] = key("–", "tied for good", "tie")
 
@@ -265,7 +265,7 @@ class TieContact(Contact):
 
 
 class LinkContact(Contact):
-    """An elastic link with a damper, C = k p + c ṗ, from the start and for good."""
+    """An elastic link with a damper, C = k p + c ṗ, from the start to the end."""
 
     law: Literal["link"] = key("–", "an elastic link", "link")
     stiffness: float = key("N/m", "stiffness k of the link", ge=0.0)
@@ -293,4 +293,4 @@ LAWS: dict[str, type[Contact]] = {
     "tie": TieContact,
     "link": LinkContact,
 }
-LAW = OneOf(Contact, "law", "the interface law (docs/choose.md says which)", LAWS, "transmission")
+LAW = OneOf(Contact, "law", "the interface law (docs/choose.md helps to choose)", LAWS, "transmission")

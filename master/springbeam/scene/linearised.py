@@ -1,7 +1,7 @@
-"""Energies of a scene, and its frequencies where it is stiffest, for what must be known before it runs.
+"""Energies of a scene, and its frequencies where it is stiffest, known before a run.
 
-It is stiffest where its hardening spring is deflected as far as the energy at first contact allows; a softening spring,
-at rest. What a softening spring holds, and from which energy on it escapes, is told by its well.
+A hardening spring is stiffest at the largest deflection that the energy at first contact allows, a softening spring at
+rest. The depth of its potential well bounds the energy of a softening spring that does not escape.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def bent_energy(scene: Scene, beam: Beam) -> float:
 
 
 def _load_energy(scene: Scene) -> float:
-    """Estimate what loads that begin all at once do [J]: twice the static deflection under their peaks, 2 F²/k.
+    """Estimate the energy of loads that begin at once [J]: twice the static deflection under their peaks, 2 F²/k.
 
     F is the tip force that would bend the slender beam as far, ∫ f ξ² (3 − ξ)/2 dx with ξ = x/L.
     """
@@ -86,7 +86,7 @@ def spring_frequency(scene: Scene) -> float:
 
 
 def _elongation(spring: Spring) -> float:
-    """Return how far the top is at the start from where the spring is without force [m]."""
+    """Return the elongation of the spring at the start [m]."""
     return spring.equilibrium - spring.unloaded
 
 

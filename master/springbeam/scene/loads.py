@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 else:
     np = Later("numpy")
 
-#: So many lines of a table in a step are data, and no kinks that are worth the end of one.
+#: With so many lines of a table in a step, no step ends at its kinks.
 LINES_IN_STEP = 4
 #: Most different places of point forces on a beam.
 MOST_POINTS = 4
@@ -34,7 +34,8 @@ class Load(Table):
     """A load that acts on the beam, on its tip, on the spring, or on all by the acceleration of the base."""
 
     on: Literal["beam", "tip", "spring", "base"] = key(
-        "–", "what it acts on: a force on the beam (N/m, or N at a point), on tip or spring (N), or the base (m/s²)"
+        "–",
+        "target: beam (force in N/m, or N at a point), tip or spring (force in N), base (acceleration in m/s²)",
     )
     shape: Annotated[tuple[float, ...] | None, Field(strict=False, min_length=1, max_length=4)] = key(
         "–", "on the beam: f_b is the signal times Σ s_i (x/L)^i", None, otherwise="uniform, without at"
@@ -68,12 +69,12 @@ class Load(Table):
 
     @property
     def _extent(self) -> tuple[float, float]:
-        """From when to when it is not 0 [s], counted from `since`."""
+        """Interval in which it is not 0 [s], counted from `since`."""
         return -inf, inf
 
     @property
     def _bends(self) -> tuple[float, ...]:
-        """When it jumps or bends [s], counted from `since`."""
+        """Times at which it jumps or has a kink [s], counted from `since`."""
         return ()
 
     @property
@@ -93,7 +94,7 @@ class Load(Table):
 
     @property
     def rate(self) -> float:
-        """Rate of an oscillation that goes on and on [rad/s], 0 for any other signal."""
+        """Rate of an oscillation without end [rad/s], 0 for any other signal."""
         return 0.0
 
     @property
@@ -103,7 +104,7 @@ class Load(Table):
 
     @property
     def kinks(self) -> list[float]:
-        """Times at which it jumps or bends [s], ascending, each worth the end of a step."""
+        """Times at which it jumps or has a kink [s], ascending; a step ends at each."""
         return [self.since + bend for bend in sorted(set(self._bends))]
 
     @property
@@ -113,7 +114,7 @@ class Load(Table):
 
     @property
     def notes(self) -> list[str]:
-        """What reading its file did to the lines, for people."""
+        """Changes made to the lines of its file, in words."""
         return []
 
     def is_finer_than(self, macro_step: float | None) -> bool:
@@ -236,7 +237,7 @@ class TrapezoidLoad(_Pulse):
     """A pulse that rises and falls evenly, and is constant between."""
 
     signal: Literal["trapezoid"] = key("–", "a pulse that rises, stays and falls", "trapezoid")
-    rise: float = key("s", "how long it rises, and falls", gt=0.0)
+    rise: float = key("s", "duration of the rise, and of the fall", gt=0.0)
 
     @model_validator(mode="after")
     def _has_time_to_fall(self) -> Self:
@@ -361,7 +362,7 @@ def _record(path: Path, modified: int, interpolation: str, unit: str, reading: R
     times, columns = recorded.read({1: unit})
     values = columns[1]
     notes = [note for note in recorded.notes if not note.endswith("is assumed")]
-    from scipy.interpolate import CubicSpline, PPoly  # takes half a second to load: only for who has a table
+    from scipy.interpolate import CubicSpline, PPoly  # takes half a second to load: only if there is a table
 
     if interpolation == "cubic":
         spline = CubicSpline(times, values)

@@ -1,6 +1,6 @@
-"""What is said of keys, values and scenes: the keys in words and as a JSON Schema, what is wrong and what is allowed.
+"""Texts about keys, values and scenes: descriptions of keys in words and as a JSON Schema, and error messages.
 
-What is said of a key, in errors as in tables, is read from the JSON Schema of its declaration.
+The text about a key, in errors as in tables, is read from the JSON Schema of its declaration.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from .partners import LOWER, PARTNERS, UPPER, ForeignFmu
 from .scene import TABLES, Scene
 from .tables import OneOf, SceneError, Table
 
-#: What a table is one of, by its name.
+#: Alternatives for a table, by its name.
 VARIANTS: dict[str, OneOf] = {"beam": UPPER, "spring": LOWER, "contact": LAW, "loads": SIGNAL}
 _ELEMENTS = replace(UPPER, tables={name: PARTNERS[name] for name in UPPER.named}, default="")
-#: Tables by their names, "" is what stands outside of them, and by theirs the bodies that are not our own; or what a
-#: table is one of.
+#: Tables by their names ("" for the keys outside of tables), and bodies that are not our own by theirs; or the
+#: alternatives for a table.
 MODELS: dict[str, type[Table] | OneOf] = {
     "": Scene,
     **TABLES,
@@ -55,7 +55,7 @@ _BOUNDS = {
 class Key(NamedTuple):
     """One key of a scene file; ``table`` is "" for those outside a table.
 
-    ``of`` says which tables have the key, where a table is one of several and not all do.
+    ``of`` names the alternatives of the table that have the key, if not all do.
     """
 
     table: str
@@ -71,14 +71,13 @@ class Key(NamedTuple):
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of a scene file (draft 2020-12), for editors and other programs.
 
-    It has each key alone: meaning, type and range. What several keys decide together, as which of them a table needs,
-    is left to `springbeam.scene.rules`.
+    It has meaning, type and range of each key alone; conditions on several keys are in `springbeam.scene.rules`.
     """
     found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scene.model_json_schema()}
     for described in (found, *found["$defs"].values()):
         described.pop("required", None)
         for key in described["properties"].values():
-            # What says nothing about a file is left out: TOML has no null, and names are titles enough.
+            # Left out: null, which TOML does not have, and titles, which repeat the names.
             key |= key.pop("anyOf", [{}])[0]
             for name, empty in (("title", key.get("title")), ("default", None), ("otherwise", "")):
                 if name in key and (key[name] == empty or isinstance(key[name], dict)):
@@ -90,7 +89,7 @@ def schema() -> dict[str, Any]:
 
 
 def models_of(table: str) -> dict[str, type[Table]]:
-    """Return what the table of that name may be, by the values of its key that says so.
+    """Return the alternatives for the table of that name, by the value of the key that chooses.
 
     ``"loads.0"`` is the first of ``[[loads]]``. Empty if there is no such table.
     """
@@ -100,7 +99,7 @@ def models_of(table: str) -> dict[str, type[Table]]:
 
 
 def keys_of(*models: type[Table]) -> dict[str, dict[str, Any]]:
-    """Return what the JSON Schema says of each key of tables; of a key that several have, what it says of the first."""
+    """Return the JSON Schema of each key of tables; of a key that several have, that of the first."""
     found: dict[str, dict[str, Any]] = {}
     for model in models:
         found = {**schema()["$defs"].get(model.__name__, schema())["properties"], **found}
@@ -108,7 +107,7 @@ def keys_of(*models: type[Table]) -> dict[str, dict[str, Any]]:
 
 
 def allowed(key: Mapping[str, Any]) -> str:
-    """Return in words what a key of `keys_of` may be."""
+    """Return in words the allowed values of a key of `keys_of`."""
     if choices := key.get("enum") or [key[name] for name in ("const",) if name in key]:
         return " or ".join(json.dumps(choice, ensure_ascii=False) for choice in choices)
     bounds = " and ".join(f"{words} {key[name]:.15g}" for name, words in _BOUNDS.items() if name in key)
@@ -122,7 +121,7 @@ def listed(table: str | None = None) -> list[Key]:
 
 
 def _keys(table: str) -> Iterator[Key]:
-    """Yield the keys of one of `MODELS`; one that several of its tables have alike once."""
+    """Yield the keys of one of `MODELS`; a key that several of its tables share once."""
     model = MODELS[table]
     choice = model if isinstance(model, OneOf) else OneOf(model, "", "", {"": model}, "")
     found: dict[Key, list[str]] = {}
@@ -140,12 +139,12 @@ def _keys(table: str) -> Iterator[Key]:
 
 
 def either(texts: Iterable[str]) -> str:
-    """Return texts as an error offers them: ``"a" or "b"``."""
+    """Return a choice of texts for an error: ``"a" or "b"``."""
     return " or ".join(json.dumps(text, ensure_ascii=False) for text in texts)
 
 
 def heading(table: str) -> str:
-    """Return how a table of `MODELS` stands in a file."""
+    """Return the heading of a table of `MODELS` in a file."""
     if table in ("fmu", "element"):
         return f"[beam] or [spring] with {table}"
     return "outside the tables" if not table else "[[loads]], any number" if table == "loads" else f"[{table}]"
@@ -157,7 +156,7 @@ def unit_of(table: str, key: str) -> str:
 
 
 def about(table: str) -> str:
-    """Return what a table describes, and what each of those that it may be."""
+    """Return the description of a table and of each of its alternatives."""
     model = MODELS[table]
     if not isinstance(model, OneOf):
         return described(model)
@@ -181,7 +180,7 @@ def _default(model: type[Table], name: str, key: Mapping[str, Any]) -> str:
 
 # -- errors ------------------------------------------------------------------------------------------------------------
 
-#: Keys and values that scenes had once, as ``[table] key`` or ``[table] key = value``, and what to do instead.
+#: Former keys and values, as ``[table] key`` or ``[table] key = value``, and their replacement.
 GONE: dict[str, str] = {
     '[coupling] scheme = "hermite"': 'is gone; use "energy", whose velocities now agree at every row',
     '[coupling] scheme = "auto"': "is gone; leave scheme and degree out: the highest degree that fits is the default",
@@ -216,7 +215,7 @@ def key_kind(table: str, key: str) -> type:
 
 
 def explain(error: Any) -> str:
-    """Return a line ``[table] key = value: what is wrong and what would be allowed`` for one of pydantic's errors."""
+    """Return a line ``[table] key = value: fault and allowed values`` for one of pydantic's errors."""
     kind = error["type"]
     value = error["input"]
     table, *keys = map(str, error["loc"])
@@ -257,18 +256,18 @@ def _unknown(place: str, name: str, there: Iterable[str]) -> str:
 
 
 def nearest(name: str, candidates: Iterable[str]) -> str:
-    """Return a question after the candidate that is most like ``name``, "" if none is."""
+    """Return a question that offers the candidate most similar to ``name``, or ""."""
     close = difflib.get_close_matches(name, candidates, n=1)
     return f"did you mean {close[0]}? " if close else ""
 
 
 def toml_of(value: Any) -> str:
-    """Return a value as it may stand in a file, in one line of at most 60 characters."""
+    """Return a value in TOML syntax, in one line of at most 60 characters."""
     return one_line(json.dumps(value, ensure_ascii=False, default=str))
 
 
 def one_line(text: str, longest: int = 60) -> str:
-    """Return ``text`` with what cannot be printed replaced, cut to ``longest`` characters."""
+    """Return ``text`` with unprintable characters replaced, cut to ``longest`` characters."""
     text = "".join(c if c.isprintable() else "�" for c in text)
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
@@ -294,8 +293,8 @@ def filled(scene: Scene, text: str, **numbers: Any) -> str:
 class Rule(NamedTuple):
     """Condition and text of a message about a scene; `filled` explains ``text``.
 
-    ``when`` and ``numbers`` get the scene, and what of it the rule is for. If ``when`` returns a dict, these are the
-    numbers. ``{load.key}`` is a key of the load that the rule is for.
+    ``when`` and ``numbers`` get the scene, and the load that the rule is for. If ``when`` returns a dict, these are the
+    numbers. ``{load.key}`` is a key of that load.
     """
 
     when: Callable[..., object]
@@ -304,14 +303,14 @@ class Rule(NamedTuple):
 
 
 def texts_of(scene: Scene, rules: Iterable[Rule], *of: Any) -> Iterator[str]:
-    """Yield what ``rules`` tell of ``scene``, and of what in it they are for."""
+    """Yield the messages of the ``rules`` that ``scene`` violates."""
     for rule in rules:
         if found := rule.when(scene, *of):
             yield filled(scene, rule.text, **(found if isinstance(found, dict) else rule.numbers(scene, *of)))
 
 
 def texts_of_loads(scene: Scene, rules: Sequence[Rule]) -> Iterator[str]:
-    """Yield what ``rules`` tell of each load of ``scene``, which is ``[load]`` in their texts."""
+    """Yield the messages of the ``rules`` that loads of ``scene`` violate; ``[load]`` in their texts is the load."""
     for number, load in enumerate(scene.loads):
         name = f"loads.{number}"
         texts = [rule.text.replace("{load.", f"{{{name}.").replace("[load]", f"[{name}]") for rule in rules]

@@ -18,8 +18,8 @@ def tip_modes(beam: Beam) -> tuple[np.ndarray, np.ndarray]:
     """Return the frequencies of the mesh [rad/s], the lowest first, and the tip's displacement in modes of unit mass
     [1/√kg].
 
-    Elements of a higher degree and those with the averaged mass are more accurate: fine linear ones stand for them.
-    Both energies are sums of squares, so that low frequencies are not lost beside the high ones of a slender beam.
+    Elements of a higher degree and those with the averaged mass are represented by fine linear ones. Both energies are
+    sums of squares, so that rounding of the high frequencies of a slender beam does not destroy the low ones.
     """
     linear = beam.element_degree == 1 and beam.mass_matrix == "consistent"
     n = min(beam.n_elements, _ELEMENTS) if linear else _ELEMENTS

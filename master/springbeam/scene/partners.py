@@ -1,7 +1,7 @@
-"""Bodies that take the place of our beam or our spring: an FMU that others made, or an element of a few keys.
+"""Bodies in place of our beam or our spring: an FMU of others, or an element of a few keys.
 
-``[beam]`` is the body whose end is above, ``[spring]`` the one below. Either table is our own body, or, by its key
-``fmu`` or ``element``, one of these.
+``[beam]`` is the upper body, ``[spring]`` the lower one. Either table is our own body, or, by its key ``fmu`` or
+``element``, one of these.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .tables import Beam, OneOf, Spring, Table, key
 class ForeignFmu(Table):
     """A co-simulation FMU of FMI 2.0 or 3.0 with one end that a force moves, and the names of its variables.
 
-    What has no name decides what can be offered: `springbeam.bodies.gate`.
+    Missing names limit the couplings that are possible (`springbeam.bodies.gate`).
     """
 
     INPUTS: ClassVar = ("force", "impulse")
@@ -30,12 +30,10 @@ class ForeignFmu(Table):
     integral: str | None = key("m·s", "output: ∫ x dτ over the last step, 0 at its start", None)
     integral_2: str | None = key("m·s²", "output: ∫∫ x dτ dτ over the last step", None)
     acceleration: str | None = key(
-        "m/s²", "output, upward", None, otherwise="the derivative of the velocity, or a trial step, tells it"
+        "m/s²", "output, upward", None, otherwise="the derivative of the velocity, or computed by a trial step"
     )
     impulse: str | None = key("N·s", "input, upward, applied at the start of the next step", None)
-    mass: float | None = key(
-        "kg", "what an impulse or a force meets at first", None, gt=0.0, otherwise="it is measured"
-    )
+    mass: float | None = key("kg", "mass that an impulse moves", None, gt=0.0, otherwise="it is measured")
     kinetic_energy: str | None = key("J", "output", None)
     potential_energy: str | None = key("J", "output", None)
     dissipated_energy: str | None = key("J", "output, since the start", None)
@@ -52,7 +50,7 @@ class ForeignFmu(Table):
 
     @property
     def integrals(self) -> int:
-        """How many integrals of its displacement it tells."""
+        """Number of integrals of its displacement that it has."""
         return 0 if self.integral is None else 1 if self.integral_2 is None else 2
 
 
@@ -64,7 +62,7 @@ class PointMassElement(Table):
 
     element: Literal["point_mass"] = key("–", "a free mass")
     mass: float = key("kg", "mass m", gt=0.0)
-    displacement: float = key("m", "where it is at the start", 0.0)
+    displacement: float = key("m", "position at the start", 0.0)
     velocity: float = key("m/s", "velocity at the start, upward", 0.0)
     external_force: float = key("N", "constant force f, upward", 0.0)
 
@@ -81,12 +79,12 @@ class SpringDamperElement(PointMassElement):
 
 
 class RigidWallElement(Table):
-    """An end that is held at rest, whatever acts on it."""
+    """An end that is held at rest under any force."""
 
     START = "position"
     AT_GAP = ("position",)
 
-    element: Literal["rigid_wall"] = key("–", "an end that nothing moves")
+    element: Literal["rigid_wall"] = key("–", "an end at rest under any force")
     position: float = key("m", "where it is", 0.0)
 
 
@@ -102,7 +100,7 @@ OWN = "own"
 
 
 def kind_of(table: Any) -> str:
-    """Return which body a table describes: a key of `PARTNERS`, `OWN`, or an ``element`` that there is not."""
+    """Return the kind of body of a table: a key of `PARTNERS`, `OWN`, or an unknown ``element``."""
     if not isinstance(table, dict):
         return next((kind for kind, model in PARTNERS.items() if type(table) is model), OWN)
     return "fmu" if "fmu" in table else str(table["element"]) if "element" in table else OWN
@@ -113,12 +111,12 @@ class _Body(OneOf):
         return kind_of(content)
 
     def kept(self, content: dict[str, Any], kind: str) -> dict[str, Any]:
-        """Return nothing: what another body's keys say is not said of this one."""
+        """Return nothing: keys of another body do not apply to this one."""
         return {}
 
 
 def _body(own: type[Table]) -> OneOf:
-    return _Body(Table, "element", "which body takes the place of our own", {OWN: own, **PARTNERS}, OWN)
+    return _Body(Table, "element", "the body in place of our own", {OWN: own, **PARTNERS}, OWN)
 
 
 UPPER = _body(Beam)

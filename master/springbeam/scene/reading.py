@@ -75,7 +75,7 @@ def _scene_file(path_or_name: str | Path) -> Path:
 
 
 def _settings(overrides: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Return values by table and key; of two for one key the last counts."""
+    """Return values by table and key; the last of two for one key counts."""
     settings: dict[str, dict[str, Any]] = {}
     for override in overrides:
         target, separator, value = override.partition("=")
@@ -126,7 +126,7 @@ def _loads(data: Mapping[str, Any]) -> list[Any]:
 def _change(data: dict[str, Any], table: str, changes: Mapping[str, Any]) -> None:
     """Set keys of a table, made where it is missing.
 
-    One way to give a thing takes the place of another, unless both are new. Raises SceneError if there is no such
+    A new key replaces another one that gives the same value, unless both are new. Raises SceneError if there is no such
     load, or if the scene's accuracy picks one of the keys.
     """
     loads = {f"loads.{i}": load for i, load in enumerate(_loads(data))}

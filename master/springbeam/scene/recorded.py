@@ -1,4 +1,4 @@
-"""Files of measured columns: a record as a load, or one to lay beside a run.
+"""Files of measured columns: a record as a load, or one to compare with a run.
 
 The first column is the time. The first line may name the columns, each with its unit in brackets, as ``time [ms],
 acceleration [g]`` or ``time (ms)``; or a second line has the units. Tabs part the columns where every line has one,
@@ -28,27 +28,27 @@ else:
 #: Standard gravity [m/s²].
 GRAVITY = 9.80665
 _NAME_AND_UNIT = re.compile(r"^\s*(.*?)(?:\s*\[(.*)\]|\s+\((.*)\))?\s*$")
-#: Marks at the beginning of a file by which it says its encoding.
+#: Byte order marks, which give the encoding of a file.
 _MARKS = {codecs.BOM_UTF8: "utf-8", codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
-#: What stands for a value that is missing, in any case.
+#: Spellings of a missing value, in lower or upper case.
 _NOTHING = ("", "nan", "na", "n/a", "null", "-", "--", "---")
 
 
 class Reading(Table):
     """How a file of measured columns is read."""
 
-    decimal: Literal[".", ","] = key("–", "file: what decimals begin with", ".")
+    decimal: Literal[".", ","] = key("–", "file: decimal separator", ".")
     encoding: Literal["utf-8", "utf-16-le", "utf-16-be", "latin-1"] | None = key(
-        "–", "file: how its characters are written", None, otherwise="as its byte order mark says, UTF-8 without one"
+        "–", "file: encoding", None, otherwise="by its byte order mark; without one UTF-8"
     )
-    skip_lines: int = key("–", "file: how many lines to skip at its beginning", 0, ge=0)
+    skip_lines: int = key("–", "file: number of lines to skip at its beginning", 0, ge=0)
     units_row: bool = key("–", "file: whether the line after the names of the columns has their units", False)
     missing: Literal["refuse", "drop", "interpolate"] = key(
-        "–", "file: what to do where a value is missing: drop the line, or interpolate between its neighbours", "refuse"
+        "–", "file: treatment of missing values: drop the line, or interpolate between its neighbours", "refuse"
     )
     repeats: Literal["refuse", "first", "mean"] = key(
         "–",
-        "file: what to do with times that repeat or go back: keep those after all before, or sort and take means",
+        "file: treatment of times that repeat or decrease: keep those after all before, or sort and take means",
         "refuse",
     )
 
@@ -58,7 +58,7 @@ class Recorded:
 
     def __init__(self, path: Path, reading: Reading | None = None) -> None:
         self._reading = reading or Reading()
-        #: What was done to the data, for people.
+        #: Changes made to the data, in words.
         self.notes: list[str] = []
         lines = list(enumerate(self._text(path.read_bytes()).splitlines(), 1))[self._reading.skip_lines :]
         kept = [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
@@ -98,7 +98,7 @@ class Recorded:
         """Return the cells of lines, all of as many columns."""
         if not lines:
             return []
-        import pyarrow as arrow  # takes a tenth of a second: only for who has a file
+        import pyarrow as arrow  # takes a tenth of a second: only if there is a file
         from pyarrow import csv as arrow_csv
 
         separator = next((mark for mark in "\t;" if all(mark in line for line in lines)), ",")
@@ -128,8 +128,8 @@ class Recorded:
     def read(self, wanted: Mapping[int, str]) -> tuple[np.ndarray, dict[int, np.ndarray]]:
         """Return the times [s], ascending, shape (n,), and columns by their numbers, shapes (n,).
 
-        ``wanted`` are the units in which the columns are to be, by number; "" leaves one as it is. What was done to the
-        data is then in `notes`.
+        ``wanted`` are the units of the result by number of the column; "" leaves a column as it is. `notes` then has
+        the changes made to the data.
         """
         values = np.array([self._values(k, unit) for k, unit in {0: "s", **wanted}.items()])
         values = self._ascending(self._present(values))
@@ -225,12 +225,12 @@ class Recorded:
 
 
 def _factor(unit: str, wanted: str, label: str) -> float:
-    """Return what a value in ``unit`` is multiplied by to have it in ``wanted``; 1 where one of them is not known."""
+    """Return the factor from ``unit`` to ``wanted``; 1 if one of them is not known."""
     if not unit or wanted in ("", unit):
         return 1.0
     if (unit, wanted) == ("g", "m/s²"):
         return GRAVITY
-    from pint import PintError, Quantity  # takes a second: only for who has units to convert
+    from pint import PintError, Quantity  # takes a second: only if there are units to convert
 
     try:
         return float(Quantity(1.0, unit.replace("·", "*")).to(wanted.replace("·", "*")).magnitude)

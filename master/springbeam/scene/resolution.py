@@ -1,8 +1,7 @@
-"""Judge whether the macro step resolves the motion, and say what would.
+"""Judge whether the macro step resolves the motion, and name a remedy.
 
-When a run is called *not resolved*, and why, is in ``docs/coupling.md``, "Is the motion resolved?"; the constants are
-its limits. Frequencies are those of the beam, not of its mesh, so that asking costs next to nothing;
-`springbeam.studies.stability.predict` has the mesh's. Longer than other modules by the table of what is told.
+``docs/coupling.md``, "Is the motion resolved?", has the definition; the constants are its limits. Frequencies are those
+of the beam, not of its mesh, which cost little; `springbeam.studies.stability.predict` has those of the mesh.
 """
 
 from __future__ import annotations
@@ -27,22 +26,22 @@ from .tables import ORDINARY_SCHEMES, Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
 TURN = 1.0
-#: By degree d of the force: a step that turns spring and massless beam by x rad makes them late by x^(2d + 2) over this
-#: of itself, as a Gauss collocation of d + 1 stages would (for d = 0 the midpoint rule).
+#: By degree d of the force: a step that turns spring and massless beam by x rad makes them lag by the share
+#: x^(2d + 2) over this, like a Gauss collocation of d + 1 stages (for d = 0 the midpoint rule).
 COLLOCATION = (12.0, 720.0, 100800.0)
-#: By which angle all of them together may lag [rad]. Positions are off by up to 0.75 of it, so by about 1 %.
+#: Largest lag of all steps together [rad]. Positions have errors of up to 0.75 of it, about 1 %.
 LAG = 0.015
-#: Share of its way that an end may be from where the law of the contact would have it, by degree of the force: a soft
-#: law, a tie. At degree 0 it is mostly known to some tenths of itself; it leaves out what the force of a higher degree
-#: feels of the fastest waves, and what ends that part decide from one step to the next.
+#: Largest distance of an end from its position under the contact law, as a share of its motion, by degree of the force:
+#: a soft law, a tie. The estimate leaves out force errors of the fastest waves and effects of separations.
 MISPLACED = (0.006, 0.002, 0.001)
 MISPLACED_TIED = (0.0025, 0.002, 0.001)
-#: Share of its way by which what the steps leave out of measured loads may move an end; that is known to a factor of 3.
+#: Largest displacement of an end by the part of measured loads that the steps leave out, as a share of its motion;
+#: known to a factor of 3.
 LEFT_OUT = 0.01
-#: Share of its way by which an end may be off between the rows, as `springbeam.results.dense.between_rows` tells it.
+#: Largest error of an end between the rows, as a share of its motion (`springbeam.results.dense.between_rows`).
 BETWEEN_ROWS = 0.01
-#: By which angle the midpoint rule may let waves lag at the end of the run [rad]: the fastest ones that an impact sets
-#: off; where nothing strikes, those of a few times the beam's lowest frequency, or of a load, which move the tip more.
+#: Largest lag of waves at the end of the run by the midpoint rule [rad]: of the fastest ones that an impact excites;
+#: without an impact, of a few times the beam's lowest frequency, or of a load, which move the tip more.
 WAVE_LAG = 1.0
 SMOOTH_LAG = 0.01
 SMOOTH_WAVES = 5.0
@@ -50,7 +49,7 @@ SMOOTH_WAVES = 5.0
 BENT = 1e-4
 #: Macro steps that a contact must last for its end not to be decided by the force of one or two of them.
 SHORT = 1.0
-#: Share of the smaller momentum of both bodies that the force of a short contact may pass on: it is none to speak of.
+#: Impulse of a short contact, as a share of the smaller momentum of both bodies, below which it is ignored.
 SHORT_IMPULSE = 0.1
 #: Periods of the fastest wave of the mesh that a window must hold for the mean of a rigid force to be settled to 5 %.
 SETTLED = 2.5
@@ -60,7 +59,7 @@ _HIGHER = ", a higher coupling.degree allows longer ones"
 
 
 class _Seen(NamedTuple):
-    """What a run shows of its resolution, as parameters of `not_resolved`."""
+    """Measures of the resolution of a run: parameters of `not_resolved`."""
 
     misplaced: float
     shortest_contact: float
@@ -80,23 +79,23 @@ def not_resolved(
     H: float | None = None,
     oscillations: Sequence[tuple[str, float, str]] | None = None,
 ) -> str | None:
-    """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
+    """Return in words why the run did not resolve its motion, and a remedy; ``None`` if it did.
 
     Parameters
     ----------
     scene
         The scene as run.
     misplaced
-        How far an end is from where the law of the contact would have it, relative to its displacement.
+        Distance of an end from its position under the contact law, relative to its displacement.
     shortest_contact
-        How long the shortest contact, touch or rest on the foundation has lasted [s]; of a soft law it counts where the
-        force is exchanged once per macro step.
+        Duration of the shortest contact, touch or rest on the foundation [s]; for a soft law it counts if the force is
+        exchanged once per macro step.
     left_out
-        How far what the steps leave out of tables moves an end, relative to its displacement.
+        Displacement of an end by the part of tables that the steps leave out, relative to its displacement.
     between_rows
-        How far an end may be from its curve between the rows, relative to its displacement.
+        Distance of an end from its curve between the rows, relative to its displacement.
     H
-        Steps of one length that make waves as late as those of the run [s]; needed if these follow from tolerances.
+        Steps of one length that make waves lag like those of the run [s]; needed if these follow from tolerances.
     oscillations
         As of `slow_oscillations`, which is the default.
     """
@@ -106,18 +105,18 @@ def not_resolved(
 
 
 def lateness(scene: Scene, turn: float) -> float:
-    """Return by which share of itself a step that turns a contact by ``turn`` [rad] makes it late."""
+    """Return the relative lag of a contact that turns by ``turn`` [rad] in a step."""
     degree = _force_degree(scene)
     return turn ** (2 * degree + 2) / COLLOCATION[degree]
 
 
 def _force_degree(scene: Scene) -> int:
-    """Return the degree of a contact force that is as accurate as its degree allows; exchanges are no better than 0."""
+    """Return the degree of the contact force; 0 for exchanges, which are no more accurate."""
     return scene.degree if scene.coupling.scheme == "energy" else 0
 
 
 def _too_fast(scene: Scene, seen: _Seen) -> dict[str, Any]:
-    """Return what turns too far in a macro step, nothing if all is slower."""
+    """Return the oscillation that turns too far in a macro step, nothing if all are slower."""
     H = scene.coupling.H
     found = (
         {"name": name, "turn": omega * H, "size": _rounded_down(TURN / omega), "otherwise": otherwise}
@@ -128,10 +127,10 @@ def _too_fast(scene: Scene, seen: _Seen) -> dict[str, Any]:
 
 
 def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
-    """Return how far the forces of the steps miss the law of the contact, nothing if they keep close to it.
+    """Return the effect of the difference between the forces of the steps and the contact law, nothing if it is small.
 
-    Waves that the steps do not follow let ``misplaced`` fall with the square of H only, and unevenly: the step that is
-    named is half of what the square asks for.
+    With unresolved waves ``misplaced`` decreases only with the square of H, and unevenly; so the step that is named is
+    half of what the square gives.
     """
     limits = MISPLACED_TIED if scene.contact.rigid else MISPLACED
     coupling = scene.coupling
@@ -146,7 +145,7 @@ def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
 
 
 def _lags(scene: Scene, seen: _Seen) -> dict[str, Any]:
-    """Return by how much steps make spring and massless beam together late, nothing if they follow them."""
+    """Return the lag of spring and massless beam together, nothing if it is small."""
     omega = joined_frequency(scene)
     degree = _force_degree(scene)
     H = scene.coupling.H
@@ -164,22 +163,22 @@ def _lags(scene: Scene, seen: _Seen) -> dict[str, Any]:
 
 
 def _struck(scene: Scene) -> Beam | None:
-    """Return our beam if it has inertia and something, whatever body, is there for its tip to meet."""
+    """Return our beam if it has inertia and there is a body that its tip can meet."""
     meets = scene.lower is not None or scene.stop is not None
     return scene.beam if meets and not scene.massless else None
 
 
 def _waves_lag(scene: Scene, seen: _Seen) -> dict[str, Any]:
-    """Return by how much the midpoint rule makes waves of the beam late, nothing if it follows them.
+    """Return the lag of waves of the beam by the midpoint rule, nothing if it is small.
 
-    Neither a mismatch of velocities nor the energy would tell. A beam that starts bent to a straight line springs back
-    from its clamp as from an impact.
+    Neither a mismatch of velocities nor the energy shows it. A beam that starts bent to a straight line springs back
+    from its clamp like after an impact.
     """
     beam = scene.beam
     if beam is None or scene.massless or beam.integrator == "modal":
         return {}
     H = seen.H or scene.coupling.H
-    waves = "the fastest waves that an impact or a bent start sets off"
+    waves = "the fastest waves of an impact or a bent start"
     omega = impact_frequency(beam)
     limit = WAVE_LAG
     bent = not scene.static and bent_energy(scene, beam) > BENT * initial_kinetic_energy(beam)
@@ -193,21 +192,21 @@ def _waves_lag(scene: Scene, seen: _Seen) -> dict[str, Any]:
 
 
 def window_of(scene: Scene, omega: float) -> float:
-    """Return `WINDOW` of a period at ``omega`` [rad/s], of the run where nothing oscillates [s]."""
+    """Return the share `WINDOW` of a period at ``omega`` [rad/s], or of the run if nothing oscillates [s]."""
     return WINDOW * (2.0 * pi / omega if omega > 0.0 else scene.time.t_end)
 
 
 def peak_force_doubt(scene: Scene) -> str | None:
-    """Return why the peak contact force of the run is unreliable, and the remedy; ``None`` if it can.
+    """Return why the peak contact force of the run is unreliable, and the remedy; ``None`` if it is reliable.
 
-    At a rigid impact the force at an instant grows with the mesh. Its mean over a window settles where the window is
+    At a rigid impact the force at an instant grows with the mesh. Its mean over a window converges if the window is
     longer than `SETTLED` periods of the fastest wave kept (``docs/choose.md`` has the numbers).
     """
     return next(texts_of(scene, (_MESH_DECIDES,)), None)
 
 
 def _settling(scene: Scene) -> dict[str, float]:
-    """Return the window of the peak force and a longer one in which it settles, nothing if the mesh does not count."""
+    """Return the window of the peak force and one in which it converges, nothing if the mesh has no effect."""
     beam = _struck(scene)
     if beam is None or not scene.contact.rigid:
         return {}
@@ -217,7 +216,7 @@ def _settling(scene: Scene) -> dict[str, float]:
 
 
 def slow_oscillations(scene: Scene) -> list[tuple[str, float, str]]:
-    """Return (name, frequency [rad/s], what else would help) of each of our bodies and of each load that oscillates."""
+    """Return (name, frequency [rad/s], other remedy) of each of our bodies and of each load that oscillates."""
     found = []
     beam = scene.beam
     spring = scene.spring
@@ -230,7 +229,7 @@ def slow_oscillations(scene: Scene) -> list[tuple[str, float, str]]:
 
 
 def oscillating(scene: Scene, bodies: Iterable[tuple[str, float, float]]) -> list[tuple[str, float, str]]:
-    """Return as `slow_oscillations`, of ``bodies`` as (table, frequency [rad/s], damping ratio); others creep."""
+    """Return `slow_oscillations` of ``bodies``, each (table, frequency [rad/s], damping ratio), if not overdamped."""
     found = []
     for table, omega, ratio in bodies:
         if omega > 0.0 and ratio < 1.0:
@@ -243,7 +242,7 @@ def oscillating(scene: Scene, bodies: Iterable[tuple[str, float, float]]) -> lis
 
 
 def _shorter(scene: Scene, times: float) -> str:
-    """Return what makes steps ``times`` as short."""
+    """Return a remedy that makes steps ``times`` as short."""
     if scene.coupling.adaptive:
         return "smaller tolerances resolve it"
     return f"coupling.macro_step <= {_rounded_down(scene.coupling.H / times)} resolves it"
@@ -254,9 +253,9 @@ def _rounded_down(size: float) -> str:
     return f"{0.95 * size:.1e} s"
 
 
-# -- what is told ---------------------------------------------------------------------------------------------------
+# -- messages -------------------------------------------------------------------------------------------------------
 
-#: How steps of one length may fail; the first that holds is told.
+#: Faults of steps of one length; the first that holds is reported.
 _OF_EQUAL_STEPS = (
     Rule(
         _too_fast,
@@ -269,8 +268,7 @@ _OF_EQUAL_STEPS = (
         "end; coupling.macro_step <= {size} resolves it{higher}",
     ),
 )
-#: How steps may fail, also those that follow from tolerances: these are judged by what they add up to, since by their
-#: own error they follow the ends.
+#: Faults of all steps, also of those that follow from tolerances, which are judged by their accumulated effect.
 _OF_ALL_STEPS = (
     Rule(
         _waves_lag,
@@ -280,8 +278,8 @@ _OF_ALL_STEPS = (
     ),
     Rule(  # loads whose frequencies the scene does not give
         lambda s, seen: seen.left_out > LEFT_OUT,
-        "not resolved: what the steps leave out of the tables of loads moves an end by about {far:.2g} % of its way, "
-        "since a mode of it turns far in a step; {remedy}",
+        "not resolved: the part of the tables of loads that the steps leave out moves an end by {far:.2g} % of its "
+        "motion, since a mode of it turns far in a step; {remedy}",
         lambda s, seen: {
             "far": 100.0 * seen.left_out,
             "remedy": _shorter(s, (seen.left_out / LEFT_OUT) ** (1.0 / 3.0)),
@@ -289,7 +287,7 @@ _OF_ALL_STEPS = (
     ),
     Rule(
         _law_missed,
-        "not resolved: the forces of the steps differ from the contact law, which moves an end by {far} of its way. "
+        "not resolved: the forces of the steps differ from the contact law, which moves an end by {far} of its motion. "
         "Velocities, forces and times of contact are samples of a faster motion; {remedy}",
     ),
     Rule(  # a force that does not see the contact end
@@ -307,8 +305,8 @@ _OF_ALL_STEPS = (
     ),
     Rule(  # rows that are right; it falls no slower than with H where twice as many steps follow what turned by π
         lambda s, seen: seen.between_rows > BETWEEN_ROWS,
-        "not resolved: between the rows an end may be off by {far:.2g} % of its way, since it moves to and fro within "
-        "a step; {remedy}",
+        "not resolved: between the rows an end may have an error of {far:.2g} % of its motion, since it oscillates "
+        "within a step; {remedy}",
         lambda s, seen: {
             "far": 100.0 * seen.between_rows,
             "remedy": _shorter(s, 2.0 * seen.between_rows / BETWEEN_ROWS),
@@ -318,5 +316,5 @@ _OF_ALL_STEPS = (
 _MESH_DECIDES = Rule(
     _settling,
     "the peak contact force, a mean over {window:.2g} s, depends on the mesh: {contact.law} is rigid. "
-    "contact.force_window >= {longer:.2g} s, more elements or more modes settle it",
+    "contact.force_window >= {longer:.2g} s, more elements or more modes remove this",
 )

@@ -1,6 +1,6 @@
-"""Errors of scenes whose values are allowed one by one: which keys and values do not go together.
+"""Errors of scenes whose values are valid one by one: keys and values that contradict each other.
 
-Longer than other modules, since nearly all of it is one table of such rules.
+Nearly all of the module is one table of such rules.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def impossible(scene: Scene) -> list[str]:
 
 
 def _is_finite(beam: Beam) -> bool:
-    """Return whether doubles hold what the equations are made of: EI, KAG, ρA, ρI, squares of wave speeds, 1/k."""
+    """Return whether the coefficients EI, KAG, ρA, ρI, squares of wave speeds and 1/k are finite doubles above 0."""
     stiffness = (bending_stiffness(beam), shear_stiffness(beam))
     inertia = (beam.density * beam.area, beam.density * beam.second_moment_of_area)
     speeds = (k / m for k, m in zip(stiffness, reversed(inertia), strict=True))
@@ -65,12 +65,12 @@ def _wall_below(scene: Scene) -> bool:
 
 
 def _averages(scene: Scene) -> bool:
-    """Return whether our beam's integrator sees only the mean of a force over a step that the scene asks for."""
+    """Return whether a degree above 0 is given, and our beam's integrator depends only on the mean force of a step."""
     return scene.accuracy is None and scene.beam is not None and scene.beam.integrator == "midpoint"
 
 
 def _rests(body: Table | None) -> bool:
-    """Return whether a body, if there is one, has a place of rest under loads that this package finds."""
+    """Return whether the package can compute the equilibrium of a body under loads; true if there is none."""
     own = isinstance(body, Beam | Spring | RigidWallElement | None)
     return own or (isinstance(body, SpringDamperElement) and body.stiffness > 0.0)
 
@@ -86,7 +86,7 @@ def _let_go(scene: Scene) -> bool:
 
 
 def _ends(scene: Scene) -> Mapping[str, Any]:
-    """Return where both ends are at the start, and what the tip meets, for the texts of rules."""
+    """Return the positions of both ends at the start, and what the tip meets, for the texts of rules."""
     heights = {"tip": scene.at_start("beam"), "top": scene.at_start("spring"), "target": scene.tip_target}
     return {name: at(scene, height.key) for name, height in heights.items() if height is not None} | {
         "height": heights["tip"].value if heights["tip"] else None,
@@ -96,7 +96,7 @@ def _ends(scene: Scene) -> Mapping[str, Any]:
 
 
 def _alone_in_a_well(scene: Scene) -> bool:
-    """Return whether our spring softens, starts inside its hilltops, and has no beam of ours above it."""
+    """Return whether our spring softens, starts inside its potential well, and has no beam of ours above it."""
     spring = scene.spring
     return (
         spring is not None
@@ -112,12 +112,12 @@ def _waits(scene: Scene) -> bool:
 
 
 def _given_step(scene: Scene) -> bool:
-    """Return whether the macro step is the scene's own, and not left to an accuracy or to tolerances."""
+    """Return whether the macro step is given, not found by an accuracy or by tolerances."""
     return scene.accuracy is None and scene.coupling.macro_step is not None
 
 
 def _points(scene: Scene) -> list[float]:
-    """Return where point forces act, as fractions of the beam's length."""
+    """Return the positions of point forces, as fractions of the beam's length."""
     return sorted({load.at for load in scene.loads if load.at is not None})
 
 
@@ -133,7 +133,7 @@ def _most_elements(beam: Beam) -> int:
 
 
 def _mesh(scene: Scene) -> Mapping[str, Any]:
-    """Return what the mesh of our beam has and allows, for the texts of rules."""
+    """Return sizes and limits of the mesh of our beam, for the texts of rules."""
     beam = scene.beam
     assert beam is not None
     degree = f" of element_degree = {beam.element_degree}" if beam.element_degree > 1 else ""
@@ -148,7 +148,7 @@ def _mesh(scene: Scene) -> Mapping[str, Any]:
     }
 
 
-#: What makes a scene impossible.
+#: Rules for scenes.
 FORBIDDEN: tuple[Rule, ...] = (
     # Bodies
     Rule(lambda s: s.upper is None and s.lower is None, "no body: a scene needs [beam], [spring] or both"),
@@ -224,7 +224,7 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     Rule(
         lambda s: _averages(s) and s.degree > 0,
-        '{coupling.degree}: {beam.integrator} sees only the mean of the contact force; use "modal", or degree = 0',
+        '{coupling.degree}: {beam.integrator} uses only the mean of the contact force; use "modal", or degree = 0',
     ),
     # A beam without inertia
     Rule(
@@ -339,7 +339,7 @@ FORBIDDEN: tuple[Rule, ...] = (
         lambda s: {"largest": largest_load(s.spring)},
     ),
     Rule(
-        # Nothing takes energy away or pushes back: what is above the rim of the well runs over it.
+        # Without damping or a stop the top escapes if its energy is above the rim of the well.
         lambda s: (
             _alone_in_a_well(s)
             and s.spring.damping == 0.0
@@ -387,7 +387,7 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
 )
 
-#: What makes a scene impossible with one of its loads.
+#: Rules for loads.
 FORBIDDEN_LOADS: tuple[Rule, ...] = (
     *(
         Rule(
@@ -423,7 +423,7 @@ FORBIDDEN_LOADS: tuple[Rule, ...] = (
     *(
         Rule(
             lambda s, load, table=table, end=end: load.on == end and isinstance(s.under(table), RigidWallElement),
-            f"{{load.on}}: {{{table}.element}} stays where it is under any load; take the load out",
+            f"{{load.on}}: {{{table}.element}} does not move under any load; leave the load out",
         )
         for table, end in (("beam", "tip"), ("spring", "spring"))
     ),

@@ -1,4 +1,4 @@
-"""A whole scene: its tables, and what follows from them before anything is built or loaded."""
+"""A whole scene: its tables, and values that follow from them before anything is built or loaded."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Scene(Table):
 
     @model_validator(mode="after")
     def _lower_body_at_gap(self) -> Self:
-        """Put the lower body where ``gap`` says; keys that it has itself stay, and are refused by the rules."""
+        """Set the position of the lower body by ``gap``; the rules reject keys that it has itself."""
         if self.lower is not None and self.contact.gap != 0.0:
             follows = dict.fromkeys(set(self.lower.AT_GAP) - self.lower.model_fields_set, -self.contact.gap)
             lower = self.lower.model_copy(update=follows)
@@ -68,7 +68,7 @@ class Scene(Table):
         return self.lower if isinstance(self.lower, Spring) else None
 
     def under(self, table: str) -> Table | None:
-        """Return what the scene has under ``[table]``, whatever body that is."""
+        """Return the content of ``[table]``, whatever body that is."""
         content: Table | None = getattr(self, {"beam": "upper", "spring": "lower"}.get(table, table))
         return content
 
@@ -117,9 +117,9 @@ class Scene(Table):
 
     @property
     def degree(self) -> int:
-        """Degree of the contact force over a step: what is asked for, else the highest that the bodies allow.
+        """Degree of the contact force over a step: the given one, else the highest that our bodies allow.
 
-        What FMUs of others and bodies of the caller's allow is known to a run alone.
+        Only a run knows what FMUs of others and bodies of the caller allow.
         """
         if self.coupling.degree is not None:
             return self.coupling.degree
@@ -146,10 +146,10 @@ class Scene(Table):
         return self.upper is not None and (self.lower is not None or self.elastic_stop)
 
     def at_start(self, table: str) -> StartHeight | None:
-        """Return where the end of the body ``[table]``, or the stop, is at the start.
+        """Return the position of the end of the body ``[table]``, or of the stop, at the start.
 
-        ``None`` where only an FMU knows, or it is found. For our spring that is Ψ, for our beam s₀ L, or its static
-        deflection if it is let go without inertia and damping.
+        ``None`` if only an FMU knows it, or if it is computed. For our spring it is Ψ, for our beam s₀ L, or its static
+        deflection if it is released without inertia and damping.
         """
         body = self.under(table)
         if body is None or body.START is None or self.static:
@@ -164,14 +164,14 @@ class Scene(Table):
 
     @property
     def equilibrium(self) -> float | None:
-        """Ψ [m], where the lower end is at the start if nothing loads it; ``None`` where only an FMU knows."""
+        """Ψ [m], position of the unloaded lower end at the start; ``None`` if only an FMU knows it."""
         return None if self.lower is None or self.lower.START is None else getattr(self.lower, self.lower.START)
 
     @property
     def tip_target(self) -> StartHeight | None:
-        """What the upper end meets first: the lower body, else the stop.
+        """The body that the upper end meets first: the lower body, else the stop.
 
-        ``None`` where there is nothing to meet, where only an FMU knows, or where the law joins the ends at once.
+        ``None`` if there is none, if only an FMU knows its position, or if the law joins the ends at once.
         """
         if self.upper is None or self.contact.lasting:
             return None
@@ -188,12 +188,12 @@ class Scene(Table):
 
     @property
     def duration(self) -> float:
-        """How long is run [s]: from `contact_time` on if the tip arrives undeformed."""
+        """Length of the run [s]: from `contact_time` on if the tip arrives undeformed."""
         return self.time.t_end - (self.contact_time or 0.0)
 
     @property
     def contact_time(self) -> float | None:
-        """First contact t_c [s] of an undeformed approach; ``None`` where there is none to compute beforehand."""
+        """First contact t_c [s] of an undeformed approach; ``None`` if it cannot be computed beforehand."""
         clearance = self.initial_clearance
         if self.beam is None or clearance is None or self.beam.approach == "elastic":
             return None
@@ -206,7 +206,7 @@ class Scene(Table):
     def equal_steps(self) -> tuple[int, float]:
         """Number of whole macro steps up to t_end, and the size of a last, shorter one [s], 0 if there is none.
 
-        A remainder that is next to nothing joins the step before it.
+        A negligible remainder joins the step before it.
         """
         H = self.coupling.H
         span = self.duration

@@ -18,7 +18,7 @@ import numpy as np
 
 from .tables import Beam, Spring
 
-#: Places at which the beam's shape is sampled, as fractions of its length.
+#: Positions at which the beam's shape is sampled, as fractions of its length.
 SHAPE_POINTS = np.linspace(0.0, 1.0, 21)
 
 #: Gauss–Legendre on [0, 1], exact to degree 7: M² has degree 6.
@@ -85,7 +85,7 @@ def lowest_frequency(beam: Beam) -> float:
     inertia = beam.density * beam.second_moment_of_area
     rows = ((area, u), (inertia, theta)), ((bending_stiffness(beam), curvature), (shear_stiffness(beam), strain))
     mass, stiffness = (sum(c * (B.T * weights) @ B for c, B in energy) for energy in rows)
-    # By numpy: scipy takes longer to load than all else that reads a scene.
+    # By numpy: scipy takes longer to load than everything else that reads a scene.
     to_unit_stiffness = np.linalg.inv(np.linalg.cholesky(stiffness))
     largest = np.linalg.eigvalsh(to_unit_stiffness @ mass @ to_unit_stiffness.T)[-1]
     return float(1.0 / np.sqrt(largest))
@@ -135,18 +135,18 @@ def _work(beam: Beam, start: float, virtual: Callable[[np.ndarray], tuple[np.nda
 
 @lru_cache(maxsize=64)
 def tip_reach(beam: Beam) -> float:
-    """Estimate how far the tip goes from a straight beam [m].
+    """Estimate the largest deflection of the tip [m].
 
-    That is by its loads, or by a static deflection that holds the kinetic energy of the start.
+    It is the static one under the loads, or one that stores the kinetic energy of the start.
     """
     swing = math.sqrt(2.0 * initial_kinetic_energy(beam) * tip_compliance(beam))
     return max(swing, abs(tip_load_deflection(beam)))
 
 
 def resting_height(spring: Spring, force: float) -> float | None:
-    """Return where the spring's top rests under an upward ``force`` [N], k1 x + k2 x³ = F [m].
+    """Return the equilibrium [m] of the spring's top under an upward ``force`` [N], k1 x + k2 x³ = F.
 
-    Of several places it is the stable one nearest to Ψ; ``None`` if there is none.
+    Of several it is the stable one nearest to Ψ; ``None`` if there is none.
     """
     roots = np.roots([spring.cubic_stiffness, 0.0, spring.linear_stiffness, -force])
     heights = spring.unloaded + roots.real[roots.imag == 0.0]

@@ -1,4 +1,4 @@
-"""Warnings about scenes that can be run: what is probably a mistake, and keys that play no part."""
+"""Warnings about scenes that can be run: probable mistakes, and keys without effect."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from .tables import ORDINARY_SCHEMES
 
 #: E/G: 2 to 3 of isotropic solids, up to some 100 of laminates.
 _YOUNG_OVER_SHEAR = (0.5, 200.0)
-#: Length over radius of gyration: below, no beam theory holds; above, it is a thread.
+#: Length over radius of gyration: below it beam theory fails, above it the beam is a thread.
 _SLENDERNESS = (3.0, 3e4)
-#: Lowest frequency [Hz] of anything that a macroscopic beam is.
+#: Range of the lowest frequency [Hz] of macroscopic beams.
 _FREQUENCIES = (1e-2, 1e7)
-#: Mass of the beam over that of the spring, or the other way round.
+#: Mass of the beam over that of the spring, or vice versa.
 _MASS_RATIO = (1e-6, 1e6)
 #: Speed of the tip over that of sound in the beam, about its largest strain: no solid stays elastic beyond.
 _MOST_STRAIN = 0.05
 
 
 def suspicions(scene: Scene) -> list[str]:
-    """Return warnings about values that can be run but are probably mistaken, or play no part."""
+    """Return warnings about values that can be run but are probably mistakes, or have no effect."""
     return [
         *implausible(scene),
         *texts_of(scene, (*SUSPICIOUS, *EFFECTS)),
@@ -35,15 +35,15 @@ def suspicions(scene: Scene) -> list[str]:
 
 
 def implausible(scene: Scene) -> Iterator[str]:
-    """Yield what can hardly be meant of our beam, as lines ``[table] key = value: why, and what may be meant``.
+    """Yield improbable values of our beam, as lines ``[table] key = value: reason, and probable value``.
 
-    A beam with area = 1 or density = 1 is taken to be in units of its own: nothing is said about it.
+    A beam with area = 1 or density = 1 is taken to be dimensionless, without warnings.
     """
     beam = scene.beam
     return texts_of(scene, IMPLAUSIBLE if beam is not None and 1.0 not in (beam.area, beam.density) else ())
 
 
-# -- what can hardly be meant ---------------------------------------------------------------------------------------
+# -- improbable values ----------------------------------------------------------------------------------------------
 
 
 def _beyond(value: float, bounds: tuple[float, float]) -> bool:
@@ -51,7 +51,7 @@ def _beyond(value: float, bounds: tuple[float, float]) -> bool:
 
 
 def _material(key: str, unit: str, bounds: tuple[float, float], known: str, other: str, factor: float) -> Rule:
-    """Return the rule for a property that no solid has; ``factor`` is that of the unit that may be meant."""
+    """Return the rule for a property that no solid has; ``factor`` is that of the probable unit."""
 
     def meant(scene: Scene) -> Mapping[str, str]:
         value = factor * getattr(scene.beam, key)
@@ -62,7 +62,7 @@ def _material(key: str, unit: str, bounds: tuple[float, float], known: str, othe
 
 
 def _of_beam(scene: Scene) -> dict[str, Any]:
-    """Return what follows from our beam, for the texts of rules."""
+    """Return properties of our beam, for the texts of rules."""
     beam = scene.beam
     spring = scene.spring
     assert beam is not None
@@ -84,7 +84,7 @@ def _of_beam(scene: Scene) -> dict[str, Any]:
     }
 
 
-#: What our beam can hardly be.
+#: Rules for improbable values of our beam.
 IMPLAUSIBLE = (
     _material(
         "young_modulus", "Pa", (1e4, 2e12), "rubber about 1e6, aluminium 7e10, steel 2.1e11", "GPa", 1e9
@@ -109,7 +109,7 @@ IMPLAUSIBLE = (
     ),
     Rule(
         lambda s: _beyond(_of_beam(s)["masses"], _MASS_RATIO),
-        "{beam.length}: the beam has {mass:.3g} kg, beside {spring.mass}{milli}; lengths are in m",
+        "{beam.length}: the beam has {mass:.3g} kg, with {spring.mass}{milli}; lengths are in m",
         _of_beam,
     ),
     Rule(
@@ -121,7 +121,7 @@ IMPLAUSIBLE = (
 )
 
 
-# -- what is probably a mistake -------------------------------------------------------------------------------------
+# -- probable mistakes ----------------------------------------------------------------------------------------------
 
 
 def _well(scene: Scene) -> dict[str, Any]:
@@ -198,7 +198,7 @@ SUSPICIOUS_LOADS = (
 )
 
 
-# -- keys that play no part -----------------------------------------------------------------------------------------
+# -- keys without effect --------------------------------------------------------------------------------------------
 
 
 def _counts(
@@ -207,7 +207,7 @@ def _counts(
     where: str,
     numbers: Callable[[Scene], Mapping[str, Any]] = lambda s: {},
 ) -> list[Rule]:
-    """Return rules for keys that are given, and not as their default, in scenes where they do not count."""
+    """Return rules for keys that are given, and not as their default, in scenes where they have no effect."""
 
     def rule(table: str, key: str) -> Rule:
         def idle(scene: Scene) -> bool:
@@ -229,8 +229,8 @@ def _dynamic(scene: Scene) -> bool:
 
 
 _JOINS = "it counts between two bodies, or a beam and a stop"
-#: Where the keys count that do not always. ``[[loads]]`` refuses such keys itself; here they are told, so that a key
-#: can be changed with ``--set`` although another one then counts no more.
+#: Conditions under which keys have an effect. Loads reject such keys; here a warning suffices, so that ``--set`` can
+#: change a key that removes the effect of another.
 EFFECTS: tuple[Rule, ...] = (
     *_counts(
         "beam.element_degree beam.reduced_integration beam.mass_matrix",
@@ -257,7 +257,7 @@ EFFECTS: tuple[Rule, ...] = (
     *_counts(
         "contact.force_window",
         lambda s: s.coupled or (s.upper is not None and s.stop is not None),
-        "it counts where the run tells a peak contact force",
+        "it counts where the run has a peak contact force",
     ),
     *_counts(
         "coupling.tolerance",

@@ -1,7 +1,7 @@
 """The tables of a scene file, one class each: meaning, unit, default and range of every key.
 
-Field names are those of the FMU parameters; units are SI. `springbeam.scene.rules` has what several tables decide,
-`springbeam.scene.messages` lists the keys and makes ``docs/scene.md`` and the JSON Schema from what stands here.
+Field names are those of the FMU parameters; units are SI. `springbeam.scene.rules` has conditions on several tables,
+`springbeam.scene.messages` lists the keys and makes ``docs/scene.md`` and the JSON Schema from them.
 """
 
 from __future__ import annotations
@@ -41,17 +41,17 @@ ALL_MODES_UP_TO = 1000
 MOST_MODES = 1000
 #: Most modes times unknowns: 40 bytes each while the modes are found, so 1 GB.
 MOST_MODE_VALUES = 25_000_000
-#: Most elements of degree 1; of degree p fewer by p(p + 1)/2, as a band of their matrices grows so.
+#: Most elements of degree 1; of degree p fewer by p(p + 1)/2, by which the band of their matrices grows.
 MOST_ELEMENTS = 1_000_000
 
 
-#: An option of the command, and what Python calls it where that is not its own name.
+#: Options of commands, and their names in Python if these differ.
 _OPTION = re.compile(r"(?<!\S)--([a-z]+)")
 _ARGUMENTS = {"set": "overrides", "map": "names"}
 
 
 class SceneError(ValueError):
-    """A scene that cannot be run; the message names the file, the table, the key and what would be allowed."""
+    """A scene that cannot be run; the message names the file, the table, the key and the allowed values."""
 
 
 class ArgumentError(SceneError):
@@ -75,14 +75,13 @@ def key(
 ) -> Any:
     """Declare a key of a table: its unit ("–" for none), one line of meaning, its default (none: it must be given).
 
-    ``otherwise`` says in words what holds where the key is left out and ``default`` does not tell; ``bounds`` are
-    pydantic's gt, ge, le, lt.
+    ``otherwise`` describes a default that is no fixed value; ``bounds`` are pydantic's gt, ge, le, lt.
     """
     extra: dict[str, Any] = {"unit": unit, "otherwise": otherwise}
     return Field(default, description=meaning, json_schema_extra=extra, **bounds)  # type: ignore[call-overload]
 
 
-#: Groups of keys that give one thing, each another way; those of the first follow from the others.
+#: Groups of keys that give the same values; those of the first follow from the others.
 Ways = tuple[tuple[str, ...], ...]
 
 
@@ -96,21 +95,21 @@ def _plain(value: Any) -> Any:
 class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True, serialize_by_alias=True)
 
-    #: What can be given in several ways: a table has keys of one.
+    #: Values that alternative groups of keys give: a table has keys of one group.
     WAYS: ClassVar[tuple[Ways, ...]] = ()
-    #: Keys that give the table its scales: of a table with none of them, those that are needed are 1 (dimensionless).
+    #: Keys that set the scales of the table: without any of them, the needed ones are 1 (dimensionless).
     SCALES: ClassVar[tuple[str, ...]] = ()
-    #: Of a body, or the stop: the key that says where its end is at the start; ``None`` where only an FMU knows.
+    #: Key of the position of the end, of a body or the stop, at the start; ``None`` if only an FMU knows it.
     START: ClassVar[str | None] = None
-    #: Of a body below: the keys that ``gap`` of ``[contact]`` gives.
+    #: Keys of a lower body that ``gap`` of ``[contact]`` gives.
     AT_GAP: ClassVar[tuple[str, ...]] = ()
 
-    #: Which keys follow from others: where they do, by the keys given, and their values, by the values of these.
+    #: Keys that follow from others: the condition on the given keys, and the values.
     FOLLOWS: ClassVar[tuple[tuple[Callable[[set[str]], bool], dict[str, Callable[[Any], float]]], ...]] = ()
 
     @classmethod
     def ones(cls) -> dict[str, float]:
-        """Return 1 for all keys that are needed: the table in units of its own, what exact solutions are stated for."""
+        """Return 1 for all needed keys: the dimensionless table for which exact solutions are stated."""
         return {name: 1.0 for name, field in cls.model_fields.items() if field.is_required()}
 
     @classmethod
@@ -120,7 +119,7 @@ class Table(BaseModel):
 
     @classmethod
     def other_ways(cls, name: str) -> set[str]:
-        """Return the keys that give in another way what the key ``name`` gives."""
+        """Return the keys that are alternatives to the key ``name``."""
         return {
             key for ways in cls.WAYS if name in chain(*ways) for group in ways if name not in group for key in group
         }
@@ -135,7 +134,7 @@ class Table(BaseModel):
         given = {name for name, value in data.items() if value is not None}
         for name in data:
             if name in given and (others := given & cls.other_ways(name)):
-                raise ValueError(f"{', '.join([name, *sorted(others)])}: two ways to give one thing; leave one out")
+                raise ValueError(f"{', '.join([name, *sorted(others)])}: alternatives; leave one out")
         # A bad value, which is reported as such, counts as 1.
         sane = {name: x for name, x in data.items() if isinstance(x, (int, float)) and abs(x) <= float_info.max}
         following = [values for follow, values in cls.FOLLOWS if follow(given)]
@@ -151,7 +150,7 @@ class Table(BaseModel):
 
     @model_serializer(mode="wrap")
     def _as_given(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what follows from other keys: neither given nor the default."""
+        """Leave out keys that follow from others: neither given nor the default."""
         fields = type(self).model_fields
         given = self.model_fields_set
         followed = {name for name in fields.keys() - given if getattr(self, name) != fields[name].default}
@@ -160,12 +159,12 @@ class Table(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class OneOf:
-    """Annotate a field whose table is one of several: the value of its key ``name`` says which.
+    """Annotate a field whose table is one of several, chosen by the value of its key ``name``.
 
     A table that is added to ``tables`` counts after ``Scene.model_rebuild(force=True)``.
     """
 
-    #: What they have in common.
+    #: Their common base.
     common: type[Table]
     name: str
     #: One line on ``name``.
@@ -175,12 +174,12 @@ class OneOf:
     default: str
 
     def kind(self, content: Any) -> str:
-        """Return which of ``tables`` the content of a table belongs to, or what else its key says."""
+        """Return which of ``tables`` the content of a table belongs to, or the unknown value of its key."""
         kind = content.get(self.name) if isinstance(content, dict) else getattr(content, self.name, None)
         return self.default if kind is None else str(kind)
 
     def kept(self, content: dict[str, Any], kind: str) -> dict[str, Any]:
-        """Return what of the content of a table is kept where it becomes another: the keys that this one has too."""
+        """Return the part of the content of a table that another alternative can keep: the keys that it has, too."""
         table = self.tables.get(kind)
         return {key: value for key, value in content.items() if table is None or key in table.model_fields}
 
@@ -203,7 +202,7 @@ class Time(Table):
 
     t_end: float = key("s", "end of the run", gt=0.0)
     initial_state: Literal["given", "static"] = key(
-        "–", "as the bodies' keys say; or at rest under the loads as they then are, and the force of ends that touch",
+        "–", "given: by the keys of the bodies; static: at rest under the loads at the start and the contact force",
         "given",
     )  # fmt: skip
 
@@ -253,7 +252,7 @@ class Beam(Table):
         "–", "until first contact the beam turns as a straight line, or moves by its equations", "undeformed"
     )
     fidelity: Literal["dynamic", "quasi_static"] = key(
-        "–", "quasi_static: no inertia, so that mesh, modes and integrator play no part", "dynamic"
+        "–", "quasi_static: no inertia, so that mesh, modes and integrator have no effect", "dynamic"
     )
 
     WAYS = (
@@ -345,7 +344,7 @@ class Spring(Table):
     absolute_tolerance: float = key("m, m/s", "absolute tolerance of its motion, of y and z", 1e-30, gt=0.0, le=1e-2)
 
     def force(self, y: _Heights) -> _Heights:
-        """Return k1 x + k2 x³ − f_s [N]: what holds the top at ``y`` [m], or a seated one hands to the foundation."""
+        """Return k1 x + k2 x³ − f_s [N]: the force that holds the top at ``y`` [m], as the foundation does."""
         x = y - self.unloaded
         return self.linear_stiffness * x + self.cubic_stiffness * x**3 - self.external_force
 
@@ -355,7 +354,7 @@ class Spring(Table):
 
     @property
     def softens(self) -> bool:
-        """Whether it gives way: it pushes back near ``unloaded``, and less and less further out."""
+        """Whether it softens: its stiffness is positive near ``unloaded`` and decreases further out."""
         return self.cubic_stiffness < 0.0 < self.linear_stiffness
 
 
@@ -373,7 +372,7 @@ STEP_KEY = "macro_step"
 TOLERANCE_KEYS = ("relative_tolerance", "absolute_tolerance")
 #: H [s] of a scene that gives neither: that of Ahn & Tate's section 6.
 DEFAULT_STEP = 0.004
-#: What ``accuracy`` picks, by table: it takes the place of these keys.
+#: Keys that ``accuracy`` sets, by table.
 PICKED_BY_ACCURACY = {
     "coupling": ("scheme", "degree", STEP_KEY, *TOLERANCE_KEYS, "tolerance"),
     "spring": TOLERANCE_KEYS,
@@ -383,7 +382,7 @@ ORDINARY_SCHEMES = ("gauss_seidel", "jacobi")
 
 
 class Coupling(Table):
-    """How the force of a step is found, and how long steps are (``docs/coupling.md``)."""
+    """Scheme of the contact force, and size of the steps (``docs/coupling.md``)."""
 
     scheme: Literal["energy", "gauss_seidel", "jacobi"] = key("–", "coupling scheme", "energy")
     degree: int | None = key(
