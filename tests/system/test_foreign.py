@@ -16,6 +16,7 @@ from time import sleep
 import numpy as np
 import oscillator
 import pytest
+import scenes
 import tomli_w
 from commands import HANGS, command, printed, ran, refused
 from scenes import kinds
@@ -31,13 +32,9 @@ M1, M2, K, C, V = 2.0, 3.0, 40.0, 0.2, -0.3
 STIFFNESS, DAMPING = 50.0, 0.1
 #: Names that a scene may leave out, each with what stands on it.
 WITHOUT = {"nothing": (), "velocity, impulse": ("velocity", "impulse")}
+BAD = scenes.table("bad_inputs.toml")["fmus"]
 #: What an FMU does after 1.5 s, and the cause that is told.
-LATE = {
-    "late crash": "crashed (SIGSEGV) in its step at t = 1.5",
-    "late abort": "crashed (SIGABRT: nobody expected this) in its step at t = 1.5",
-    "late exit": "crashed (exit code 7) in its step at t = 1.5",
-    "late hang": "has not returned within 60 s from its step at t = 1.5",
-}
+LATE = BAD["late"]
 ENERGIES = ("kinetic_energy", "potential_energy", "dissipated_energy", "load_potential")
 
 
@@ -220,54 +217,26 @@ def test_steps_of_one_size_stay_of_one_size(fmu):
         simulate(pair(fmu("fixed", variable=False), loads=[pulse], coupling={"degree": 0}))
 
 
-PLAIN = {"state": False, "slopes": False}
-#: What the FMU cannot do, what a scene asks for, and what is said.
-REFUSED = {
-    "state": (PLAIN, {"coupling": {"degree": 0}}, '[coupling] scheme = "energy"', "canGetAndSetFMUstate"),
-    "slopes": (PLAIN, {"coupling": {"scheme": "jacobi", "degree": 1}}, "[coupling] degree = 1", "canInterpolateInputs"),
-    "stop": (
-        PLAIN, {"coupling": {"scheme": "jacobi", "degree": 0}, "stop": {"position": -1.0}}, "[stop]", "leave it out",
-    ),
-    "impulse": (
-        {}, {"spring": {"impulse": None}, "contact": {"law": "transmission"}},
-        'law = "transmission"', "no impulse", 'use "compliance", "link" or "tie"',
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("what", REFUSED)
+@pytest.mark.parametrize("what", BAD["lacks"])
 def test_a_missing_capability_is_named_with_what_would_work(fmu, what):
-    said, changes, *words = REFUSED[what]
-    scene = pair(fmu("plain" if said else "oscillator", **said), **{"contact": {"damping": 0.0}, **changes})
+    changes = dict(BAD["lacks"][what])
+    words, made = changes.pop("said"), changes.pop("fmu", {})
+    changes = scenes.without_false(changes)
+    changes.setdefault("contact", {"damping": 0.0})
     with pytest.raises(SceneError) as caught:
-        simulate(scene)
+        simulate(pair(fmu("plain", **made) if made else fmu(), **changes))
     lines = str(caught.value).splitlines()
     assert any(all(text in line for text in (*words, "[spring]")) for line in lines)
 
 
-@pytest.mark.parametrize(
-    "lie", [name for name in oscillator.LIES if name not in ("none", "hang", "short", "past", *LATE)]
-)
+@pytest.mark.parametrize("lie", BAD["lies"])
 def test_an_fmu_that_lies_is_found_before_the_run(fmu, lie):
+    said = BAD["lies"][lie]
     parameters = {"m": M2, "k": K, "lie": oscillator.LIES[lie]}
-    said = {
-        "state": "canGetAndSetFMUstate = true, but",
-        "velocity": "velocity 'v' is not the rate",
-        "integral": "integral 'ix' is not that",
-        "integral_2": "integral_2 'ix2' is not that",
-        "slopes": "canInterpolateInputs = true, but a force that grows over a step is not followed",
-        "crash": "crashed (SIGSEGV) in its step at t = 0.04 s of the check before the run",
-        "nan": "not finite",
-        "energy": "energies named do not account",
-        "early": "fmi3DoStep returned early, which it was not allowed to",
-        "event": "fmi3DoStep asks for event mode",
-        "end": "fmi3DoStep asks that the simulation end",
-        "message": f"k = {K:g} of the spring",
-    }
-    path = fmu("three", version="3.0") if "fmi3" in said[lie] else fmu()
+    path = fmu("three", version="3.0") if "fmi3" in said else fmu()
     with pytest.raises(FmuError) as caught:
         simulate(pair(path, spring={"parameters": parameters}, coupling={"degree": 0}))
-    assert said[lie] in str(caught.value)
+    assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -348,22 +317,13 @@ def test_units_that_an_fmu_declares_are_converted(fmu, tmp_path):
     assert "SI units are assumed" not in shown
 
 
-#: A unit of which variable, what the FMU says of it, and what is said of that.
-MISTAKEN = {
-    "no BaseUnit": ("x", "mm", None, "variable 'x' is in 'mm', and the FMU does not say how much that is"),
-    "an angle": ("x", "rad", 'rad="1"', "variable 'x' is in 'rad', which is not a unit of displacement (m)"),
-    "a torque": ("F", "N.m", 'kg="1" m="2" s="-2"', "variable 'F' is in 'N.m', which is not a unit of force (N)"),
-    "an offset": ("x", "m_above", 'm="1" offset="5"', "has factor 1 and offset 5; use a unit"),
-    "SI units by name": ("ix", "m.s", None, None),
-    "SI units by name, spelled": ("F", "kg.m/s^2", None, None),
-}
-
-
-@pytest.mark.parametrize("what", MISTAKEN)
+@pytest.mark.parametrize("what", BAD["units"])
 def test_a_unit_of_something_else_is_refused(fmu, what):
-    name, unit, base, said = MISTAKEN[what]
-    edits = oscillator.in_units("s", {name: unit}, {} if base is None else {unit: base})
-    with nullcontext() if said is None else pytest.raises(FmuError, match=re.escape(said)):
+    case = BAD["units"][what]
+    edits = oscillator.in_units(
+        "s", {case["name"]: case["unit"]}, {case["unit"]: case["base"]} if "base" in case else {}
+    )
+    with pytest.raises(FmuError, match=re.escape(case["said"])) if "said" in case else nullcontext():
         simulate(pair(fmu(what, edits=edits)))
 
 
@@ -512,19 +472,6 @@ def test_a_crash_in_mid_run_loses_nothing(fmu, tmp_path):
         assert rows[lie].count(b"\n") == pytest.approx(1.5 / 0.02, abs=3)
 
 
-NAMES = {
-    "no such input": ({"force": "G"}, "has no variable 'G'; it is the scene's force"),
-    "force is an output": ({"force": "x"}, "variable 'x' is output, and force must be an input"),
-    "velocity is an input": ({"velocity": "F"}, "variable 'F' is input, and velocity must be an output"),
-    "nearly": ({"velocity": "v0 "}, "did you mean 'v0'?"),
-    "no such parameter": ({"parameters": {"kk": 1.0}}, "has no variable 'kk'"),
-    "not a parameter": ({"parameters": {"x": 1.0}}, "variable 'x' is output, not a parameter"),
-    "text for a number": ({"parameters": {"k": "stiff"}}, "variable 'k' is Real"),
-    "wrong way": ({"force_sign": 1}, "a positive 'F' pushes the end up; set force_sign = -1"),
-    "wrong mass": ({"mass": 6.0}, "with the mass 6 kg it should"),
-}
-
-
 #: One oscillator of 2 kg and 200 N/m below, by each kind of body that says how stiff it is.
 ANSWERING = {
     "our own": {"spring": {"mass": 2.0, "linear_stiffness": 200.0}},
@@ -570,9 +517,10 @@ def test_what_a_foreign_body_does_not_say_is_not_judged(fmu):
     assert said.startswith("the body in [spring]")
 
 
-@pytest.mark.parametrize("what", NAMES)
+@pytest.mark.parametrize("what", BAD["names"])
 def test_wrong_names_are_one_error(fmu, what):
-    change, said = NAMES[what]
+    change = dict(BAD["names"][what])
+    said = change.pop("said")
     with pytest.raises(FmuError) as caught:
         simulate(pair(fmu(), spring=change))
     assert said in str(caught.value)
