@@ -44,23 +44,13 @@ def changed(monkeypatch):
     ("section", "body", "key", "change"),
     [
         (exact.static_deflection, FmuBeam, "young_modulus", 1.01),
-        (exact.static_deflection, FmuBeam, "shear_modulus", 1.01),
-        (exact.frequencies, FmuBeam, "density", 1.01),
-        (exact.frequencies, FmuBeam, "second_moment_of_area", 0.99),
-        (exact.frequencies, FmuBeam, "shear_modulus", 1.01),
         (exact.frequencies, FmuBeam, "mass_matrix", "consistent"),  # its sixth frequency is 0.5 % higher
-        (exact.duffing, FmuSpring, "mass", 1.01),
         (exact.duffing, FmuSpring, "cubic_stiffness", 1.01),
         (exact.bar_impact, FmuBeam, "density", 1.01),
-        (exact.two_masses, FmuSpring, "linear_stiffness", 1.01),
         (exact.compliant_impact, FmuSpring, "mass", 1.01),
-        (exact.compliant_impact, FmuBeam, "density", 1.01),
         (exact.link, FmuBeam, "shear_modulus", 1.01),
-        (exact.link, FmuSpring, "linear_stiffness", 1.01),
-        (exact.tie, FmuSpring, "mass", 1.01),
         (exact.resonance, FmuBeam, "alpha_b", 1.01),
         (exact.pulse, FmuSpring, "linear_stiffness", 1.01),
-        (exact.slow_ramp, FmuBeam, "shear_modulus", 1.01),
     ],
     ids=lambda given: getattr(given, "solution", given).__name__ if callable(given) else str(given),
 )

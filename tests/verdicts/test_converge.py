@@ -59,11 +59,11 @@ def test_beyond_all_modes_there_is_nothing():
 
 
 def test_linear_elements_converge_by_order_two(tmp_path):
-    settings = ["--set=time.t_end=0.01", "--set=beam.n_elements=20"]
+    settings = ["--set=time.t_end=0.01", "--set=beam.n_elements=10"]
     metrics = ["--metric", "first_separation", "--metric", "contact_duration"]
     found = json.loads(printed("converge", "steel-bumper", *settings, *metrics, "--out", tmp_path / "found", "--json"))
     assert found["elements"]["settled"]["contact_duration"]["order"] == pytest.approx(2.0, abs=0.1)
-    assert [level["beam.n_elements"] for level in found["elements"]["levels"]] == [20, 40, 80, 160]
+    assert [level["beam.n_elements"] for level in found["elements"]["levels"]] == [10, 20, 40, 80]
     assert [level["unknowns"] for level in found["modes"]["levels"]] == [1, 3, 6, 12]
     assert found["elements"]["settled"]["first_separation"]["limit"] is None  # there is none
     written = {file.name for file in (tmp_path / "found").iterdir()}
