@@ -4,20 +4,18 @@ from math import factorial
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, Upper, beam_body
+from bodies import DuffingBody, Upper
 from scenes import scene_from_dict
 
 from springbeam import simulate
 from springbeam.contact.phases import Joint, Phase
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.results.steps import STEP
-from springbeam.run.observed import least_momentum
 from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair
 from springbeam.scene import load_scene, shipped_scenes, with_changes
 from springbeam.scene.frequencies import fastest_frequency, impact_frequency, mesh_frequency, slowest_frequency
 from springbeam.scene.resolution import lateness, not_resolved, peak_force_doubt, slow_oscillations
-from springbeam.scene.statics import lowest_frequency, tip_compliance, tip_inertia
+from springbeam.scene.statics import lowest_frequency, tip_compliance
 
 BEAMS = [name for name in shipped_scenes() if load_scene(name).beam is not None]
 PAIR = load_scene("soft")
@@ -66,24 +64,6 @@ def test_one_radian_of_the_slowest_oscillation_is_the_limit(turn, resolved):
     assert (not_resolved(driven) is None) is resolved
 
 
-@pytest.mark.parametrize("degree", [0, 1, 2])
-@pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
-def test_the_shortest_contact_of_a_tie_has_a_limit_from_degree_1_on(degree, share, resolved):
-    """At degree 0 the steps themselves tell how far the ends are off."""
-    for tables in ({}, {"beam": {"fidelity": "quasi_static"}}):
-        given = with_changes(PAIR, coupling={"degree": degree}, **tables)
-        told = not_resolved(given, shortest_contact=PAIR.coupling.H / share)
-        assert (told is None) is (resolved or degree == 0)
-
-
-def test_a_soft_contact_within_a_macro_step_is_lost_to_an_exchange_alone():
-    """It finds the force at the ends of the step, where the contact is over: a cell of the grid was 110 % off."""
-    for scheme, resolved in (("energy", True), ("gauss_seidel", False), ("jacobi", False)):
-        scene = with_changes(PAIR, contact={"law": "compliance"}, coupling={"scheme": scheme, "degree": 1})
-        told = not_resolved(scene, shortest_contact=0.9 * PAIR.coupling.H)
-        assert (told is None) is resolved
-
-
 def test_what_creeps_or_has_no_inertia_has_nothing_to_resolve():
     coarse = with_changes(PAIR, coupling={"macro_step": 0.2})
     assert "slowest oscillation of the beam" in not_resolved(coarse)
@@ -112,9 +92,9 @@ STIFF = with_changes(
 @pytest.mark.parametrize("degree", [0, 1, 2])
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
 def test_ends_that_the_law_would_have_elsewhere_are_said(degree, share, resolved):
-    """Soft ones and tied ones, by degree; of what measured loads leave out, and between the rows, 1 % is allowed."""
-    for seen in ("left_out", "between_rows"):
-        assert (not_resolved(STIFF, **{seen: 0.01 * share}) is None) is resolved
+    """Soft ones and tied ones, by degree; 1 % of what measured loads leave out, and 0.5 % between the rows."""
+    for seen, limit in (("left_out", 0.01), ("between_rows", 0.005)):
+        assert (not_resolved(STIFF, **{seen: limit * share}) is None) is resolved
     for scene, limits in ((STIFF, (0.006, 0.002, 0.001)), (PAIR, (0.0025, 0.002, 0.001))):
         told = not_resolved(with_changes(scene, coupling={"degree": degree}), share * limits[degree])
         assert (told is None) is resolved
@@ -126,7 +106,7 @@ def test_what_resolves_ends_that_are_elsewhere_is_said():
     for scene in (STIFF, PAIR):
         assert not_resolved(with_changes(scene, **adaptive), off).endswith("; smaller tolerances resolve it")
     low = with_changes(STIFF, coupling={"degree": 0})
-    for seen, share in (({"misplaced": 4.0 * 0.006}, 0.25), ({"left_out": 0.08}, 0.5), ({"between_rows": 0.02}, 0.25)):
+    for seen, share in (({"misplaced": 4.0 * 0.006}, 0.25), ({"left_out": 0.08}, 0.5), ({"between_rows": 0.01}, 0.25)):
         told = not_resolved(low, **seen)
         named = float(told.split("coupling.macro_step <= ")[1].split()[0])
         assert named == pytest.approx(0.95 * share * STIFF.coupling.H, rel=0.03)
@@ -290,39 +270,8 @@ def test_a_peak_force_that_depends_on_the_mesh_is_told():
         assert (peak_force_doubt(few) is not None) == told
 
 
-# -- what the records of a run show of its resolution, with made-up records of two masses ----------------------------
-
-#: Of 2 kg above and 1 kg below; the tip of the records rests, so that no motion of a beam adds to its momentum.
-TIP, TOP, H = 2.0, 1.0, 1e-3
-SCENE = with_changes(load_scene("soft"), coupling={"macro_step": H})
-
-
-def pair(degree=1, **contact):
-    scene = with_changes(SCENE, contact=contact, coupling={"degree": degree})
-    return scene, Pair(set_up(scene), Upper(TIP), DuffingBody(TOP))
-
-
-def records(phase, **columns):
-    """Steps of H in ``phase``, whose last one ends on an event; ``columns`` are those before and after it."""
-    number = len(next(iter(columns.values())))
-    steps = np.zeros(number, STEP)
-    steps["time"], steps["size"] = H * np.arange(number), np.where(np.arange(number), H, 0.0)
-    steps["phase"], steps["events"][-1] = phase.number, 1.0
-    steps["phase"][-1] = Phase(Joint.FREE).number
-    for name, values in columns.items():
-        steps[name] = steps[f"{name}_after"] = values
-    return steps
-
-
 def test_ends_move_with_both_masses_unless_the_lower_one_is_held():
-    _, both = pair()
-    assert both.reduced_mass(Phase(Joint.TIED)) == pytest.approx(TIP * TOP / (TIP + TOP), rel=1e-15)
-    assert both.reduced_mass(Phase(Joint.TIED, seated=True)) == TIP
-
-
-def test_a_beam_has_the_momentum_of_its_slowest_swing():
-    """Its inertia at the tip times the tip's range in 2/ω₁, where the tip itself is slower than that."""
-    steps = records(Phase(Joint.TIED, seated=True), u_tip=[0.0, 4.0, 4.0, 4.0], v_tip=[0.0, 0.0, 0.0, 0.3])
-    beam = beam_body(SCENE.beam)
-    momentum = tip_inertia(SCENE.beam) * 4.0 * 0.5 * slowest_frequency(SCENE.beam)
-    assert least_momentum(Pair(set_up(SCENE), beam, DuffingBody(TOP)), steps) == pytest.approx(momentum, rel=2e-3)
+    tip, top = 2.0, 1.0
+    both = Pair(set_up(PAIR), Upper(tip), DuffingBody(top))
+    assert both.reduced_mass(Phase(Joint.TIED)) == pytest.approx(tip * top / (tip + top), rel=1e-15)
+    assert both.reduced_mass(Phase(Joint.TIED, seated=True)) == tip

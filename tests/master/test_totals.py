@@ -7,7 +7,7 @@ from bodies import bodies
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.motion.events import Event, EventKind
 from springbeam.results.steps import STEP
-from springbeam.results.totals import shortest_contact, totals
+from springbeam.results.totals import totals
 from springbeam.run.observed import force_window
 from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair
@@ -81,35 +81,6 @@ def test_durations_and_rebound():
     assert "rebound_velocity" not in found(steps, events[0], apart=False)
     assert numbers["bounce_time"] == pytest.approx(0.8, rel=1e-15)
     assert "bounce_time" not in found(steps[:6], *events[:5])  # it flies where the run ends
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize(
-    ("kinds", "column"),
-    [(("impact", "separation"), "contact_force"), (("seated", "unseated"), "foundation_force")],
-)
-def test_the_shortest_contact_that_ended_by_the_last_row_counts_if_it_passes_on_an_impulse(kinds, column, sign):
-    """0.2 s at 1 N, or −1 N of a tie; then 0.1 s without force, and one whose end came just before an interruption."""
-    steps = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 0.8, 9))
-    steps[column] = sign * (steps["time"] < 0.45)
-    times = (0.1, 0.3, 0.5, 0.6, 0.75, 0.9)
-    held = {"contact_force": {"joint": "tied"}, "foundation_force": {"seated": True}}[column]
-    events = [Event(time, EventKind(kinds[k % 2]), **({} if k % 2 else held)) for k, time in enumerate(times)]
-
-    def shortest(below, least, of=steps):
-        return shortest_contact(SCENE, of, events, below, least)
-
-    assert shortest(1.0, 0.19) == pytest.approx(0.2, rel=1e-14)
-    assert shortest(0.15, 0.19) == shortest(1.0, 0.21) == shortest(1.0, 0.1, steps[:0]) == np.inf
-    assert shortest(1.0, -1.0) == pytest.approx(0.1, rel=1e-14)
-
-
-def test_a_touch_after_a_release_is_a_contact_of_its_own():
-    steps = steps_with(lambda t: (1.0, 0.0, 0.0), np.linspace(0.0, 0.8, 9))
-    phases = {0.0: ("impact", "tied"), 0.4: ("release", "touch"), 0.5: ("separation", "free")}
-    events = [Event(time, EventKind(kind), joint=joint) for time, (kind, joint) in phases.items()]
-    assert shortest_contact(SCENE, steps, events, 1.0, 0.05) == pytest.approx(0.1, rel=1e-14)
-    assert shortest_contact(SCENE, steps, events, 1.0, 0.15) == pytest.approx(0.5, rel=1e-14)
 
 
 def test_a_tip_that_strikes_the_stop_itself():

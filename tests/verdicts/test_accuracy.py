@@ -153,6 +153,15 @@ def test_what_a_campaign_found_wrong_warns(name):
     assert any(words in warning for warning in run.summary["warnings"])
 
 
+@pytest.mark.parametrize("name", FOUND["curves"])
+def test_curves_that_a_campaign_found_wrong_between_right_rows_warn(name):
+    """Its last moments show 0.8 %: up to half of the error where waves turn by more than 2π in a step."""
+    scene = scene_from_dict(FOUND["curves"][name])
+    found = judge(scene, Reference(scene))
+    assert 0.01 < found["error_motion"] < 0.02
+    assert found["warns"]
+
+
 @pytest.mark.parametrize("name", FOUND["parts late"])
 def test_ends_that_close_a_little_before_they_part_do_part(name):
     scene = scene_from_dict(FOUND["parts late"][name])

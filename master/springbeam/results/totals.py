@@ -7,7 +7,6 @@ step is that of the polynomial that was applied, without the part that turns a m
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from math import inf
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.polynomial.polynomial import polyder, polyval
 
 from ..motion.events import Event
 from ..scene import Scene
-from .contact_times import foundation_contacts, kicks, tip_contacts, touches
+from .contact_times import foundation_contacts, kicks, tip_contacts
 from .dense import extremes
 from .steps import FORCE_COLUMNS, impulse, joined
 
@@ -105,28 +104,6 @@ def totals(scene: Scene, steps: np.ndarray, events: Iterable[Event], window: flo
     return {
         name: float(value) if name not in TOTALS or TOTALS[name].unit else int(value) for name, value in found.items()
     }
-
-
-def shortest_contact(scene: Scene, steps: np.ndarray, events: Iterable[Event], below: float, least: float) -> float:
-    """Return how long the shortest contact, touch above Ψ or rest on the foundation lasts [s]; ∞ if not ``below`` [s].
-
-    Those are left out whose force passes on no more than ``least`` [N·s], and those that have not ended by the last
-    row. Other parameters as of `totals`.
-    """
-    events = list(events)
-    time = steps["time"]
-    found = inf
-    if len(steps) == 0:
-        return inf
-    held = [*tip_contacts(scene, events, inf), *touches(events)]
-    for intervals, force in ((held, "contact_force"), (foundation_contacts(events, inf), "foundation_force")):
-        passed = np.cumsum(impulse(steps, force))
-        for since, until in intervals:
-            if 0.0 < until - since < min(below, found) and until <= time[-1]:
-                first, last = np.searchsorted(time, (since, until))
-                if abs(passed[last] - passed[first]) > least:
-                    found = until - since
-    return found
 
 
 def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float) -> dict[str, float | int]:

@@ -31,6 +31,8 @@ _POINTS, _SHARES = np.polynomial.legendre.leggauss(4)
 _INSIDE = 0.5 * (_POINTS + 1.0), 0.5 * _SHARES
 #: Ways that an end is off from which on nothing more is to be learnt.
 _LOST = 1e3
+#: A gap inside a step that is this share of how far an end moves does not count.
+_QUIET = 1e-8
 
 
 def misplaced(pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float | None:
@@ -52,7 +54,9 @@ def misplaced(pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float |
         return None
     ends = _Errors(modes, pair.lower.mass, damping, float(np.ptp(steps["time"])))
     stiffness = ends.per_mass * np.broadcast_to(stiff, len(steps)) if ends.per_mass > 0.0 else np.zeros(len(steps))
-    follow = partial(_along_tie, pair.interface.alone) if pair.law is None else partial(_along_soft_law, pair.law)
+    follow = partial(_along_tie, pair.interface.alone, _QUIET * min(ways))
+    if pair.law is not None:
+        follow = partial(_along_soft_law, pair.law)
     found = 0.0
     after = _after_events(pair.interface, steps, events)
     for u, y in follow(pair.joined.degree, ends, steps, stiffness, after):
@@ -79,37 +83,40 @@ class _Errors:
         creeps = decay**2 >= stiffness
         self._rates = np.concatenate([root - decay, -(root + decay)[creeps]])
         pushed = 0.5 * tip / root
-        pushed = np.concatenate([pushed, -pushed[creeps]])
+        self._impulse = np.concatenate([pushed, -pushed[creeps]])
+        self._jump = self._impulse * self._rates
+        #: What the terms are of u and of v.
         shown = np.concatenate([np.where(creeps, 1.0, 2.0) * tip, tip[creeps]])
-        #: What an impulse and a jump of the tip add to the terms, and what these add to u and v, as pairs of reals.
-        self._impulse, self._jump = _reals(pushed), _reals(pushed * self._rates)
-        self._shown = np.array([_reals(np.conj(shown * self._rates**n)) for n in range(2)])
-        self._modes = stiffness, decay, tip, creeps
+        self._shown = np.array([shown, shown * self._rates])
+        self._modes = stiffness, decay, creeps
         self._damps = np.concatenate([modes[1], modes[1][creeps]])
         self._terms = np.zeros(len(self._rates), complex)
         self._pairs = self._terms.view(float)
         self._moves = cache(self._move)
+        self._added = np.zeros((3, len(self._pairs)))
+        #: The force [N], the impulse [N·s] and the shift [N·s²] of this step that the terms do not have yet.
+        self._due = [0.0, 0.0, 0.0]
         self.u = self.v = self.y = self.z = 0.0
         self.mobility = float(tip @ tip)
-        self._resisted = float(self._shown[1] @ self._jump)
+        self._resisted = float((self._shown[1] @ self._jump).real)
         self.per_mass = 1.0 / mass if mass > 0.0 else 0.0
         self._resists = self.per_mass * damping
 
-    def _move(self, H: float) -> tuple[np.ndarray, np.ndarray, float, float, np.ndarray]:
-        """Return what a step of ``H`` [s] makes of the terms, and what a constant force of 1 N adds to them.
+    def _move(self, H: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[float, float], tuple[float, float]]:
+        """Return what a step of ``H`` [s] makes of the terms, and of u and v in these.
 
-        Further by how much the latter changes u [m/N] and v, and what the step makes of where 1 N·s², which moves a
-        free mass, puts the modes that it follows.
+        Further, in rows, what its end adds to the terms: of a constant force of 1 N, of an impulse of 1 N·s, and of
+        1 N·s², which moves a free mass, of the modes that the step follows; and what force and shift add to u and v.
         """
-        stiffness, decay, _, creeps = self._modes
+        stiffness, decay, creeps = self._modes
         moved = np.exp(self._rates * H)
-        impulse = self._impulse.view(complex)
-        jump = self._jump.view(complex)
-        pushed = _reals(impulse * np.expm1(self._rates * H) / self._rates)
+        pushed = self._impulse * np.expm1(self._rates * H) / self._rates
         follows = 1.0 / (1.0 + H * (decay + 0.25 * H * stiffness))
-        shifted = _reals(moved * (jump + self._damps * impulse) * np.concatenate([follows, follows[creeps]]))
-        u, v = (self._shown @ pushed).tolist()
-        return moved, pushed, u, v, shifted
+        shifted = moved * (self._jump + self._damps * self._impulse) * np.concatenate([follows, follows[creeps]])
+        at_end = np.array([_reals(np.conj(row * moved)) for row in self._shown])
+        added = np.array([_reals(terms) for terms in (pushed, self._impulse, shifted)])
+        by_force, by_shift = ((self._shown @ terms).real.tolist() for terms in (pushed, shifted))
+        return moved, at_end, added, by_force, by_shift
 
     def drift(self, H: float, stiffness: float, per_mass: float, shift: float = 0.0) -> tuple[float, float]:
         """Advance by ``H`` [s] without a force, the lower end by the midpoint rule.
@@ -118,29 +125,31 @@ class _Errors:
         besides. ``stiffness`` is the spring's over its mass [1/s²], ``per_mass`` that of the lower end [1/kg], 0 while
         the foundation holds it.
         """
-        moved, pushed, flexible, hastened, shifted = self._moves(H)
+        if any(self._due):
+            self._pairs += np.array(self._due).dot(self._added)
+        moved, at_end, self._added, self._by_force, by_shift = self._moves(H)
+        self._due = [0.0, 0.0, shift]
+        u, v = at_end.dot(self._pairs).tolist()
         self._terms *= moved
-        if shift != 0.0:
-            self._pairs += shift * shifted
-            self.y -= shift * per_mass
-        self.u, self.v = (self._shown @ self._pairs).tolist()
+        self.u = u + shift * by_shift[0]
+        self.v = v + shift * by_shift[1]
+        self.y -= shift * per_mass
         half = 0.5 * H
         slow = 1.0 / (1.0 + half * (self._resists + half * stiffness))
         mean = slow * (self.z - half * stiffness * self.y)
         self.y += H * mean
         self.z = 2.0 * mean - self.z
         faster = H * slow * per_mass
-        self._response = pushed, flexible, hastened, half * faster, faster
-        return self.y - self.u, flexible + half * faster
+        self._lower = half * faster, faster
+        return self.y - self.u, self._by_force[0] + half * faster
 
     def act(self, C: float) -> None:
         """Let the mean force ``C`` [N] act over the step of the last `drift`, too."""
-        pushed, flexible, hastened, further, faster = self._response
-        self._pairs += C * pushed
-        self.u += C * flexible
-        self.v += C * hastened
-        self.y -= C * further
-        self.z -= C * faster
+        self._due[0] += C
+        self.u += C * self._by_force[0]
+        self.v += C * self._by_force[1]
+        self.y -= C * self._lower[0]
+        self.z -= C * self._lower[1]
 
     def strike(self, stays: float, turns: float, most: float) -> None:
         """Do to the lower end what `_after_events` says."""
@@ -150,7 +159,7 @@ class _Errors:
         """Do to the tip what `_after_events` says; the impulse that is earlier or later moves the beam besides."""
         jump = (stays - 1.0) * self.u / self.mobility
         change = (stays - 1.0) * self.v + max(-most, min(turns * self.u, most))
-        self._pairs += jump * self._jump
+        self._terms += jump * self._jump
         self.u *= stays
         self.v += jump * self._resisted
         self.push(change / self.mobility, 0.0)
@@ -161,7 +170,7 @@ class _Errors:
 
     def push(self, impulse: float, per_mass: float) -> None:
         """Let an ``impulse`` [N·s] lift the tip and press the lower end; ``per_mass`` as of `advance`."""
-        self._pairs += impulse * self._impulse
+        self._due[1] += impulse
         self.v += impulse * self.mobility
         self.z -= impulse * per_mass
 
@@ -220,17 +229,24 @@ def _defect(law: SoftLaw, before: np.ndarray, step: np.ndarray, parts: int) -> n
 
 
 def _along_tie(
-    alone: bool, degree: int, ends: _Errors, steps: np.ndarray, stiffness: np.ndarray, after: np.ndarray
+    alone: bool,
+    quiet: float,
+    degree: int,
+    ends: _Errors,
+    steps: np.ndarray,
+    stiffness: np.ndarray,
+    after: np.ndarray,
 ) -> Iterator[tuple[float, float]]:
     """Yield the errors of both ends [m] along the run, inside steps, too: they leave a gap and different velocities.
 
-    ``alone`` says that the tip itself strikes the foundation.
+    ``alone`` says that the tip itself strikes the foundation. Steps whose gap stays below ``quiet`` [m] are whole.
     """
     parts = degree + 2  # one more than the step has forces
     size = np.where(steps["size"] > 0.0, steps["size"], 1.0)
     path = _penetration(np.roll(steps, 1), steps, size)
     shares = (np.arange(parts) + 1.0) / parts
     inside = np.array([[path.at(s), path.slope(s) / size] for s in shares]).transpose(2, 0, 1)
+    whole = (np.abs(inside[:, :, 0]).max(axis=1) <= quiet).tolist()
     tied = joined(steps)
     phase = steps["phase"]
     seated = phase >= 3.0
@@ -247,8 +263,9 @@ def _along_tie(
         if H > 0.0 and open_[i - 1]:
             ends.drift(H, k, per_mass)
         elif H > 0.0:
-            for deep, rate in inside[i].tolist():
-                beyond, gives = ends.drift(H / parts, k, per_mass)
+            places = inside[i, -1 if whole[i] else 0 :].tolist()
+            for deep, rate in places:
+                beyond, gives = ends.drift(H / len(places), k, per_mass)
                 ends.act((beyond + deep) / gives)
                 ends.meet(rate, per_mass)
                 yield ends.y, ends.y  # between rows the tip takes the path of the lower end

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import inf, sqrt
 
 import numpy as np
 
-from ..motion.events import Event
 from ..results.columns import MOST_SHOWN, normal_compliance
 from ..results.dense import between_rows
-from ..results.totals import shortest_contact
 from ..scene import Scene
 from ..scene.laws import stiffest
 from ..scene.loads import TableLoad
-from ..scene.resolution import SHORT, SHORT_IMPULSE, not_resolved, oscillating, window_of
+from ..scene.resolution import not_resolved, oscillating, window_of
 from .loads import ON_BEAM, ON_SPRING
 from .stepping import Pair
 
@@ -43,19 +40,14 @@ def not_shown(scene: Scene, pair: Pair, steps: np.ndarray) -> str | None:
     return _NOT_SHOWN if too_large else None
 
 
-def why_not_resolved(
-    scene: Scene, pair: Pair, H: float, steps: np.ndarray, events: Sequence[Event], misplaced: float | None
-) -> str | None:
-    """Return in words why a run in steps of H [s] whose ends are ``misplaced`` is not resolved; ``None`` if it is."""
-    least = SHORT_IMPULSE * least_momentum(pair, steps)
-    lasted = shortest_contact(scene, steps, events, SHORT * H, least)
+def why_not_resolved(scene: Scene, pair: Pair, steps: np.ndarray, misplaced: float | None) -> str | None:
+    """Return in words why a run whose ends are ``misplaced`` is not resolved; ``None`` if it is."""
     sizes = steps["size"][steps["size"] > 0.0]
     late = float(np.sqrt(np.mean(sizes**3) / np.mean(sizes))) if scene.coupling.adaptive and len(sizes) else None
     return not_resolved(
         scene,
         misplaced or 0.0,
         oscillations=oscillating(scene, _oscillations(pair, steps)),
-        shortest_contact=lasted,
         left_out=left_out(pair, steps),
         between_rows=between_rows(scene, steps),
         H=late,
@@ -128,27 +120,6 @@ def _together(pair: Pair, steps: np.ndarray) -> float:
     stiffness = sum(float(np.max(k)) for k in known if k is not None) if len(steps) else 0.0
     inertia = pair.upper.inertia + pair.lower.inertia
     return sqrt(stiffness / inertia) if 0.0 < stiffness < inf and 0.0 < inertia < inf else 0.0
-
-
-def least_momentum(pair: Pair, steps: np.ndarray) -> float:
-    """Return the smaller one of both bodies' largest momenta [kg·m/s], without waves that a body carries.
-
-    That of a body that does not move does not count; ∞ if there is none.
-    """
-    if not len(steps):
-        return inf
-    momenta = []
-    duration = pair.setup.end - pair.setup.start
-    for body, name, velocity in ((pair.upper, "u_tip", "v_tip_after"), (pair.lower, "y", "z_after")):
-        speed = float(np.abs(steps[velocity]).max())
-        momentum = body.mass * speed if speed > 0.0 else 0.0
-        omega, _ = body.oscillation() or (0.0, 0.0)
-        if omega > 0.0 and body.inertia > body.mass:  # its end is lighter than what swings
-            quarter = min(2.0 / omega, duration or inf)
-            momentum = max(momentum, body.inertia * float(np.ptp(steps[name])) / quarter)
-        if momentum > 0.0:
-            momenta.append(momentum)
-    return min(momenta, default=inf)
 
 
 # -- what steps leave out of measured loads ----------------------------------------------------------------------------

@@ -27,7 +27,7 @@ def summary(scene: Scene, master: Master, recorder: Recorder) -> dict[str, Any]:
     made = int(np.count_nonzero(np.diff(steps["time"])))
     energies, warnings, changed = master.balance.report(steps)
     off = misplaced(pair, steps, events)
-    unresolved = why_not_resolved(scene, pair, master.steps.size, steps, events, off)
+    unresolved = why_not_resolved(scene, pair, steps, off)
     warnings += filter(None, [unresolved or peak_force_doubt(scene), not_shown(scene, pair, steps)])
     warnings += filter(None, [unknown(scene, pair), coarse_force(pair)])
     window = force_window(scene, pair, steps)

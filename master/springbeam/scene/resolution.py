@@ -7,7 +7,7 @@ of the beam, not of its mesh, which cost little; `springbeam.studies.stability.p
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import inf, pi, sqrt
+from math import pi, sqrt
 from typing import Any, NamedTuple
 
 from .frequencies import (
@@ -22,7 +22,7 @@ from .linearised import bent_energy, spring_frequency
 from .messages import Rule, texts_of
 from .scene import Scene
 from .statics import initial_kinetic_energy
-from .tables import ORDINARY_SCHEMES, Beam
+from .tables import Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
 TURN = 1.0
@@ -38,8 +38,9 @@ MISPLACED_TIED = (0.0025, 0.002, 0.001)
 #: Largest displacement of an end by the part of measured loads that the steps leave out, as a share of its motion;
 #: known to a factor of 3.
 LEFT_OUT = 0.01
-#: Largest error of an end between the rows, as a share of its motion (`springbeam.results.dense.between_rows`).
-BETWEEN_ROWS = 0.01
+#: Largest error of an end between the rows, as a share of its motion (`springbeam.results.dense.between_rows`): where
+#: waves turn by more than 2π in a step, up to half of the error.
+BETWEEN_ROWS = 0.005
 #: Largest lag of waves at the end of the run by the midpoint rule [rad]: of the fastest ones that an impact excites;
 #: without an impact, of a few times the beam's lowest frequency, or of a load, which move the tip more.
 WAVE_LAG = 1.0
@@ -47,10 +48,6 @@ SMOOTH_LAG = 0.01
 SMOOTH_WAVES = 5.0
 #: Energy of a start that is bent enough to count, over that of its velocity.
 BENT = 1e-4
-#: Macro steps that a contact must last for its end not to be decided by the force of one or two of them.
-SHORT = 1.0
-#: Impulse of a short contact, as a share of the smaller momentum of both bodies, below which it is ignored.
-SHORT_IMPULSE = 0.1
 #: Periods of the fastest wave of the mesh that a window must hold for the mean of a rigid force to be settled to 5 %.
 SETTLED = 2.5
 #: Share of the slowest period over which the contact force is averaged.
@@ -62,7 +59,6 @@ class _Seen(NamedTuple):
     """Measures of the resolution of a run: parameters of `not_resolved`."""
 
     misplaced: float
-    shortest_contact: float
     left_out: float
     between_rows: float
     H: float | None
@@ -73,7 +69,6 @@ def not_resolved(
     scene: Scene,
     misplaced: float = 0.0,
     *,
-    shortest_contact: float = inf,
     left_out: float = 0.0,
     between_rows: float = 0.0,
     H: float | None = None,
@@ -87,9 +82,6 @@ def not_resolved(
         The scene as run.
     misplaced
         Distance of an end from its position under the contact law, relative to its displacement.
-    shortest_contact
-        Duration of the shortest contact, touch or rest on the foundation [s]; for a soft law it counts if the force is
-        exchanged once per macro step.
     left_out
         Displacement of an end by the part of tables that the steps leave out, relative to its displacement.
     between_rows
@@ -101,7 +93,7 @@ def not_resolved(
     """
     slow = slow_oscillations(scene) if oscillations is None else oscillations
     causes = _OF_ALL_STEPS if scene.coupling.adaptive else (*_OF_EQUAL_STEPS, *_OF_ALL_STEPS)
-    return next(texts_of(scene, causes, _Seen(misplaced, shortest_contact, left_out, between_rows, H, slow)), None)
+    return next(texts_of(scene, causes, _Seen(misplaced, left_out, between_rows, H, slow)), None)
 
 
 def lateness(scene: Scene, turn: float) -> float:
@@ -289,19 +281,6 @@ _OF_ALL_STEPS = (
         _law_missed,
         "not resolved: the forces of the steps differ from the contact law, which moves an end by {far} of its motion. "
         "Velocities, forces and times of contact are samples of a faster motion; {remedy}",
-    ),
-    Rule(  # a force that does not see the contact end
-        lambda s, seen: (
-            not s.coupling.adaptive
-            and (s.degree > 0 if s.contact.rigid else s.coupling.scheme in ORDINARY_SCHEMES)
-            and seen.shortest_contact < SHORT * s.coupling.H
-        ),
-        "not resolved: a contact lasts {steps:.2g} macro steps only, so that the force of one or two steps decides "
-        "when it ends, and with it what follows; coupling.macro_step <= {size} resolves it",
-        lambda s, seen: {
-            "steps": seen.shortest_contact / s.coupling.H,
-            "size": _rounded_down(seen.shortest_contact / SHORT),
-        },
     ),
     Rule(  # rows that are right; it falls no slower than with H where twice as many steps follow what turned by π
         lambda s, seen: seen.between_rows > BETWEEN_ROWS,
