@@ -1,11 +1,55 @@
-"""Scenes that the references are tested with, and an integration of theirs by scipy."""
+"""Scenes that the references are tested with, an integration of theirs by scipy; references that are kept on disk."""
+
+import hashlib
+import os
+import pickle
+import platform
+import shutil
+from functools import cache
+from pathlib import Path
 
 import numpy as np
+import scipy
 from scenes import scene_from_dict
 from scipy.integrate import solve_ivp
 
+import springbeam
 from springbeam.monolithic.event_driven import integrate
 from springbeam.monolithic.exponential import ExponentialPropagator
+
+#: Where references are kept between runs of the tests.
+KEPT = Path(__file__).parents[2] / "build" / "cache" / "references"
+
+
+@cache
+def folder_of_references():
+    """Return the folder of references by this code and these libraries; those by others are removed."""
+    made_by = hashlib.sha256(f"{np.__version__} {scipy.__version__} {platform.version()}".encode())
+    made_by.update(os.environ.get("OPENBLAS_CORETYPE", "").encode())
+    for part in ("monolithic", "motion", "results", "scene"):
+        for path in sorted((Path(springbeam.__file__).parent / part).rglob("*.py")):
+            made_by.update(path.read_bytes())
+    folder = KEPT / made_by.hexdigest()[:16]
+    for other in KEPT.glob("*"):
+        if other != folder:
+            shutil.rmtree(other, ignore_errors=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def reference(scene, **options):
+    """Return the event-driven reference of a scene: that of an earlier run of the tests if the code is the same."""
+    if any(load.signal == "table" for load in scene.loads):  # the file may have changed
+        return integrate(scene, **options)
+    asked = pickle.dumps((scene.model_dump_json(), {name: np.asarray(given) for name, given in options.items()}))
+    file = folder_of_references() / hashlib.sha256(asked).hexdigest()
+    if file.exists():
+        return pickle.loads(file.read_bytes())
+    found = integrate(scene, **options)
+    part = file.with_name(f"{file.name}.{os.getpid()}")
+    part.write_bytes(pickle.dumps(found))
+    part.replace(file)
+    return found
 
 
 def dips(restitution, turn):

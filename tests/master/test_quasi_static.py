@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from bodies import bodies, simulate
+from references import reference
 from scenes import scene_from_dict
 from scipy.sparse.linalg import spsolve
 
 from springbeam.bodies.protocol import Motion
 from springbeam.bodies.quasi_static import QuasiStaticBeam
 from springbeam.contact.events import Holding
-from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import assemble, constant_forces
 from springbeam.scene import Beam, Coupling, statics
 from springbeam.scene.statics import SHAPE_POINTS
@@ -110,7 +110,7 @@ def test_where_the_force_vanishes_as_the_spring_falls_through_its_equilibrium_th
 def test_what_holds_the_ends_is_the_force_of_the_reference_over_the_stiffness():
     """C/k and its rate, by the accelerations of the reference."""
     given = scene(stop={"position": -0.05}, beam={"alpha_b": 0.02})
-    exact = event_driven.integrate(given)
+    exact = reference(given)
     compliance, alpha = statics.tip_compliance(given.beam), given.beam.alpha_b
     joined = np.isin(exact.phase, ("tied", "touch"))
     y, z, force, acceleration = (exact[name][joined] for name in ("y", "z", "contact_force", "a_y"))

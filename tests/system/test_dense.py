@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import scenes
+from references import reference
 
 from springbeam import load_scene, simulate
-from springbeam.monolithic import event_driven
 from springbeam.results.steps import impulse
 from springbeam.results.steps import joined as are_joined
 from springbeam.studies.metrics import METRICS
@@ -95,7 +95,7 @@ def test_times_that_are_not_known_are_refused(tmp_path):
         (run, [0.01, 0.06], r"time 0\.06 s: the run is known from 0\.0 s to 0\.05 s"),
         (run, np.nan, "time nan s"),
         (run, [[0.01, 0.02]], r"shape \(1, 2\)"),
-        (event_driven.integrate(run.scene), 0.01, "this run has no data between its rows"),
+        (reference(run.scene), 0.01, "this run has no data between its rows"),
     ):
         with pytest.raises(ValueError, match=said):
             known.at(times)

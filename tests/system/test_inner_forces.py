@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from references import reference
 
 from springbeam import load_scene, simulate, with_changes
-from springbeam.monolithic import event_driven
 from springbeam.pictures import panels
 from springbeam.studies.metrics import METRICS
 
@@ -34,7 +34,7 @@ def test_they_converge_to_the_reference_of_the_same_mesh(changes):
         run = simulate(scene)
         assert np.array_equal(run.a_tip, run.a_y)  # joined throughout
         times = run.time[2:-1]
-        exact = event_driven.integrate(scene, sample_times=times)
+        exact = reference(scene, sample_times=times)
         rows = np.searchsorted(exact.time, times)
         assert np.array_equal(exact.time[rows], times)
         off = {
@@ -72,7 +72,7 @@ def test_at_an_event_the_tip_has_the_acceleration_before_it():
         ({"loads": [{"on": "base", "amplitude": 0.5}]}, -6.0, -6.0),
     ],
 )
-@pytest.mark.parametrize("simulated", [simulate, event_driven.integrate])
+@pytest.mark.parametrize("simulated", [simulate, reference])
 def test_the_clamp_bears_what_loads_a_beam_at_rest(given, force, moment, simulated):
     """ρA = 6 kg/m, L = 2 m; N and N·m of the load about the clamp, on the beam and on its reference."""
     beam = {"density": 2.0, "area": 3.0, "length": 2.0, "n_elements": 4, "approach": "elastic"}

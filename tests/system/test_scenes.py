@@ -4,10 +4,9 @@ import bodies
 import numpy as np
 import pytest
 import scenes
-from references import integrated_anew
+from references import integrated_anew, reference
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
-from springbeam.monolithic import event_driven
 from springbeam.results.contact_times import contact_changes
 
 CASES = scenes.TABLE["cases"]
@@ -17,7 +16,7 @@ def beside_reference(scene, run_of, bounds, _):
     """Compare events, motion and energy with those of the event-driven reference."""
     run = run_of(scene)
     rows = np.searchsorted(run.time, np.unique(run.time)[:: len(run) // 100 + 1], side="right") - 1
-    exact = event_driven.integrate(scene, sample_times=run.time[rows])
+    exact = reference(scene, sample_times=run.time[rows])
     starts, among = bounds.get("starts", []), bounds.get("among", [])
     for found in (scenes.kinds(run), scenes.kinds(exact)):
         assert found[: len(starts)] == starts

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from commands import HANGS
+from references import reference
 from scenes import kinds, soft
 
-from springbeam.monolithic import event_driven
 from springbeam.results.distance import motion
 from springbeam.scene import load_scene, with_changes
 from springbeam.studies import tradeoff
@@ -21,7 +21,7 @@ def test_a_curve_between_few_points_is_judged_too(monkeypatch):
     coarse = next(case for case in study.cases().values() if case["family"] == "energy 2")
     scene = with_keys(study.scene, coarse)
     run = tradeoff.run_in_memory(scene)
-    exact = event_driven.integrate(scene, sample_times=run.time)
+    exact = reference(scene, sample_times=run.time)
     rows = np.searchsorted(exact.time, run.time)
     at_points = motion(run.columns, {name: exact[name][rows] for name in ("u_tip", "y")})
     assert study.record(coarse)["error_motion"] > 3.0 * at_points
@@ -30,7 +30,7 @@ def test_a_curve_between_few_points_is_judged_too(monkeypatch):
 def test_what_a_configuration_costs_and_where_it_errs_is_that_of_its_run():
     """The spring strikes its stop once."""
     scene = soft(time={"t_end": 0.12})
-    run, exact = tradeoff.run_in_memory(scene), event_driven.integrate(scene)
+    run, exact = tradeoff.run_in_memory(scene), reference(scene)
     row, summary = {**costs(run), **tradeoff._errors(run, exact)}, run.summary
     counts = {f"cost_{name}": sum(summary[f"{body}_{of}"] for body in ("beam", "spring"))
               for name, of in (("do_steps", "steps"), ("rollbacks", "rollbacks"))}  # fmt: skip

@@ -7,9 +7,9 @@ linear spring that is unloaded at y₀ is one that is unloaded at 0 under a furt
 import numpy as np
 import pytest
 import scenes
+from references import reference
 
 from springbeam import SceneError, load_scene, simulate, with_changes
-from springbeam.monolithic import event_driven
 from springbeam.paper import co_simulation, monolithic
 from springbeam.scene import scene_from_dict
 from springbeam.scene.linearised import spring_frequency, spring_stiffness, well_depth
@@ -47,7 +47,7 @@ def run_at(scene):
 
 
 def reference_at(scene):
-    return event_driven.integrate(scene, sample_times=TIMES)
+    return reference(scene, sample_times=TIMES)
 
 
 @pytest.mark.parametrize("program", [run_at, reference_at])
@@ -72,7 +72,7 @@ def test_a_spring_that_is_moved_with_its_stop_has_the_same_motion(program, k2):
     ],
     ids=["transmission", "compliance", "tie", "link", "quasi static"],
 )
-@pytest.mark.parametrize("program", [simulate, event_driven.integrate])
+@pytest.mark.parametrize("program", [simulate, reference])
 def test_a_linear_spring_is_one_under_the_load_of_its_preload(program, tables):
     scene = with_changes(scene_from_dict(PAIR), **tables)
     moved = program(with_changes(scene, spring={"unloaded": Y0}))

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import printed
+from references import reference
 from scenes import scene_from_dict
 
 from springbeam import RunStopped, SceneError, load_scene, with_changes
-from springbeam.monolithic import event_driven
 from springbeam.results.distance import Distance, distance
 from springbeam.results.files import load_trajectory
 from springbeam.results.recording import MemoryRecorder
@@ -44,9 +44,9 @@ def test_the_promise_is_kept_on_the_whole_curve(name):
     first, second = (simulate(scene_from_dict({**SCENES[name], "accuracy": accuracy})) for accuracy in (1e-3, 1e-4))
     rows = [found.time[:: len(found) // 25 + 1] for found in (first, second)]
     times = np.unique(np.concatenate([np.linspace(first.time[0], first.time[-1], 201), *rows]))
-    reference = event_driven.integrate(first.scene, sample_times=times)
+    exact = reference(first.scene, sample_times=times)
     for found in (first, second):
-        asked, wrong = found.summary["accuracy"]["asked"], errors(found, reference)
+        asked, wrong = found.summary["accuracy"]["asked"], errors(found, exact)
         assert max(wrong.values()) <= asked, wrong
         assert max(found.summary["accuracy"]["estimated_errors"].values()) <= asked / 1.5
 
@@ -210,7 +210,7 @@ HARD = {
 def test_runs_agree_where_rounding_decides(name):
     tables, most = HARD[name]
     run = simulate(scene_from_dict(tables))
-    exact = event_driven.integrate(run.scene, sample_times=np.linspace(0.0, tables["time"]["t_end"], 401)[1:])
+    exact = reference(run.scene, sample_times=np.linspace(0.0, tables["time"]["t_end"], 401)[1:])
     for column in {"u_tip", "y"} & set(run.columns):
         off = np.abs(run.at(exact.time)[column] - exact[column]).max()
         assert off <= tables["accuracy"] * np.ptp(exact[column]) + 1e-15
