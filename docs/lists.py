@@ -9,6 +9,7 @@ from pathlib import Path
 from pages import DOCS, table, with_section  # beside this script
 
 from springbeam import Body, cli, load_scene
+from springbeam.contact.phases import TRANSITIONS
 from springbeam.pictures.drawing import GLOSSARY
 from springbeam.results.totals import LOSS_NAMES, TOTALS
 from springbeam.results.trajectory import BODY_COLUMNS, COLUMNS
@@ -65,6 +66,24 @@ def words() -> list[str]:
     return table(("word", "meaning"), [(name.replace("_", " "), meaning) for name, meaning in GLOSSARY.items()])
 
 
+def phases() -> list[str]:
+    rows = []
+    for row in TRANSITIONS:
+        seat = {(True,): ["*seated*"], (False,): ["not *seated*"]}.get(row.seated, [])
+        phase = ", ".join([*([] if row.joint is None else [f"*{row.joint}*"]), *seat])
+        said = [" ".join((part.__doc__ or "").split()).rstrip(".") for part in (row.guard, row.effect)]
+        rows.append((WHERE[row.where], phase, said[0], f"`{row.kind}`", said[1]))
+    return table(("where", "phase", "lasts while", "else", "what happens, and the next phase"), rows)
+
+
+#: Where a transition exists, by `Transition.where`.
+WHERE = {
+    "rigid": "a rigid law between two ends",
+    "strikes": "the law `transmission`",
+    "founded": "a foundation",
+    "carried": "a foundation below two ends",
+    "alone": "a foundation below the tip alone",
+}
 #: Methods of a body of one's own, the needed ones first.
 MEMBERS = (
     *("advance", "motion", "mark", "rewind", "apply_impulse", "holding_force", "energies", "stiffness"),
@@ -76,6 +95,7 @@ BLOCKS: dict[Path, dict[str, Callable[[], list[str]]]] = {
     DOCS.parent / "README.md": {"scenes": scenes},
     DOCS / "api.md": {"body": body},
     DOCS / "commands.md": {"commands": commands, "options": options},
+    DOCS / "coupling.md": {"phases": phases},
     DOCS / "files.md": {"columns": columns, "results": results},
     DOCS / "measured.md": {"classes": classes},
     DOCS / "model.md": {"words": words},

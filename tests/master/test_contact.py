@@ -6,20 +6,20 @@ import pytest
 from bodies import interface_of
 
 from springbeam import Motion, load_scene, with_changes
-from springbeam.contact.phases import (
-    Impact,
-    Joint,
-    Phase,
-    Transitions,
-)
+from springbeam.contact.impacts import NO_IMPACT
+from springbeam.contact.phases import Automaton, Instant, Joint, Outcome, Phase
 from springbeam.motion.events import EventKind
 from springbeam.scene.laws import Compliance, Link, depth
 
 
-def transitions_of(scene="soft", tip_mass=0.01, mass=1.0, equilibrium=0.0, **tables):
-    """The transitions of a scene whose largest speed so far is 1 m/s."""
-    scene = with_changes(load_scene(scene), **tables)
-    return Transitions(interface_of(scene, tip_mass, mass, equilibrium), lambda: 1.0)
+def automaton_of(scene="soft", tip_mass=0.01, mass=1.0, equilibrium=0.0, **tables):
+    """The phases of a scene."""
+    return Automaton(interface_of(with_changes(load_scene(scene), **tables), tip_mass, mass, equilibrium))
+
+
+def instant(phase, ends, contact=0.0, tolerance=1e-17, start=None, elapsed=0.0):
+    """Where an event happens in a run whose largest speed so far is 1 m/s."""
+    return Instant(phase, ends, start or ends, elapsed, contact, tolerance, tolerance, 1.0)
 
 
 @pytest.mark.parametrize("kind", [EventKind.RELEASE, EventKind.SEPARATION])
@@ -28,7 +28,7 @@ def test_ends_that_part_have_one_velocity(kind, v):
     """That of their momentum."""
     z, tip_mass, mass = 0.5, 0.01, 1.0
     ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, z, 0.0, 0.0)
-    _, phase, impact = transitions_of().after(kind, Phase(Joint.TIED), ends, 0.0, ends, 0.0, 1e-17)
+    _, phase, impact = automaton_of().after(kind, instant(Phase(Joint.TIED), ends))
     assert phase.joint is Joint.FREE
     v_after, z_after = v + impact.on_beam / tip_mass, z + impact.on_spring / mass
     assert v_after == pytest.approx(z_after, rel=1e-14)
@@ -39,16 +39,14 @@ def test_ends_that_part_have_one_velocity(kind, v):
 def test_ends_that_are_let_go_with_one_velocity_to_rounding_get_no_impulse(seated):
     """Such as those that have just met: 1e-15 of the largest speed is no error of a scheme."""
     ends = tuple(Motion(0.0, velocity, 0.0, 0.0) for velocity in (1e-15, 0.0))
-    _, _, impact = transitions_of().after(EventKind.SEPARATION, Phase(Joint.TOUCH, seated), ends, 0.0, ends, 0.0, 1e-17)
-    assert impact == Impact()
+    _, _, impact = automaton_of().after(EventKind.SEPARATION, instant(Phase(Joint.TOUCH, seated), ends))
+    assert impact == NO_IMPACT
 
 
 @pytest.mark.parametrize(("z", "kind"), [(-0.5, "retie"), (0.5, "separation")])
 def test_a_massless_tip_whose_force_vanishes_at_equilibrium_is_tied_again_if_it_falls(z, kind):
     ends = (Motion(0.0, z, 0.0, 0.0),) * 2
-    found, phase, _ = transitions_of(tip_mass=0.0).after(
-        EventKind.SEPARATION, Phase(Joint.TOUCH), ends, 0.0, ends, 0.0, 1e-17
-    )
+    found, phase, _ = automaton_of(tip_mass=0.0).after(EventKind.SEPARATION, instant(Phase(Joint.TOUCH), ends))
     assert (found, phase.joint) == (kind, Joint.TIED if kind == "retie" else Joint.FREE)
 
 
@@ -59,7 +57,7 @@ def test_a_massless_tip_whose_force_vanishes_at_equilibrium_is_tied_again_if_it_
 def test_where_they_go_tells_what_ends_are_that_meet_at_equilibrium_to_rounding(height, v, z, joint):
     """Together: a hundredth of the mass that falls by 1 m/s stops a top that rises by 1 cm/s."""
     ends = Motion(0.1 + height, v, 0.0, 0.0), Motion(0.1 + height, z, 0.0, 0.0)
-    _, phase, _ = transitions_of(equilibrium=0.1).after(EventKind.IMPACT, Phase(), ends, 0.0, ends, 0.0, 1e-18)
+    _, phase, _ = automaton_of(equilibrium=0.1).after(EventKind.IMPACT, instant(Phase(), ends, tolerance=1e-18))
     assert phase.joint.value == joint
 
 
@@ -68,9 +66,9 @@ def test_where_they_go_tells_what_ends_are_that_meet_at_equilibrium_to_rounding(
 )
 def test_what_a_heavier_tip_takes_up_at_once_has_struck_for_the_last_time_unless_nothing_is_lost(v, e, kind):
     """A top that falls on the foundation by 0.5 m/s, tied to a tip of ten times its mass."""
-    transitions = transitions_of(tip_mass=10.0, stop={"restitution": e, "position": -0.015})
+    automaton = automaton_of(tip_mass=10.0, stop={"restitution": e, "position": -0.015})
     ends = tuple(Motion(-0.015, w, 0.0, 0.0) for w in (v, -0.5))
-    found, *_ = transitions.after(EventKind.STOP_IMPACT, Phase(Joint.TIED), ends, 0.0, ends, 0.0, 1e-17)
+    found, *_ = automaton.after(EventKind.STOP_IMPACT, instant(Phase(Joint.TIED), ends))
     assert found == kind
 
 
@@ -78,10 +76,10 @@ def test_what_a_heavier_tip_takes_up_at_once_has_struck_for_the_last_time_unless
 @pytest.mark.parametrize(("scene", "joint"), [("beam-on-stop", Joint.TIED), ("soft", Joint.FREE)])
 def test_what_lies_on_the_foundation_at_rest_is_held_there(scene, joint, e):
     """A tip alone by a contact force, a spring top by the foundation; nothing takes an impulse, not even one of −0."""
-    transitions = transitions_of(scene, stop={"restitution": e, "position": -0.015})
+    automaton = automaton_of(scene, stop={"restitution": e, "position": -0.015})
     ends = (Motion(-0.015, 0.0, 0.0, 0.0),) * 2
-    found = transitions.after(EventKind.STOP_IMPACT, Phase(), ends, 0.0, ends, 0.0, 1e-17)
-    assert repr(found) == repr((EventKind.SEATED, Phase(joint, seated=True), Impact()))
+    found = automaton.after(EventKind.STOP_IMPACT, instant(Phase(), ends))
+    assert repr(found) == repr(Outcome(EventKind.SEATED, Phase(joint, seated=True)))
 
 
 @pytest.mark.parametrize("v", [0.19, -3.0])
@@ -92,9 +90,9 @@ def test_a_tip_that_leaves_the_foundation_leaves_at_rest(kind, mass, v):
     A tip that leaves tied to the top with another velocity would strike the foundation at once, or fly higher.
     """
     tip_mass, held = 0.01, Phase(Joint.TIED if mass == inf else Joint.TOUCH, seated=True)
-    transitions = transitions_of("beam-on-stop" if mass == inf else "soft", mass=mass)
+    automaton = automaton_of("beam-on-stop" if mass == inf else "soft", mass=mass)
     ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, 0.0, 0.0, 0.0)
-    found, phase, impact = transitions.after(EventKind(kind), held, ends, 0.0, ends, -1.0, 1e-17)
+    found, phase, impact = automaton.after(EventKind(kind), instant(held, ends, contact=-1.0))
     opened = Phase(Joint.TOUCH) if kind == "unseated" else Phase(Joint.FREE, seated=mass < inf)
     assert (found, phase) == (kind, opened)
     assert impact.on_spring == 0.0
@@ -108,10 +106,10 @@ def test_a_tip_that_leaves_the_foundation_leaves_at_rest(kind, mass, v):
 ])  # fmt: skip
 def test_a_rebound_that_is_lower_than_heights_can_be_told_apart_is_none_if_it_is_slow(speed, tolerance, kind):
     """It rises by (e z)²/2a with a = 1 km/s², 4.9e-12 m, and counts as none below 1e-4 of the fastest impact."""
-    transitions = transitions_of(stop={"restitution": 0.9, "position": -0.015})
+    automaton = automaton_of(stop={"restitution": 0.9, "position": -0.015})
     for z in (-1.0, -speed / 0.9):
         before, end = ((Motion(0.0, 0.0, 0.0, 0.0), Motion(-0.015, w, 0.0, 0.0)) for w in (z + 1e-3, z))
-        found, *_ = transitions.after(EventKind.STOP_IMPACT, Phase(), before, 1e-6, end, 0.0, tolerance)
+        found, *_ = automaton.after(EventKind.STOP_IMPACT, instant(Phase(), end, 0.0, tolerance, before, 1e-6))
     assert found == kind
 
 

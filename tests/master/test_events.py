@@ -8,8 +8,8 @@ import pytest
 from bodies import DuffingBody, Upper, interface_of
 
 from springbeam.bodies.protocol import NO_FORCE, Motion, StepRefused
-from springbeam.contact.events import EventFunctions, locate, no_dip, position_tolerance
-from springbeam.contact.phases import Joint, Phase
+from springbeam.contact.events import locate, no_dip, position_tolerance
+from springbeam.contact.phases import Automaton, Joint, Phase
 from springbeam.coupling.protocol import Step
 from springbeam.motion.paths import Path
 from springbeam.run.detection import Detector
@@ -97,10 +97,27 @@ def test_what_may_happen_in_a_phase_is_as_far_away_as_it_is_and_comes_as_fast_as
 ):
     """Ψ is at 0.1 m, the stop at −15 mm; joined ends move with the velocity of their momentum."""
     scene = with_changes(load_scene(scene), **tables)
-    functions = EventFunctions(interface_of(scene, equilibrium=0.1))
-    samples = functions.samples(phase, RISING)
-    found = dict(zip((kind for kind, _ in functions.of(phase)), samples, strict=True))
+    automaton = Automaton(interface_of(scene, equilibrium=0.1))
+    samples = automaton.samples(phase, RISING)
+    found = dict(zip((kind for kind, _ in automaton.guards(phase).functions), samples, strict=True))
     assert found == {kind: pytest.approx(sample, rel=1e-14) for kind, sample in expected.items()}
+
+
+@pytest.mark.parametrize(("scene", "tables", "phase", "expected"), [
+    ("soft", {}, Phase(), None),
+    ("soft", {}, Phase(Joint.TIED), None),
+    ("soft", {}, Phase(Joint.TOUCH), ("separation", "contact")),
+    ("soft", {"contact": {"law": "tie"}}, Phase(Joint.TIED), None),
+    ("soft", SOFTLY, Phase(Joint.TOUCH), None),
+    *(("soft", {}, Phase(joint, seated=True), ("unseated", "foundation")) for joint in Joint),
+    ("soft", SOFTLY, Phase(Joint.TOUCH, seated=True), ("unseated", "foundation")),
+    ("beam-on-stop", {}, Phase(), None),
+    ("beam-on-stop", {}, Phase(Joint.TIED, seated=True), ("separation", "contact")),
+])  # fmt: skip
+def test_a_phase_that_lasts_while_a_force_pushes(scene, tables, phase, expected):
+    """A seated top is left first: while the foundation holds it, a tip that touches it is not looked at."""
+    interface = interface_of(with_changes(load_scene(scene), **tables), equilibrium=0.1)
+    assert Automaton(interface).guards(phase).force == expected
 
 
 @pytest.mark.parametrize(("rate", "fastest", "stays"), [(0.0, 0.9, True), (0.0, 1.1, False), (5.0, 0.9, False)])

@@ -1,4 +1,4 @@
-"""When the bodies touch and what that does: phases and impacts (``phases``), event functions (``events``).
+"""When the bodies touch and what that does: phases (``phases``), guards that end them (``events``), ``impacts``.
 
 ``interface`` says what may meet. Imports `bodies`. Start at ``phases``.
 """

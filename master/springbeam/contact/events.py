@@ -11,10 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..bodies.protocol import Body, Ends
-from ..motion.events import EventKind, Joint
 from ..motion.paths import EPS, Means, Sample
-from .interface import Interface
-from .phases import Phase
 
 _MAX_EVALUATIONS = 60
 
@@ -80,58 +77,6 @@ class Holding:
 #: f of the ends (tip, lower end), positive while nothing happens. A call returns f and ḟ, `means` those of f over the
 #: step of a size [s] that has ended at ``ends``, ``None`` if nobody knows.
 EventFunction = Gap | Height | Holding
-
-
-class EventFunctions:
-    """Which event functions each phase has, by the kind of their event.
-
-    Joined ends have the rate of their common velocity: they differ from each other by what the energy schemes leave
-    open, and one of them may even go the other way.
-    """
-
-    def __init__(self, interface: Interface) -> None:
-        self._interface = interface
-        self._meets = interface.rigid and not interface.lasting
-        self._phase: Phase | None = None
-        self._functions: list[tuple[EventKind, EventFunction]] = []
-        #: The ends last asked for, and the samples there: a step starts where the one before has ended.
-        self._ends: Ends | None = None
-        self._samples: list[Sample] = []
-
-    def of(self, phase: Phase) -> list[tuple[EventKind, EventFunction]]:
-        if phase is not self._phase:
-            self._phase, self._functions, self._ends = phase, self._built(phase), None
-        return self._functions
-
-    def samples(self, phase: Phase, ends: Ends) -> list[Sample]:
-        """f, ḟ of each function of ``phase``."""
-        if phase is not self._phase or ends != self._ends:
-            functions = self.of(phase)
-            self._ends = ends
-            self._samples = []
-            for _, function in functions:
-                self._samples.append(function(ends))
-        return self._samples
-
-    def _built(self, phase: Phase) -> list[tuple[EventKind, EventFunction]]:
-        tip = 0
-        low = 1
-        meets = self._interface
-        functions: list[tuple[EventKind, EventFunction]] = []
-        share = meets.tip_share if meets.rigid and phase.joint is not Joint.FREE else 0.0
-        if self._meets:
-            if phase.joint is Joint.FREE:
-                functions.append((EventKind.IMPACT, gap))
-            if phase.joint is Joint.TIED and not phase.seated:
-                functions.append((EventKind.RELEASE, Height(low, meets.equilibrium, share, -1.0)))
-            if phase.joint is Joint.TOUCH:
-                functions.append((EventKind.RETIE, Height(low, meets.equilibrium, share)))
-                if meets.upper.massless and not phase.seated:
-                    functions.append((EventKind.SEPARATION, Holding(meets.upper, meets.lower)))
-        if meets.floor is not None and not phase.seated:
-            striking = Height(tip, meets.floor, 1.0) if meets.alone else Height(low, meets.floor, share)
-            functions.append((EventKind.STOP_IMPACT, striking))
-        return functions
 
 
 def position_tolerance(ends: Ends, macro_step: float) -> float:

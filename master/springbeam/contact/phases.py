@@ -1,6 +1,8 @@
-"""Phases and impacts: who is joined to whom, and what an event changes.
+"""The phases of a run: what ends each one, and what happens then. `TRANSITIONS` is the whole automaton.
 
-``docs/model.md`` states the laws; section names below are its.
+A phase lasts as long as its guards are positive. A guard is a function of the ends (`springbeam.contact.events`) or a
+force that can only push; where the first of them falls through zero its event happens. The effect of the event is the
+next phase and an impact. ``docs/coupling.md``, "Events", shows the table; ``docs/model.md`` states the laws.
 """
 
 from __future__ import annotations
@@ -8,9 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal, NamedTuple
 
-from ..bodies.protocol import Ends, Motion
+from ..bodies.protocol import Ends
 from ..motion.events import EventKind, Joint
+from ..motion.paths import Sample
+from .events import EventFunction, Height, Holding, gap
+from .impacts import NO_IMPACT, Impact, foundation_impact, meeting, rebound
 from .interface import Interface, common_velocity
 
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only); slower than the
@@ -18,6 +24,10 @@ from .interface import Interface, common_velocity
 _SEATING_SPEED, _SEATING_SPEED_UNSEEN = 1e-8, 1e-4
 #: Rounding of a velocity, relative to the largest so far.
 VELOCITY_ROUNDING = 16.0 * 2.0**-52
+_TIP, _LOW = 0, 1
+
+#: A force that can only push: C between the ends, or N of the foundation.
+PushingForce = Literal["contact", "foundation"]
 
 
 @dataclass(frozen=True)
@@ -37,120 +47,163 @@ class Phase:
         return float(list(Joint).index(self.joint) + 3 * self.seated)
 
 
-@dataclass(frozen=True)
-class Impact:
-    """Impulses [N·s], upward on each body, and the energy they take away [J]."""
+class Instant(NamedTuple):
+    """What the effect of an event depends on."""
 
-    on_beam: float = 0.0
-    on_spring: float = 0.0
-    of_foundation: float = 0.0
-    energy_loss: float = 0.0
-
-
-def meeting(v: float, z: float, tip_mass: float, mass: float) -> Impact:
-    """Return the impact of tip [m/s, kg] and spring top [m/s, kg] (docs/model.md, "What happens at an event").
-
-    J = (z − v)/(1/m_tip + 1/m), equal and opposite, and both leave with one velocity. A massless tip takes no impulse.
-    """
-    if tip_mass == 0.0:
-        return Impact()
-    reduced = 1.0 / (1.0 / tip_mass + 1.0 / mass)
-    j = reduced * (z - v)
-    return Impact(on_beam=j, on_spring=-j, energy_loss=0.5 * reduced * (z - v) ** 2)
+    phase: Phase  #: which the event ends
+    ends: Ends  #: before the event
+    start: Ends  #: where the step began that ends with it
+    elapsed: float  #: size of that step [s]
+    contact: float  #: C [N]
+    tolerance: float  #: resolution of positions [m]
+    together: float  #: distance within which events are simultaneous [m]
+    fastest: float  #: the largest speed of an end so far [m/s]
 
 
-def rebound(velocity: float, mass: float, restitution: float) -> tuple[float, float]:
-    """Impulse −(1+e) m w [N·s] that reverses w to −e w, and its loss ½ m w² (1 − e²) [J]."""
-    # Taken from 0, the impulse on nothing is 0 and not −0.
-    return 0.0 - (1.0 + restitution) * mass * velocity, 0.5 * mass * velocity**2 * (1.0 - restitution**2)
+class Outcome(NamedTuple):
+    """What has happened: the event, the phase after it, and its impact."""
+
+    kind: EventKind
+    phase: Phase
+    impact: Impact = NO_IMPACT
 
 
-def foundation_impact(v: float, z: float, tip_mass: float, mass: float, restitution: float) -> Impact:
-    """Tip and spring top strike the foundation, each at its velocity [m/s]; a mass of 0 [kg] takes no part.
+class Guards(NamedTuple):
+    """What may end a phase."""
 
-    Each velocity is reversed by itself, so nothing is lost at e = 1.
-    """
-    on_beam, loss_beam = rebound(v, tip_mass, restitution)
-    on_spring, loss_spring = rebound(z, mass, restitution)
-    return Impact(on_beam, on_spring, on_spring + on_beam, loss_spring + loss_beam)
+    functions: list[tuple[EventKind, EventFunction]]
+    force: tuple[EventKind, PushingForce] | None
 
 
-class Transitions:
-    """What each kind of event does to the phase and to the velocities.
+class Automaton:
+    """The phases of one pair of ends; keeps the guards of the present phase.
+
+    Joined ends have the rate of their common velocity in the guards: they differ from each other by what the energy
+    schemes leave open, and one of them may even go the other way.
 
     Parameters
     ----------
     interface
         What may meet.
-    fastest
-        Returns the largest speed of an end so far [m/s].
     """
 
-    _hardest = 0.0  #: speed of the fastest impact on the foundation so far [m/s]
-
-    def __init__(self, interface: Interface, fastest: Callable[[], float]) -> None:
+    def __init__(self, interface: Interface) -> None:
         self._interface = interface
-        self._fastest = fastest
         self._tip_mass = interface.upper.mass
         self._mass = interface.lower.mass
-        self._alone = interface.alone
+        self._hardest = 0.0  #: speed of the fastest impact on the foundation so far [m/s]
+        self._phase: Phase | None = None
+        self._guards = Guards([], None)
+        #: The ends last asked for, and the samples there: a step starts where the one before has ended.
+        self._ends: Ends | None = None
+        self._samples: list[Sample] = []
 
-    def after(
-        self,
-        kind: EventKind,
-        phase: Phase,
-        start: Ends,
-        elapsed: float,
-        ends: Ends,
-        end_force: float,
-        tolerance: float,
-    ) -> tuple[EventKind, Phase, Impact]:
-        """The event's kind (an impact on the foundation may end seated), the phase after it, and the impact.
+    def guards(self, phase: Phase) -> Guards:
+        """Return what may end ``phase``."""
+        if phase is not self._phase:
+            self._phase = phase
+            self._guards = self._guards_of(phase)
+            self._ends = None
+        return self._guards
 
-        ``ends`` are (tip, lower end) before it, ``start`` the same ``elapsed`` [s] ago, where the step began that ends
-        with it, ``end_force`` is C [N], ``tolerance`` what positions can be told apart to [m].
-        """
-        tip, low = ends
-        if kind is EventKind.IMPACT:
-            return kind, *self._meet(phase, tip, low, tolerance)
-        if kind is EventKind.STOP_IMPACT:
-            return self._strike(phase, start, elapsed, ends, tolerance)
-        if kind is EventKind.RELEASE:
-            if end_force > 0.0:
-                return kind, Phase(Joint.TOUCH), Impact()
-            return kind, Phase(Joint.FREE), self._part(phase, tip, low)
-        if kind is EventKind.RETIE:
-            return kind, Phase(Joint.TIED), Impact()
-        if kind is EventKind.UNSEATED:
-            return kind, Phase(phase.joint), self._part(phase, tip, low) if self._ties(phase) else Impact()
-        assert kind is EventKind.SEPARATION
-        if self._tip_mass == 0.0 and low.velocity < 0.0 and self._at_equilibrium(low, tolerance):
-            return EventKind.RETIE, Phase(Joint.TIED), Impact()  # C vanishes at Ψ, where they are tied again
-        opened = Phase(Joint.FREE, seated=phase.seated and not self._alone)
-        return kind, opened, self._part(opened, tip, low)
+    def samples(self, phase: Phase, ends: Ends) -> list[Sample]:
+        """Return f, ḟ of each function of ``phase``."""
+        if phase is not self._phase or ends != self._ends:
+            functions = self.guards(phase).functions
+            self._ends = ends
+            self._samples = []
+            for _, function in functions:
+                self._samples.append(function(ends))
+        return self._samples
 
-    def _meet(self, phase: Phase, tip: Motion, low: Motion, tolerance: float) -> tuple[Phase, Impact]:
+    def after(self, kind: EventKind, at: Instant) -> Outcome:
+        """Return what happens where the guard of ``kind`` has become zero."""
+        return _EFFECTS[kind](self, at)
+
+    def _guards_of(self, phase: Phase) -> Guards:
+        functions: list[tuple[EventKind, EventFunction]] = []
+        force = None
+        for row in TRANSITIONS:
+            if getattr(self._interface, row.where) and row.joint in (None, phase.joint) and phase.seated in row.seated:
+                guard = row.guard(self._interface, phase)
+                if isinstance(guard, str):
+                    force = (row.kind, guard)
+                else:
+                    functions.append((row.kind, guard))
+        return Guards(functions, force)
+
+    # -- effects ----------------------------------------------------------------------------------------------------
+
+    def meet(self, at: Instant) -> Outcome:
+        """An inelastic impact; *tied* below Ψ or going there, else *touch*."""
+        tip, low = at.ends
         impact = meeting(tip.velocity, low.velocity, self._tip_mass, self._mass)
         common = low.velocity + impact.on_spring / self._mass
         if self._interface.lasting:
             tied = True
-        elif self._at_equilibrium(low, tolerance):
+        elif self._is_at_equilibrium(at):
             tied = common < 0.0 or (common == 0.0 and not self._rises_from_rest())
         else:
             tied = low.displacement < self._interface.equilibrium
         # A top that stands on the foundation is driven into it, and strikes it at once; not by a tip without mass or at
         # rest.
-        seated = phase.seated and (self._tip_mass == 0.0 or common == 0.0)
-        return Phase(Joint.TIED if tied else Joint.TOUCH, seated), impact
+        seated = at.phase.seated and (self._tip_mass == 0.0 or common == 0.0)
+        return Outcome(EventKind.IMPACT, Phase(Joint.TIED if tied else Joint.TOUCH, seated), impact)
+
+    def release(self, at: Instant) -> Outcome:
+        """*Touch* if C > 0; else the ends part: *free*."""
+        if at.contact > 0.0:
+            return Outcome(EventKind.RELEASE, Phase(Joint.TOUCH))
+        return Outcome(EventKind.RELEASE, Phase(Joint.FREE), self._parting(at.phase, at))
+
+    def tie(self, at: Instant) -> Outcome:
+        """*Tied*."""
+        return Outcome(EventKind.RETIE, Phase(Joint.TIED))
+
+    def part(self, at: Instant) -> Outcome:
+        """The ends take their common velocity and part: *free*; a massless tip that falls through Ψ is *tied*."""
+        _, low = at.ends
+        if self._tip_mass == 0.0 and low.velocity < 0.0 and self._is_at_equilibrium(at):
+            return self.tie(at)  # C vanishes at Ψ, where they are tied again
+        opened = Phase(Joint.FREE, seated=at.phase.seated and not self._interface.alone)
+        return Outcome(EventKind.SEPARATION, opened, self._parting(opened, at))
+
+    def strike(self, at: Instant) -> Outcome:
+        """What is at the foundation rebounds, the joined tip with it; *seated* where the rebound has died out."""
+        interface = self._interface
+        e = interface.restitution
+        with_tip = interface.alone or self._ties(at.phase)
+        masses = self._tip_mass if with_tip else 0.0, 0.0 if interface.alone else self._mass
+        v, z = (end.velocity for end in at.ends)
+        speed = max(abs(z), abs(v) if with_tip else 0.0)
+        self._hardest = max(self._hardest, speed)
+        after, before = (common_velocity(tip.velocity, low.velocity, *masses) for tip, low in (at.ends, at.start))
+        # It strikes while rising if the rebound would be over in no time.
+        dies_out = after > 0.0 or e * speed <= _SEATING_SPEED * self._hardest
+        if not interface.alone and at.elapsed > 0.0 and e * speed <= _SEATING_SPEED_UNSEEN * self._hardest:
+            # The flight shows what presses it down: C at its end may be wrong by what reverses a mismatch of
+            # velocities, (d + 1)(d + 2) times their quotient by the step. It rises by (e z)²/2a; each impact is found
+            # to no better than the tolerance, which brings it as much.
+            dies_out |= 0.5 * (e * after) ** 2 * at.elapsed <= at.tolerance * (before - after)
+        if (dies_out and e < 1.0) or speed == 0.0:
+            stays = Phase(Joint.TIED if interface.alone else at.phase.joint, seated=True)
+            return Outcome(EventKind.SEATED, stays, foundation_impact(v, z, *masses, restitution=0.0))
+        return Outcome(EventKind.STOP_IMPACT, at.phase, foundation_impact(v, z, *masses, restitution=e))
+
+    def leave(self, at: Instant) -> Outcome:
+        """The lower end leaves the foundation; a joined tip leaves with it, at rest."""
+        impact = self._parting(at.phase, at) if self._ties(at.phase) else NO_IMPACT
+        return Outcome(EventKind.UNSEATED, Phase(at.phase.joint), impact)
 
     def _ties(self, phase: Phase) -> bool:
         """Whether a rigid law holds the ends together in ``phase``."""
         return phase.joint is not Joint.FREE and self._interface.soft is None
 
-    def _at_equilibrium(self, low: Motion, tolerance: float) -> bool:
-        """Whether the lower end is at Ψ, to rounding."""
+    def _is_at_equilibrium(self, at: Instant) -> bool:
+        """Whether the lower end is at Ψ, as far as events are told apart."""
+        _, low = at.ends
         psi = self._interface.equilibrium
-        return abs(low.displacement - psi) <= 4.0 * tolerance + 1e-12 * abs(psi)
+        return abs(low.displacement - psi) <= 4.0 * at.together + 1e-12 * abs(psi)
 
     def _rises_from_rest(self) -> bool:
         """Whether a massless tip and the lower end, at rest together at Ψ, are pushed up."""
@@ -159,42 +212,89 @@ class Transitions:
         psi = self._interface.equilibrium
         return tip.massless and tip.holding_force(psi, 0.0) + low.holding_force(psi, 0.0) < 0.0
 
-    def _strike(
-        self,
-        phase: Phase,
-        start: Ends,
-        elapsed: float,
-        ends: Ends,
-        tolerance: float,
-    ) -> tuple[EventKind, Phase, Impact]:
-        """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
-        e = self._interface.restitution
-        with_tip = self._alone or self._ties(phase)
-        masses = self._tip_mass if with_tip else 0.0, 0.0 if self._alone else self._mass
-        v, z = (end.velocity for end in ends)
-        speed = max(abs(z), abs(v) if with_tip else 0.0)
-        self._hardest = max(self._hardest, speed)
-        after, before = (common_velocity(tip.velocity, low.velocity, *masses) for tip, low in (ends, start))
-        # It strikes while rising if the rebound would be over in no time.
-        dies_out = after > 0.0 or e * speed <= _SEATING_SPEED * self._hardest
-        if not self._alone and elapsed > 0.0 and e * speed <= _SEATING_SPEED_UNSEEN * self._hardest:
-            # What presses it down is told by the flight: C at its end may be off by what reverses a mismatch of
-            # velocities, (d + 1)(d + 2) times their quotient by the step. It rises by (e z)²/2a; each impact is found
-            # to no better than the tolerance, which brings it as much.
-            dies_out |= 0.5 * (e * after) ** 2 * elapsed <= tolerance * (before - after)
-        if (dies_out and e < 1.0) or speed == 0.0:
-            stays = Phase(Joint.TIED if self._alone else phase.joint, seated=True)
-            return EventKind.SEATED, stays, foundation_impact(v, z, *masses, restitution=0.0)
-        return EventKind.STOP_IMPACT, phase, foundation_impact(v, z, *masses, restitution=e)
-
-    def _part(self, held: Phase, tip: Motion, low: Motion) -> Impact:
-        """Ends that part take the velocity that they have in common, where those of steps differ by more than rounding.
+    def _parting(self, held: Phase, at: Instant) -> Impact:
+        """Return the impact that gives ends their common velocity, if those of steps differ by more than rounding.
 
         A lower end that the foundation holds in the phase ``held`` is at rest.
         """
-        if abs(tip.velocity - low.velocity) <= VELOCITY_ROUNDING * self._fastest():
-            return Impact()
-        if self._alone or held.seated:
+        tip, low = at.ends
+        if abs(tip.velocity - low.velocity) <= VELOCITY_ROUNDING * at.fastest:
+            return NO_IMPACT
+        if self._interface.alone or held.seated:
             on_beam, loss = rebound(tip.velocity, self._tip_mass, restitution=0.0)
             return Impact(on_beam, of_foundation=on_beam, energy_loss=loss)
         return meeting(tip.velocity, low.velocity, self._tip_mass, self._mass)
+
+
+# -- guards ------------------------------------------------------------------------------------------------------------
+
+
+def _share(interface: Interface, phase: Phase) -> float:
+    """Return the tip's part in the rate of the lower end's height."""
+    return interface.tip_share if interface.rigid and phase.joint is not Joint.FREE else 0.0
+
+
+def gap_above_zero(interface: Interface, phase: Phase) -> EventFunction:
+    """g = u_tip − y > 0"""
+    return gap
+
+
+def below_equilibrium(interface: Interface, phase: Phase) -> EventFunction:
+    """Ψ − y > 0"""
+    return Height(_LOW, interface.equilibrium, _share(interface, phase), -1.0)
+
+
+def above_equilibrium(interface: Interface, phase: Phase) -> EventFunction:
+    """y − Ψ > 0"""
+    return Height(_LOW, interface.equilibrium, _share(interface, phase))
+
+
+def above_foundation(interface: Interface, phase: Phase) -> EventFunction:
+    """y − φ > 0; without a lower body u_tip − φ > 0"""
+    assert interface.floor is not None
+    if interface.alone:
+        return Height(_TIP, interface.floor, 1.0)
+    return Height(_LOW, interface.floor, _share(interface, phase))
+
+
+def contact_pushes(interface: Interface, phase: Phase) -> EventFunction | PushingForce:
+    """C > 0"""
+    return Holding(interface.upper, interface.lower) if interface.upper.massless else "contact"
+
+
+def foundation_pushes(interface: Interface, phase: Phase) -> PushingForce:
+    """N > 0"""
+    return "foundation"
+
+
+# -- the automaton -----------------------------------------------------------------------------------------------------
+
+
+class Transition(NamedTuple):
+    """What ends a phase, and what happens then."""
+
+    where: str  #: the property of an `Interface` that has this transition
+    joint: Joint | None  #: the phases that it ends; ``None``: whether the ends are joined or not
+    seated: tuple[bool, ...]  #: the phases that it ends
+    guard: Callable[[Interface, Phase], EventFunction | PushingForce]  #: positive as long as the phase lasts
+    kind: EventKind
+    effect: Callable[[Automaton, Instant], Outcome]
+
+
+_OFF, _ON, _EITHER = (False,), (True,), (False, True)
+#: What ends each phase. Where two guards become zero at once, the first one counts.
+TRANSITIONS = (
+    Transition("rigid", Joint.FREE, _EITHER, gap_above_zero, EventKind.IMPACT, Automaton.meet),
+    Transition("strikes", Joint.TIED, _OFF, below_equilibrium, EventKind.RELEASE, Automaton.release),
+    Transition("strikes", Joint.TOUCH, _EITHER, above_equilibrium, EventKind.RETIE, Automaton.tie),
+    Transition("strikes", Joint.TOUCH, _OFF, contact_pushes, EventKind.SEPARATION, Automaton.part),
+    Transition("founded", None, _OFF, above_foundation, EventKind.STOP_IMPACT, Automaton.strike),
+    Transition("carried", None, _ON, foundation_pushes, EventKind.UNSEATED, Automaton.leave),
+    Transition("alone", None, _ON, contact_pushes, EventKind.SEPARATION, Automaton.part),
+)
+_EFFECTS = {row.kind: row.effect for row in TRANSITIONS}
+#: A soft law acts in every phase, and no step ends where its contact begins or ends: the event and the next joint.
+SOFT_TRANSITIONS = {
+    Joint.FREE: (EventKind.IMPACT, Joint.TOUCH),
+    Joint.TOUCH: (EventKind.SEPARATION, Joint.FREE),
+}

@@ -11,13 +11,12 @@ from math import isfinite
 from ..bodies.protocol import Ends, Motion, StepRefused
 from ..contact.events import (
     EventFunction,
-    EventFunctions,
     gap,
     locate,
     no_dip,
     position_tolerance,
 )
-from ..contact.phases import VELOCITY_ROUNDING
+from ..contact.phases import SOFT_TRANSITIONS, VELOCITY_ROUNDING, PushingForce
 from ..coupling.protocol import Step
 from ..motion.events import Event, EventKind, Joint
 from ..motion.paths import Path, Place, Sample, sign_changes
@@ -39,7 +38,7 @@ class Detector:
     def __init__(self, pair: Pair, steps: MacroGrid | AdaptiveSteps) -> None:
         self._pair = pair
         self._steps = steps
-        self._functions = EventFunctions(pair.interface)
+        self._automaton = pair.automaton
 
     def tolerance(self, ends: Ends) -> float:
         """Resolution of positions [m]."""
@@ -63,13 +62,17 @@ class Detector:
         """The event that is due before any step: its function is 0 and falling, or a force that can only push pulls."""
         phase = state.phase
         for (kind, _), (value, rate) in zip(
-            self._functions.of(phase), self._functions.samples(phase, start), strict=True
+            self._automaton.guards(phase).functions, self._automaton.samples(phase, start), strict=True
         ):
             if rate < 0.0 and value <= self.tolerance(start) and rate < -self._rest(state, start):
                 return kind
             if kind is EventKind.SEPARATION and value < -self.simultaneity_tolerance(start):
                 return kind
-        return self._pulled(state, state.present, start)
+        by_force = self._automaton.guards(phase).force
+        if by_force is None:
+            return None
+        kind, force = by_force
+        return kind if self._pulls(force, state, state.present, start) else None
 
     def first_event(self, state: State, step: Step) -> tuple[Step, EventKind | None]:
         """The step, cut to its first event, and the kind of that; ``None`` if nothing happens in it."""
@@ -96,13 +99,13 @@ class Detector:
     def _first_by_position(self, state: State, step: Step) -> tuple[Step, EventKind | None]:
         """The step, cut to the first event that positions tell of, and its kind; of size 0 if it is at the start."""
         found: EventKind | None = None
-        functions = self._functions.of(state.phase)
+        functions = self._automaton.guards(state.phase).functions
         if not functions:
             return step, None
         for _ in range(2 * len(functions) + 1):
             candidates = []
-            starts = self._functions.samples(state.phase, step.start)
-            ends = self._functions.samples(state.phase, step.end)
+            starts = self._automaton.samples(state.phase, step.start)
+            ends = self._automaton.samples(state.phase, step.end)
             for (kind, function), start, end in zip(functions, starts, ends, strict=True):
                 if no_dip(start, end, step.size, state.fastest):
                     continue
@@ -131,19 +134,15 @@ class Detector:
 
     # -- events told by forces --------------------------------------------------------------------------------------
 
-    def _pulled(self, state: State, present: Present, ends: Ends) -> EventKind | None:
-        """Return the event that is due where a force that can only push would pull by more than rounding."""
-        kind = self._pair.let_go_by(state.phase)
+    def _pulls(self, force: PushingForce, state: State, present: Present, ends: Ends) -> bool:
+        """Return whether a force that can only push would pull by more than rounding."""
         pair = self._pair
         H = self._steps.size
-        if kind is None or state.met_again == state.time:
-            return None
-        pull = -present.held_by(kind)
-        if pull <= 0.0:
-            return None
-        mass = pair.lower.mass if kind is EventKind.UNSEATED else pair.reduced_mass(state.phase)
-        seen = pull * H > mass * VELOCITY_ROUNDING * state.fastest and pull * H * H > 2.0 * mass * self.tolerance(ends)
-        return kind if seen else None
+        pull = -present.of(force)
+        if pull <= 0.0 or state.met_again == state.time:
+            return False
+        mass = pair.lower.mass if force == "foundation" else pair.reduced_mass(state.phase)
+        return pull * H > mass * VELOCITY_ROUNDING * state.fastest and pull * H * H > 2.0 * mass * self.tolerance(ends)
 
     def _first_by_force(self, state: State, step: Step) -> tuple[Step, EventKind] | None:
         """Return ``step``, cut to where a force that can only push vanishes, and the event; the bodies are at its end.
@@ -152,24 +151,25 @@ class Detector:
         """
         pair = self._pair
         H = self._steps.size
-        kind = pair.let_go_by(state.phase)
-        if kind is None:
+        by_force = self._automaton.guards(state.phase).force
+        if by_force is None:
             return None
-        start = max(state.present.held_by(kind), 0.0)
+        kind, force = by_force
+        start = max(state.present.of(force), 0.0)
         last = step
 
         def pushes(size: float) -> float:
             nonlocal last
             last = pair.attempt(state, size, step.start)
-            return pair.present(state.phase, last, H).held_by(kind)
+            return pair.present(state.phase, last, H).of(force)
 
         present = pair.present(state.phase, step, H)
         size = step.size
-        end = present.held_by(kind)
-        mean = pair.mean_of(kind, state.phase, step)
+        end = present.of(force)
+        mean = pair.mean_of(force, state.phase, step)
         bend = 3.0 * (start + end - 2.0 * mean)
         slope = end - start - bend  # of the parabola through both ends with the mean of the step
-        if self._pulled(state, present, step.end) is None:
+        if not self._pulls(force, state, present, step.end):
             if not (0.0 < -slope < 2.0 * bend and start < 0.25 * slope * slope / bend):
                 return None
             size *= -0.5 * slope / bend
@@ -180,8 +180,8 @@ class Detector:
         guess = min([size, *(s * step.size for s in falling)])
 
         def evaluate(size: float) -> Sample:
-            force = pushes(size)
-            return force, -scale / size
+            value = pushes(size)
+            return value, -scale / size
 
         locate(evaluate, guess, size, _SHARP * scale, state.time)
         if last.size < SAME * H and start > _SHARP * scale:
@@ -274,9 +274,9 @@ class Detector:
                 return []
             places = [path.falls_through_zero(inside), path.rises_through_zero(inside)]
         found = []
+        joint = state.phase.joint
         for at in places:
-            touching = not touching
-            joint, kind = (Joint.TOUCH, EventKind.IMPACT) if touching else (Joint.FREE, EventKind.SEPARATION)
+            kind, joint = SOFT_TRANSITIONS[joint]
             (u, v), (y, z) = (_inside(*motions, step.size, at) for motions in zip(step.start, step.end, strict=True))
             if all(map(isfinite, (u, v, y, z))):  # else the energies of the row are out of range too and stop the run
                 found.append(

@@ -14,7 +14,8 @@ from time import monotonic
 import numpy as np
 
 from ..bodies.protocol import NO_FORCE, Body, BodyFailed, Ends, StepRefused
-from ..contact.phases import Impact, Phase, Transitions
+from ..contact.impacts import NO_IMPACT, Impact
+from ..contact.phases import Instant, Phase
 from ..coupling.protocol import NotConverged, Step
 from ..motion.events import Event, EventKind, Joint
 from ..results.columns import ledger
@@ -72,7 +73,6 @@ class Master:
         else:
             self.steps = MacroGrid(setup.start, setup.end, setup.macro_step)
         self._detector = Detector(self.pair, self.steps)
-        self._transitions = Transitions(self.pair.interface, lambda: self.state.fastest)
         self.balance = Balance(self.pair)
         self._log = Log(recorder, self.balance.check)
         self._told = BEAM_TELLS * self.pair.upper.tells + SPRING_TELLS * self.pair.lower.tells
@@ -178,7 +178,7 @@ class Master:
             self._adaptive.note(abs(state.energy_at_start))
         if pair.opens_softly and start[1].displacement - start[0].displacement > self._detector.tolerance(start):
             state.phase = Phase(Joint.TOUCH, state.phase.seated)
-            self._happened(EventKind.IMPACT, Impact(), 0.0)
+            self._happened(EventKind.IMPACT, NO_IMPACT, 0.0)
         if self._in_contact(start) or (pair.law is None and state.contact[0] != 0.0):
             pair.mark()
             self._act(EventKind.STOP_IMPACT if self._setup.law is None else EventKind.IMPACT, step, state.contact[0])
@@ -200,11 +200,17 @@ class Master:
         state = self.state
         pair = self.pair
         ends = pair.ends()
-        meets = kind in (EventKind.IMPACT, EventKind.SEPARATION)  # at Ψ, where it means something else
-        tolerance = self._detector.simultaneity_tolerance(ends) if meets else self._detector.tolerance(ends)
-        kind, phase, impact = self._transitions.after(
-            kind, state.phase, step.start, step.size, ends, contact, tolerance
+        at = Instant(
+            state.phase,
+            ends,
+            step.start,
+            step.size,
+            contact,
+            self._detector.tolerance(ends),
+            self._detector.simultaneity_tolerance(ends),
+            state.fastest,
         )
+        kind, phase, impact = pair.automaton.after(kind, at)
         # Another event at the time of an impact settles what that has begun.
         state.struck = state.time if kind.collision and pair.divides else -inf
         if kind.collision and state.parted == state.time:
@@ -214,7 +220,7 @@ class Master:
         lost = impact.energy_loss + pair.follow_phase(phase)
         state.lost += lost
         state.enter(phase)
-        self._happened(kind, Impact() if kind.opens else impact, lost)  # nothing strikes where ends part
+        self._happened(kind, NO_IMPACT if kind.opens else impact, lost)  # nothing strikes where ends part
 
     def _happened(self, kind: EventKind, impact: Impact, lost: float) -> None:
         tip, low = self.pair.ends_together(self.state.phase)

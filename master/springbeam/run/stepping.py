@@ -10,10 +10,10 @@ from ..bodies import force
 from ..bodies.elements import RigidWall
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force
 from ..contact.interface import Interface
-from ..contact.phases import Phase
+from ..contact.phases import Automaton, Phase, PushingForce
 from ..coupling import coupling_of
 from ..coupling.protocol import Step, Uncoupled
-from ..motion.events import EventKind, Joint
+from ..motion.events import Joint
 from .loads import Loads
 from .outcome import RunStopped
 from .setup import Setup
@@ -33,9 +33,9 @@ class Present(NamedTuple):
     contact: float = 0.0
     foundation: float = 0.0
 
-    def held_by(self, kind: EventKind) -> float:
-        """Return the force that vanishes where the ends part, or a seat is left [N]."""
-        return self.foundation if kind is EventKind.UNSEATED else self.contact
+    def of(self, name: PushingForce) -> float:
+        """Return one of both [N]."""
+        return self.foundation if name == "foundation" else self.contact
 
 
 NOTHING = Present()
@@ -129,6 +129,7 @@ class Pair:
         self.interface = Interface(
             self.upper, self.lower, setup.law, equilibrium, setup.floor, setup.restitution, self.alone
         )
+        self.automaton = Automaton(self.interface)
         #: The tip's part in the velocity with which joined ends go on.
         self.tip_share = self.interface.tip_share
         #: Where the ends are; looked up once, since every step asks a few times.
@@ -283,19 +284,12 @@ class Pair:
             self._holding = self.lower.holding_force(self.interface.floor, 0.0)
         return Present(C, self._holding - load + C)
 
-    def let_go_by(self, phase: Phase) -> EventKind | None:
-        """Return the event that ends ``phase`` where a force that can only push would pull; ``None`` if all may."""
-        if phase.seated and not self.alone:
-            return EventKind.UNSEATED
-        touches = phase.joint is Joint.TOUCH and self.law is None and not self.upper.massless
-        return EventKind.SEPARATION if phase.seated or touches else None
-
-    def mean_of(self, kind: EventKind, phase: Phase, step: Step) -> float:
+    def mean_of(self, name: PushingForce, phase: Phase, step: Step) -> float:
         """Return the mean of C or N over ``step`` [N] without what turns a mismatch of velocities round."""
         (tip, low), (tip_after, low_after) = step.start, step.end
         turned = tip_after.velocity - low_after.velocity - tip.velocity + low.velocity
         joined = phase.joint is not Joint.FREE and self.law is None
-        applied = force.mean(step.foundation if kind is EventKind.UNSEATED else step.contact, step.size)
+        applied = force.mean(step.foundation if name == "foundation" else step.contact, step.size)
         return applied - self.reduced_mass(phase) * turned / step.size * joined
 
     def _multiplier(self, phase: Phase, time: float, macro_step: float, acting: float, *, changed: bool) -> float:
