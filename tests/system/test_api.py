@@ -1,14 +1,12 @@
 """What Python programs call: results loaded, saved and handed on, and bodies of one's own."""
 
-import subprocess
-import sys
 from functools import partial
 
 import numpy as np
 import pytest
 import tomli_w
 from bodies import DuffingBody, beam_body
-from commands import printed, ran
+from commands import printed
 
 import springbeam
 from springbeam import RunStopped, SceneError, Simulation, load_scene, simulate, with_changes
@@ -170,36 +168,13 @@ def test_a_scene_may_be_a_name_a_file_or_tables(tmp_path):
 
 
 def test_numbers_of_numpy_are_numbers():
-    beam = {"element": "point_mass", "mass": np.float32(2.0), "velocity": np.int64(-1)}
-    load = {"on": "tip", "amplitude": np.arange(3)[2], "signal": "step"}
-    scene = scene_from_dict({"time": {"t_end": np.float64(0.1)}, "beam": beam, "loads": [load]})
-    assert (scene.upper.mass, scene.upper.velocity, scene.loads[0].amplitude) == (2.0, -1.0, 2.0)
-    changed = with_changes(load_scene("soft"), beam={"n_elements": np.int32(7)}, spring={"damping": np.array(0.5)})
-    assert changed.beam.n_elements == 7
-    assert type(changed.beam.n_elements) is int
-    shaped = {"on": "beam", "shape": np.array([1.0, -0.5])}
-    assert with_changes(load_scene("soft"), loads=[shaped]).loads[0].shape == (1.0, -0.5)
+    load = {"on": "beam", "shape": np.array([1.0, -0.5]), "amplitude": np.arange(3)[2]}
+    tables = {"beam": {"n_elements": np.int32(7)}, "spring": {"damping": np.array(0.5)}, "loads": [load]}
+    scene = with_changes(load_scene("soft"), **tables)
+    assert (scene.beam.n_elements, type(scene.beam.n_elements), scene.spring.damping) == (7, int, 0.5)
+    assert (scene.loads[0].shape, scene.loads[0].amplitude) == ((1.0, -0.5), 2.0)
     with pytest.raises(SceneError, match=r"n_elements = 7\.5: must be a whole number"):
-        with_changes(load_scene("soft"), beam={"n_elements": np.float64(7.5)})
-
-
-def test_a_script_that_asks_for_processes_outside_of_its_guard_is_refused(tmp_path):
-    """Each process runs the script again up to there."""
-    lines = [
-        "from springbeam import load_scene",
-        "from springbeam.studies import study",
-        "from springbeam.studies.sweep import Sweep",
-        "sweep = Sweep(scene=load_scene('duffing', ['time.t_end=0.01']), vary=('spring.mass=1:2:2',))",
-        "{}print(len(sweep.computed(workers=2)))",
-    ]
-    script = tmp_path / "script.py"
-    script.write_text("\n".join(lines).format(""))
-    done = subprocess.run([sys.executable, script], capture_output=True, text=True)
-    assert done.returncode == 1
-    said = f'workers 2: {script}, line 5 must stand under if __name__ == "__main__":'
-    assert done.stderr.splitlines()[-1].endswith(said)
-    script.write_text("\n".join(lines).format('if __name__ == "__main__": '))
-    assert ran(sys.executable, script) == "2\n"
+        with_changes(scene, beam={"n_elements": np.float64(7.5)})
 
 
 def test_a_simulation_gives_its_fmus_back_once_and_steps_no_more():

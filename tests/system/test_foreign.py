@@ -5,7 +5,6 @@ import importlib
 import os
 import re
 import signal
-import sys
 import threading
 from contextlib import nullcontext, suppress
 from itertools import product
@@ -18,7 +17,7 @@ import oscillator
 import pytest
 import scenes
 import tomli_w
-from commands import HANGS, command, printed, ran, refused
+from commands import HANGS, command, printed, refused
 from scenes import kinds
 
 from springbeam import RunStopped, SceneError, SpringDamper, simulate, with_changes
@@ -340,19 +339,6 @@ def test_the_body_that_the_page_builds_by_python_fmu_is_the_element(tmp_path, mo
         assert run.summary["max_interface_residual"] < 1e-11
 
 
-def test_a_working_directory_that_is_gone_is_no_matter(fmu, tmp_path):
-    """What is named by whole paths is found."""
-    file, gone = tmp_path / "scene.toml", tmp_path / "gone"
-    file.write_text(tomli_w.dumps(pair(fmu("of others")).model_dump(exclude_none=True)), encoding="utf-8")
-    gone.mkdir()
-    run = f"springbeam run {file} --out {tmp_path / 'run'} --no-plots --quiet"
-    program = (
-        f"import os, sys; os.rmdir(os.getcwd()); from springbeam.cli import main; sys.argv = {run.split()!r}; main()"
-    )
-    ran(sys.executable, "-c", program, cwd=gone)
-    assert load_summary(tmp_path / "run")["status"] == "done"
-
-
 @pytest.mark.parametrize(("version", "lacks"), [("2.0", "fmi2DoStep"), ("3.0", "fmi3SetFMUState")])
 def test_a_function_that_is_needed_and_missing_is_named(fmu, version, lacks):
     """Functions that no run needs are missing in every FMU of these tests."""
@@ -390,27 +376,6 @@ def test_an_fmu_that_hangs_is_given_up(fmu):
     said = r"has not returned within 20 s from its step at t = 0\.\d+ s of the check before the run"
     with pytest.raises(FmuError, match=said):
         simulate(pair(fmu(), spring={"parameters": {"lie": oscillator.LIES["hang"]}}))
-
-
-def test_the_process_of_an_fmu_that_hangs_ends_with_the_master(fmu, hanging):
-    """That it is gone is what the process sees: nobody holds its standard input open."""
-    spec = pair(fmu(), spring={"parameters": {"lie": oscillator.LIES["late hang"]}}).lower
-    body = ForeignBody(spec, False, (0.0, 2.0), None)
-    process = body._port._process._process
-    process.send_signal(signal.SIGINT)  # Ctrl-C in a terminal, which the process leaves to the master
-
-    def gone():
-        while not hanging():
-            sleep(0.01)
-        process.stdin.close()
-
-    ending = threading.Thread(target=gone)
-    body._port.patience = HANGS + 3600.0
-    ending.start()
-    with pytest.raises(FmuError, match=r"crashed \(exit code 1.*\) in its step at t = 1\.5 s"):
-        body.advance(1.5, 0.1, (0.0, 0.0, 0.0))
-    ending.join()
-    body.close()
 
 
 def test_a_process_waits_for_the_next_body_of_its_file(fmu, monkeypatch):
