@@ -7,7 +7,6 @@ from pathlib import Path
 
 import grimp
 import numpy as np
-import pytest
 from commands import ran
 from importlinter.cli import lint_imports
 from scipy.sparse import coo_array
@@ -39,36 +38,38 @@ def test_no_files_import_each_other_in_a_circle():
 SLOW = ("numpy", "scipy", "matplotlib", "plotly", "fmpy", "pyarrow", "distributed", "pandas", "pint")
 
 
-@pytest.mark.parametrize(
-    ("line", "loaded"),
-    [
-        ("", ""),
-        ("--help", ""),
-        ("scenes", ""),
-        ("keys", ""),
-        ("keys --schema", ""),
-        ("keys beam --json", ""),
-        ("new mine", ""),
-        ("doctor --help", ""),
-        ("run --help", ""),
-        ("crosscheck --help", ""),
-        ("doctor", "numpy fmpy"),
-        ("run soft --no-plots --set time.t_end=0.01", "numpy fmpy"),
-        ("report results/soft", "numpy plotly"),
-        ("export results/soft", "numpy"),
-    ],
+#: Commands that load none of it.
+LIGHT = (
+    "",
+    "--help",
+    "scenes",
+    "keys",
+    "keys --schema",
+    "keys beam --json",
+    "new mine",
+    "run --help",
+    "crosscheck --help",
 )
-def test_a_command_loads_what_it_uses_and_nothing_else(line, loaded, tmp_path):
-    if "results" in line:
-        short = ("run", "soft", "--no-plots", "--set", "time.t_end=0.01")
-        ran(sys.executable, "-m", "springbeam", *short, cwd=tmp_path)
+
+
+def loaded_by(folder, *lines):
+    """Return which of them the commands have loaded, one after the other in one process."""
     script = f"""
 import sys
 from springbeam.cli import app
-try:
-    app({line.split()})
-except SystemExit as end:
-    print("\\nLOADED", end.code, *(name for name in {SLOW} if name in sys.modules))
+for line in {lines}:
+    try:
+        app(line.split())
+    except SystemExit as end:
+        assert end.code == 0, line
+print("\\nLOADED", *(name for name in {SLOW} if name in sys.modules))
 """
-    last = ran(sys.executable, "-c", script, cwd=tmp_path).splitlines()[-1]
-    assert last.split() == ["LOADED", "0", *loaded.split()]
+    return ran(sys.executable, "-c", script, cwd=folder).splitlines()[-1].split()[1:]
+
+
+def test_a_command_loads_what_it_uses_and_nothing_else(tmp_path):
+    assert loaded_by(tmp_path, *LIGHT) == []
+    assert loaded_by(tmp_path, "doctor") == ["numpy", "fmpy"]
+    assert loaded_by(tmp_path, "run soft --no-plots --set time.t_end=0.01") == ["numpy", "fmpy"]
+    assert loaded_by(tmp_path, "report results/soft") == ["numpy", "plotly"]
+    assert loaded_by(tmp_path, "export results/soft") == ["numpy"]

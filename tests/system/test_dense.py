@@ -22,9 +22,9 @@ def test_rows_are_themselves_and_between_them_every_column_holds(name):
         assert np.array_equal(again[name], run[name][last]), name
 
     steps = run.steps[run.steps["size"] > 0.0]
-    nodes, weights = np.polynomial.legendre.leggauss(3)
+    nodes, weights = np.polynomial.legendre.leggauss(5)
     inside = [run.at(steps["time"] - 0.5 * (1.0 - x) * steps["size"]) for x in nodes]
-    middles, begin = inside[1], run.steps[np.flatnonzero(run.steps["size"] > 0.0) - 1]
+    middles, begin = inside[2], run.steps[np.flatnonzero(run.steps["size"] > 0.0) - 1]
     assert list(middles.columns) == list(run.columns)
     kept = sum(middles[name] for name in run.columns if name.startswith("e_") and name != "e_total")
     assert np.array_equal(middles.e_total, kept)
@@ -56,6 +56,9 @@ def test_rows_are_themselves_and_between_them_every_column_holds(name):
         mean = sum(weight * there[name] for weight, there in zip(weights, inside, strict=True)) / 2.0
         own = ~together
         assert mean[own] == pytest.approx((steps[f"{name}_integral"] / steps["size"])[own], rel=1e-11, abs=1e-15)
+        remaining = (0.25 * w * (1.0 - x) * there[name] for w, x, there in zip(weights, nodes, inside, strict=True))
+        twice = steps[f"{name}_integral_2"] / steps["size"] ** 2  # ∫∫, of ∫ (1 − s) w ds
+        assert sum(remaining)[own] == pytest.approx(twice[own], rel=1e-10, abs=1e-15)
     assert np.array_equal(middles.phase == "seated", begin["phase"] >= 3.0)
     # Just before an event it has not happened yet.
     for event in run.events:

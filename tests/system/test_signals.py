@@ -49,9 +49,9 @@ def test_the_settled_amplitude_is_that_of_the_frequency_response(driven):
     assert METRICS["max_y"](driven) > 1.05 * exact
 
 
-@pytest.mark.parametrize("t_end", [100.0, 600.0])
-def test_an_oscillator_driven_at_its_resonance_without_damping_never_settles(t_end):
+def test_an_oscillator_driven_at_its_resonance_without_damping_never_settles():
     """Its amplitude grows linearly, F t/2mω."""
+    t_end = 200.0
     rate = sqrt(STIFFNESS / MASS)
     scene = with_changes(oscillator(t_end, frequency=rate / (2.0 * pi)), spring={"damping": 0.0})
     run = simulate(with_changes(scene, coupling={"macro_step": 0.02}))
