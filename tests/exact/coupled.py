@@ -14,7 +14,8 @@ from scipy.special import ai_zeros, itairy, spherical_jn
 
 from springbeam.bodies.fmu_bodies import FmuSpring
 from springbeam.run.runner import run_in_memory
-from springbeam.scene import Beam, Coupling, Scene, Spring, Time, load_scene, with_changes
+from springbeam.scene import Beam, Scene, Spring, Time, load_scene, with_changes
+from springbeam.scene.schemes import EnergyCoupling
 
 from .alone import (
     EPS,
@@ -98,7 +99,7 @@ def energy_scheme(kappa: float, size: float, degree: int, integrator: str, alpha
         time=Time(t_end=steps * size),
         beam=stiff.model_copy(update={"integrator": integrator, "alpha_b": alpha}),
         spring=spring,
-        coupling=Coupling(scheme="energy", degree=degree, macro_step=size),
+        coupling=EnergyCoupling(scheme="energy", degree=degree, macro_step=size),
     )
     run = run_in_memory(scene)
     stiffness = spring.linear_stiffness + 3.0 * spring.cubic_stiffness * float(np.abs(run["y"]).max()) ** 2

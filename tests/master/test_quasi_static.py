@@ -11,7 +11,8 @@ from springbeam.bodies.protocol import Motion
 from springbeam.bodies.quasi_static import QuasiStaticBeam
 from springbeam.contact.events import Holding
 from springbeam.monolithic.semi_discrete import assemble, constant_forces
-from springbeam.scene import Beam, Coupling, statics
+from springbeam.scene import Beam, statics
+from springbeam.scene.schemes import EnergyCoupling
 from springbeam.scene.statics import SHAPE_POINTS
 
 BEAM = Beam.with_ones(
@@ -97,7 +98,7 @@ def scene(**tables):
 def test_where_the_force_vanishes_as_the_spring_falls_through_its_equilibrium_the_ends_stay_joined(coupling):
     """Without loads C = k u_tip vanishes at Ψ = 0: rounding decided whether the tip stayed up there, free."""
     given = scene(beam={"distributed_load": 0.0}, time={"t_end": 10.0})
-    run = simulate(given.model_copy(update={"coupling": Coupling(**coupling)}))
+    run = simulate(given.model_copy(update={"coupling": EnergyCoupling(**coupling)}))
     omega = np.sqrt((3.0 + 1.0 / statics.tip_compliance(given.beam)) / 2.0)
     assert {e.kind for e in run.events[1:]} <= {"release", "impact", "retie"}
     # Joined, it is one oscillator; of degree 0, 500 steps of ω H = 0.084 lag by (ω H)³/12 each, and that is said.

@@ -15,7 +15,6 @@ import numpy as np
 
 from ..scene import SAME, Scene, SceneError
 from ..scene.messages import Rule, texts_of
-from ..scene.tables import ORDINARY_SCHEMES
 from .protocol import NO_FORCE, Abilities, Body, BodyFailed, Force, StepRefused
 
 # -- what bodies can do ------------------------------------------------------------------------------------------------
@@ -33,7 +32,7 @@ _LEFT_OUT, _MULTIPLE = 'leave it out, or use scheme = "energy"', "use a multiple
 
 
 def _exchanges(scene: Scene) -> bool:
-    return scene.coupling.scheme in ORDINARY_SCHEMES
+    return scene.coupling.exchanges
 
 
 def _falls_between(scene: Scene) -> bool:

@@ -225,7 +225,7 @@ def forces(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
         dc = size * steps[f"{name}_rate"]
         ddc = size**2 * steps[f"{name}_rate_2"]
         series = np.zeros((6, len(steps)))
-        if scene.coupling.scheme == "energy":
+        if not scene.coupling.exchanges:
             series[:3] = c + dc / 2.0 + ddc / 6.0, dc / 2.0 + ddc / 4.0, ddc / 12.0
             series[:4] -= np.where(together, _turning(before, steps), 0.0)
             first = np.where(together, 4, steps["degree"].astype(int) + 1)

@@ -218,7 +218,7 @@ def _prepared(scene: Scene, macro_step: float) -> Scene:
     """Return ``scene`` with a macro step [s] and the scheme and tolerances that go with its accuracy."""
     assert scene.accuracy is not None
     tolerance = _TOLERANCE * scene.accuracy
-    coupling = {"macro_step": macro_step, "tolerance": tolerance}
+    coupling = {"macro_step": macro_step} | ({} if scene.coupling.exchanges else {"tolerance": tolerance})
     if scene.spring is None:
         return with_changes(scene, accuracy=None, coupling=coupling)
     ida = {"relative_tolerance": tolerance, "absolute_tolerance": 1e-30}

@@ -13,7 +13,6 @@ from ..scene import Load, Scene
 from ..scene.laws import SoftLaw
 from ..scene.scene import SAME as SAME
 from ..scene.scene import SHORTEST_STEP as SHORTEST_STEP
-from ..scene.tables import ORDINARY_SCHEMES
 
 
 @dataclass(frozen=True)
@@ -33,17 +32,13 @@ class Setup:
     level: float  #: of the wall that is in place of an absent lower body [m]
     loads: tuple[Load, ...]
     scheme: str
+    exchanges: bool  #: whether values are exchanged once per macro step, so that the energy may change
     degree: int  #: of the contact force over a step
     tolerance: float  #: relative, of the contact force of a step
     #: H [s], or ``None`` where steps follow from the tolerances, relative and absolute [m].
     macro_step: float | None
     relative_tolerance: float
     absolute_tolerance: float
-
-    @property
-    def exchanges(self) -> bool:
-        """Whether the scheme exchanges once per macro step, and may change the energy."""
-        return self.scheme in ORDINARY_SCHEMES
 
 
 def set_up(scene: Scene, *abilities: Abilities) -> Setup:
@@ -71,6 +66,7 @@ def set_up(scene: Scene, *abilities: Abilities) -> Setup:
         level=0.0 if stop is None else stop.position,
         loads=scene.loads,
         scheme=coupling.scheme,
+        exchanges=coupling.exchanges,
         degree=degree,
         tolerance=coupling.tolerance,
         macro_step=coupling.macro_step,

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from .messages import key_kind, scene_keys
     from .reading import as_scene, load_scene, scene_from_dict, with_changes
     from .scene import SAME, Scene
-    from .tables import ArgumentError, Beam, Coupling, SceneError, Spring, Stop, Time
+    from .schemes import Coupling
+    from .tables import ArgumentError, Beam, SceneError, Spring, Stop, Time
 else:
     __getattr__ = attached(
         __name__,
@@ -29,7 +30,8 @@ else:
             "messages": ("key_kind", "scene_keys"),
             "reading": ("as_scene", "load_scene", "scene_from_dict", "with_changes"),
             "scene": ("SAME", "Scene"),
-            "tables": ("ArgumentError", "Beam", "Coupling", "SceneError", "Spring", "Stop", "Time"),
+            "schemes": ("Coupling",),
+            "tables": ("ArgumentError", "Beam", "SceneError", "Spring", "Stop", "Time"),
         },
     )
 

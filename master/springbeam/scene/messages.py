@@ -17,10 +17,11 @@ from .laws import LAW
 from .loads import SIGNAL
 from .partners import LOWER, PARTNERS, UPPER, ForeignFmu
 from .scene import TABLES, Scene
+from .schemes import SCHEME
 from .tables import OneOf, SceneError, Table
 
 #: Alternatives for a table, by its name.
-VARIANTS: dict[str, OneOf] = {"beam": UPPER, "spring": LOWER, "contact": LAW, "loads": SIGNAL}
+VARIANTS: dict[str, OneOf] = {"beam": UPPER, "spring": LOWER, "contact": LAW, "coupling": SCHEME, "loads": SIGNAL}
 _ELEMENTS = replace(UPPER, tables={name: PARTNERS[name] for name in UPPER.named}, default="")
 #: Tables by their names ("" for the keys outside of tables), and bodies that are not our own by theirs; or the
 #: alternatives for a table.
@@ -28,6 +29,7 @@ MODELS: dict[str, type[Table] | OneOf] = {
     "": Scene,
     **TABLES,
     "contact": LAW,
+    "coupling": SCHEME,
     "loads": SIGNAL,
     "fmu": ForeignFmu,
     "element": _ELEMENTS,

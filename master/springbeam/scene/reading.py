@@ -13,7 +13,8 @@ from .files import parse_value, shipped_scenes, tables_of
 from .messages import VARIANTS, explain, models_of, nearest, one_line
 from .rules import impossible
 from .scene import TABLES, Scene, split_key
-from .tables import PICKED_BY_ACCURACY, ArgumentError, SceneError
+from .schemes import PICKED_BY_ACCURACY
+from .tables import ArgumentError, SceneError
 
 
 def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy: float | None = None) -> Scene:

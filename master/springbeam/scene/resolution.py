@@ -104,7 +104,7 @@ def lateness(scene: Scene, turn: float) -> float:
 
 def _force_degree(scene: Scene) -> int:
     """Return the degree of the contact force; 0 for exchanges, which are no more accurate."""
-    return scene.degree if scene.coupling.scheme == "energy" else 0
+    return 0 if scene.coupling.exchanges else scene.degree
 
 
 def _too_fast(scene: Scene, seen: _Seen) -> dict[str, Any]:
@@ -129,7 +129,7 @@ def _law_missed(scene: Scene, seen: _Seen) -> dict[str, Any]:
     excess = seen.misplaced / limits[_force_degree(scene)]
     if excess <= 1.0:
         return {}
-    raises = coupling.scheme == "energy" and scene.degree < 2
+    raises = not coupling.exchanges and scene.degree < 2
     raises &= scene.beam is None or scene.beam.integrator == "modal"
     remedy = _shorter(scene, 2.0 * sqrt(excess)) + (_HIGHER if raises and not coupling.adaptive else "")
     far = f"about {100.0 * seen.misplaced:.2g} %" if seen.misplaced <= 1.0 else "more than all"

@@ -15,16 +15,14 @@ from .loads import MOST_POINTS
 from .messages import Rule, at, either, texts_of, texts_of_loads
 from .partners import RigidWallElement, SpringDamperElement
 from .scene import Scene
+from .schemes import DEFAULT_STEP
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
 from .suspicions import suspicions
 from .tables import (
     ALL_MODES_UP_TO,
-    DEFAULT_STEP,
     MOST_ELEMENTS,
     MOST_MODE_VALUES,
     MOST_MODES,
-    ORDINARY_SCHEMES,
-    TOLERANCE_KEYS,
     Beam,
     Spring,
     Table,
@@ -121,12 +119,6 @@ def _points(scene: Scene) -> list[float]:
     return sorted({load.at for load in scene.loads if load.at is not None})
 
 
-def _tolerance(scene: Scene) -> Mapping[str, str]:
-    """Return the first tolerance that the scene gives, for the texts of rules."""
-    given = (key for key in TOLERANCE_KEYS if getattr(scene.coupling, key) is not None)
-    return {"tolerance": at(scene, f"coupling.{next(given)}")}
-
-
 def _most_elements(beam: Beam) -> int:
     """Return how many elements of its degree a beam may have."""
     return 2 * MOST_ELEMENTS // (beam.element_degree * (beam.element_degree + 1))
@@ -214,11 +206,7 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     # Schemes
     Rule(
-        lambda s: s.coupling.scheme in ORDINARY_SCHEMES and s.degree > 1,
-        "{coupling.degree}: {coupling.scheme} extrapolates with degree 0 or 1",
-    ),
-    Rule(
-        lambda s: s.coupling.scheme in ORDINARY_SCHEMES and not s.contact.soft,
+        lambda s: s.coupling.exchanges and not s.contact.soft,
         '{coupling.scheme}: needs [contact] law = {soft}; use scheme = "energy" with {contact.law}',
         lambda s: {"soft": either(name for name, law in LAWS.items() if not law.rigid)},
     ),
@@ -361,11 +349,6 @@ FORBIDDEN: tuple[Rule, ...] = (
         for key in ("fmu", "element")
     ),
     # Steps; an accuracy picks scheme, degree and steps that go together
-    Rule(
-        lambda s: s.accuracy is None and s.coupling.adaptive and s.coupling.scheme in ORDINARY_SCHEMES,
-        "{tolerance}: {coupling.scheme} never repeats a step; give macro_step instead",
-        _tolerance,
-    ),
     Rule(
         lambda s: _given_step(s) and s.time.t_end < s.coupling.H,
         "{coupling.macro_step}{default}: must be at most {time.t_end}; give a smaller one, or an accuracy, which picks "

@@ -12,7 +12,8 @@ from typing_extensions import Self
 from .laws import LAW, Contact, SoftLaw, TransmissionContact
 from .loads import SIGNAL, Load
 from .partners import LOWER, UPPER, ForeignFmu, Partner
-from .tables import ORDINARY_SCHEMES, Beam, Coupling, Spring, Stop, Table, Time, key
+from .schemes import SCHEME, Coupling, EnergyCoupling, Scheme
+from .tables import Beam, Spring, Stop, Table, Time, key
 
 #: Times closer than the first of these fractions of H are one; a step shorter than the second would drown in rounding.
 SAME = 1e-9
@@ -44,7 +45,7 @@ class Scene(Table):
     lower: Annotated[Spring | Partner, LOWER] | None = Field(None, alias="spring")
     stop: Stop | None = None
     contact: Annotated[Contact, LAW] = TransmissionContact()
-    coupling: Coupling = Coupling()
+    coupling: Annotated[Scheme, SCHEME] = EnergyCoupling()
     loads: Annotated[tuple[Annotated[Load, SIGNAL], ...], Field(strict=False)] = ()
 
     @model_validator(mode="after")
@@ -123,7 +124,7 @@ class Scene(Table):
         """
         if self.coupling.degree is not None:
             return self.coupling.degree
-        if self.coupling.scheme in ORDINARY_SCHEMES:
+        if self.coupling.exchanges:
             return 0
         if self.beam is not None and self.beam.integrator != "modal" and not self.massless:
             return 0

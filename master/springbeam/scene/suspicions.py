@@ -11,7 +11,6 @@ from .linearised import beam_energy, spring_energy, well_depth
 from .messages import Rule, texts_of, texts_of_loads
 from .scene import TABLES, Scene
 from .statics import initial_kinetic_energy, locking, tip_compliance, tip_inertia
-from .tables import ORDINARY_SCHEMES
 
 #: E/G: 2 to 3 of isotropic solids, up to some 100 of laminates.
 _YOUNG_OVER_SHEAR = (0.5, 200.0)
@@ -258,10 +257,5 @@ EFFECTS: tuple[Rule, ...] = (
         "contact.force_window",
         lambda s: s.coupled or (s.upper is not None and s.stop is not None),
         "it counts where the run has a peak contact force",
-    ),
-    *_counts(
-        "coupling.tolerance",
-        lambda s: s.coupling.scheme not in ORDINARY_SCHEMES,
-        "it counts with schemes that solve for the force of a step",
     ),
 )

@@ -319,6 +319,9 @@ class Beam(Table):
 _BY_GAP = "0.0, or −gap of [contact]"
 _Heights = TypeVar("_Heights", float, "np.ndarray")
 
+#: Keys of tolerances, relative and absolute.
+TOLERANCE_KEYS = ("relative_tolerance", "absolute_tolerance")
+
 
 class Spring(Table):
     """Duffing spring m ÿ + α_s ẏ + k1 x + k2 x³ = −C + N + f_s, x = y − unloaded (Ahn & Tate, (6)).
@@ -365,54 +368,3 @@ class Stop(Table):
 
     position: float = key("m", "height φ, not above that of the spring's top")
     restitution: float = key("–", "restitution e: speed after an impact over that before", 1.0, ge=0.0, le=1.0)
-
-
-#: Keys that set the length of macro steps: the one, or the others.
-STEP_KEY = "macro_step"
-TOLERANCE_KEYS = ("relative_tolerance", "absolute_tolerance")
-#: H [s] of a scene that gives neither: that of Ahn & Tate's section 6.
-DEFAULT_STEP = 0.004
-#: Keys that ``accuracy`` sets, by table.
-PICKED_BY_ACCURACY = {
-    "coupling": ("scheme", "degree", STEP_KEY, *TOLERANCE_KEYS, "tolerance"),
-    "spring": TOLERANCE_KEYS,
-}
-#: Schemes that exchange once per macro step, as ordinary masters do.
-ORDINARY_SCHEMES = ("gauss_seidel", "jacobi")
-
-
-class Coupling(Table):
-    """Scheme of the contact force, and size of the steps (``docs/coupling.md``)."""
-
-    scheme: Literal["energy", "gauss_seidel", "jacobi"] = key("–", "coupling scheme", "energy")
-    degree: int | None = key(
-        "–", "degree of the contact force over a step; exchanges 0, 1", None, ge=0, le=2,
-        otherwise="the highest that both bodies allow; of exchanges 0",
-    )  # fmt: skip
-    macro_step: float | None = key("s", "length H of a macro step", None, gt=0.0, otherwise="0.004 without tolerances")
-    relative_tolerance: float | None = key(
-        "–", "largest error of a step, relative to the motion so far", None, gt=0.0, le=0.1
-    )
-    absolute_tolerance: float | None = key("m", "largest error of a step", None, gt=0.0)
-    tolerance: float = key("–", "relative tolerance of the contact force of a step", 1.0e-12, gt=0.0, le=1e-3)
-
-    WAYS = (((STEP_KEY,), TOLERANCE_KEYS),)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _default_step(cls, data: Any) -> Any:
-        if isinstance(data, dict) and all(data.get(key) is None for key in (STEP_KEY, *TOLERANCE_KEYS)):
-            return {**data, STEP_KEY: DEFAULT_STEP}
-        return data
-
-    @property
-    def adaptive(self) -> bool:
-        """Whether the steps follow from tolerances."""
-        return self.relative_tolerance is not None or self.absolute_tolerance is not None
-
-    @property
-    def H(self) -> float:
-        """The macro step [s]. Raises SceneError if tolerances are given instead."""
-        if self.macro_step is None:
-            raise SceneError("[coupling] macro_step: needed here; this scene gives tolerances instead")
-        return self.macro_step

@@ -184,7 +184,7 @@ def _class(run: Trajectory, cause: str, relative: np.ndarray, scale: np.ndarray,
     """Return the class of a run and why, by its relative residuals, the scale of its energy and its overlap."""
     scene = run.scene
     residual = float(np.abs(relative).max())
-    keeps = scene.coupling.scheme == "energy"
+    keeps = not scene.coupling.exchanges
     tolerance = max(scene.coupling.tolerance, 0.0 if scene.spring is None else scene.spring.relative_tolerance)
     allowed, _ = bounds(tolerance, exchanges=not keeps)
     if keeps and residual > max(_GUARANTEED, allowed):

@@ -30,7 +30,6 @@ from ...scene.laws import depth
 from ...scene.linearised import contact_energy, spring_frequency, spring_stiffness
 from ...scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
 from ...scene.suspicions import suspicions
-from ...scene.tables import ORDINARY_SCHEMES
 
 #: A coupling is called unstable where its spectral radius exceeds 1 by more than this: e-fold growth in 1000 steps.
 THRESHOLD = 1e-3
@@ -108,7 +107,7 @@ def predict(scene: Scene) -> dict[str, Any]:
         scheme = scene.coupling.scheme
         degree = scene.degree
         # The scheme energy changes no energy at any H: there is nothing to ask.
-        if scheme in ORDINARY_SCHEMES:
+        if scene.coupling.exchanges:
             found["exchange"] = {
                 "scheme": scheme,
                 "degree": degree,
