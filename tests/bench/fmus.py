@@ -39,6 +39,12 @@ def beam(effort):
         rival = f"64 products of 2 × 2 matrices: {shown(statistics.median(modal.rival))}"
         name = f"beam step of the FMU, 64 modes{what}, called from C"
         yield below(name, [1e6 * s for s in modal.ours], goal, "µs", rival)
+    for key, what in (
+        ("step", "a step of the FMU with a forecast that nobody reads"),
+        ("load", "a load set on it"),
+        ("restore", "a state set back in it"),
+    ):
+        yield ratio_row(what, _of(found[f"forecast {key}"]), 1.1, "the same without communication_step")
     yield from _initialisation(effort)
     for modes, name in ((0, "midpoint rule"), (64, "64 modes")):
         line = found[f"scaling {modes}"]
@@ -106,3 +112,17 @@ def spring(effort):
         against += f"{errors['rival'][0]:.0e} m, ours {errors['ours'][0]:.0e} m"
         yield ratio_row(f"spring step, {what}", _of(found[name]), 1.2, against)
     yield ratio_row("the same of the FMU, state restored before", _of(found["fmu"]), 1.2, bare)
+    flight = _of(found["flight"])
+    yield below(
+        "spring step of the FMU in flight, H = 4e-3, called from C",
+        [1e6 * s for s in flight.ours],
+        1.0,
+        "µs",
+        f"{bare}: {shown(statistics.median(flight.rival))}",
+    )
+    yield ratio_row(
+        "spring step of the FMU with a contact force that it finds and holds",
+        _of(found["held"]),
+        1.3,
+        "one step under a force from outside",
+    )

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstring>
 #include <ctime>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -72,24 +73,33 @@ void compare(const char* name, const Options& o, const Ours& ours, const Rival& 
   std::printf("}\n");
 }
 
+using Values = std::vector<std::pair<const char*, double>>;  ///< start values by name
+
 /// An FMU without the library around it, called as an importer written in C would.
 class Fmu {
  public:
-  explicit Fmu(const std::vector<std::pair<const char*, double>>& values) : instance_(fmi::type_names) {
-    for (const auto& [name, value] : values) {
-      const auto named = [&](const fmi::Variable& v) { return v.name == name; };
-      const auto& variables = fmi::table().variables;
-      const auto i = static_cast<unsigned>(std::find_if(variables.begin(), variables.end(), named) - variables.begin());
-      instance_.set(i, fmi::table().variables[i].type, value);
-    }
+  explicit Fmu(const Values& values) : instance_(fmi::type_names) {
+    for (const auto& [name, value] : values) set(reference(name), value);
     instance_.ensure_built();
+    instance_.progress.phase = fmi::initialization;
+    instance_.start();
     instance_.progress.phase = fmi::step_complete;
     instance_.save(start_);
   }
+  static unsigned reference(const std::string& name) {
+    const auto& variables = fmi::table().variables;
+    const auto named = [&](const fmi::Variable& v) { return v.name == name; };
+    return static_cast<unsigned>(std::find_if(variables.begin(), variables.end(), named) - variables.begin());
+  }
+  void set(unsigned reference, double value) {
+    instance_.set(reference, fmi::table().variables[reference].type, value);
+  }
+  double get(unsigned reference) { return instance_.get(reference, fmi::Type::real); }
   void step(double H) { instance_.step(instance_.progress.time, H, false); }
+  void restore() { instance_.restore(start_); }
   /// The step from the start.
   void repeat(double H) {
-    instance_.restore(start_);
+    restore();
     step(H);
   }
 

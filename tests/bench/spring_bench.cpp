@@ -149,6 +149,37 @@ void compare(const char* name, const Problem& p, double relative, const bench::O
               std::abs(spring.displacement() - y), std::abs(bare.displacement() - y));
 }
 
+/// The top pressed by 5 N against a tip that yields little, which it follows in contact or close to it.
+const bench::Values pressed{
+    {"linear_stiffness", 3.0}, {"cubic_stiffness", -0.2}, {"displacement", 0.01}, {"external_force", 5.0}};
+
+/// A step under a force that is held, as tools do it, beside the integration that it cannot do without.
+void compare_held(const bench::Options& o) {
+  constexpr double H = 1e-3;
+  bench::Values inside = pressed, outside = pressed;
+  inside.insert(inside.end(), {{"contact_law", 2.0},
+                               {"compliance_stiffness", 1e4},
+                               {"compliance_exponent", 1.5},
+                               {"communication_step", H},
+                               {"tip_response", 1e-9}});
+  outside.emplace_back("contact_force", 5.0);
+  bench::Fmu held(inside), plain(outside);
+  const unsigned force = bench::Fmu::reference("reaction"), u = bench::Fmu::reference("tip_displacement"),
+                 y = bench::Fmu::reference("displacement"), C = bench::Fmu::reference("contact_force");
+  bench::compare(
+      "held", o,
+      [&] {
+        held.set(u, 0.0);
+        held.step(H);
+        bench::keep(held.get(force));
+      },
+      [&] {
+        plain.set(C, 5.0);
+        plain.step(H);
+        bench::keep(plain.get(y));
+      });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -171,5 +202,8 @@ int main(int argc, char** argv) {
                   {"velocity", soft.z},
                   {"contact_force", soft.C}});
   bench::compare("fmu", o, [&] { fmu.repeat(soft.H); }, [&] { bare.step(); });
+  bench::Fmu flight({{"linear_stiffness", soft.k1}, {"cubic_stiffness", soft.k2}, {"velocity", soft.z}});
+  bench::compare("flight", o, [&] { flight.step(soft.H); }, [&] { bare.step(); });
+  compare_held(o);
   return 0;
 }
