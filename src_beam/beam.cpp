@@ -137,11 +137,11 @@ void Beam::step(double size, const Polynomial& c, const Loads& loads) {
                             " rad");
   }
   bool small = true;
-  const auto look_at = [&small](const Polynomial& f) {
+  const auto check = [&small](const Polynomial& f) {
     for (const double value : f) small = small && std::abs(value) < largest_input;
   };
-  look_at(c);
-  loads.for_each([&look_at](std::size_t, const Polynomial& f) { look_at(f); });
+  check(c);
+  loads.for_each([&check](std::size_t, const Polynomial& f) { check(f); });
   if (!small) throw_too_large(size, c, loads);
   try {
     move(size, c, loads);
@@ -179,12 +179,12 @@ void Beam::apply_tip_impulse(double impulse) {
   now_.v += impulse * struck_;
 }
 
-void Beam::observe(double tip_force, const Loads& loads) {
+void Beam::set_forces(double tip_force, const Loads& loads) {
   now_.scalars.tip_force = tip_force;
   now_.scalars.loads = loads.at(0.0);
 }
 
-void Beam::rest() {
+void Beam::put_at_rest() {
   book();
   now_.q = space_->flexibility_times(force(now_.scalars.loads, now_.scalars.tip_force));
   now_.v.setZero();

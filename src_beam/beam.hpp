@@ -164,7 +164,7 @@ class Beam {
 
   /// Take C [N] and the loads' values as acting now, for tip_acceleration() and load_potential(), which otherwise refer
   /// to the end of the last step. The motion does not depend on it.
-  void observe(double tip_force, const Loads& loads);
+  void set_forces(double tip_force, const Loads& loads);
   double tip_force() const { return now_.scalars.tip_force; }  ///< that acts now
 
   double tip_displacement() const { return space_->tip(now_.q); }             ///< u(L) [m]
@@ -208,7 +208,7 @@ class Beam {
   Response response_per_load(std::size_t shape) const;
 
   /// Put the beam at rest under the tip force and the loads that act now.
-  void rest();
+  void put_at_rest();
 
   /// How the tip goes on over two steps of `size` [s] without a tip force.
   struct Forecast {
@@ -232,7 +232,7 @@ class Beam {
     Eigen::VectorXd q, v;
     struct Scalars {
       double integral = 0.0, integral_2 = 0.0, dissipated = 0.0, load_work = 0.0;
-      double tip_force = 0.0;  ///< C [N] and the loads at the end of the last step, or as observed since
+      double tip_force = 0.0;  ///< C [N] and the loads at the end of the last step, or as set since
       Loads::Values loads{};
     } scalars;
   };

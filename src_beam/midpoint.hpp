@@ -9,7 +9,7 @@
 // in shear that it does not converge, the step is refused.
 //
 // ∫u and ∫∫u are those of u linear in time between the steps, as the paper reads (62): the work of a polynomial C on
-// that motion is C̄ Δu, what the midpoint rule sees.
+// that motion is C̄ Δu, as in the midpoint rule.
 #pragma once
 
 #include <memory>

@@ -67,16 +67,16 @@ class ModalBeam final : public Beam {
       force_[0] += load_[0];
     }
     // As the beam is put at rest, so that it stays there to the last digit.
-    rest_ = force_[0] / omega2_;
-    r_ = omega2_ * (rest_ - eta);
+    equilibrium_ = force_[0] / omega2_;
+    r_ = omega2_ * (equilibrium_ - eta);
     if (damped_) {
       eta_next = eta + (k.G[0] * v + k.G[1] * r_);
       v_next = v + (k.G[0] * r_ - k.one_minus_decay * v);
     } else {
       v_next = v + k.kick * r_;
       eta_next = eta + k.drift * v_next;
-      v_next = k.sign * (v_next + k.kick * (omega2_ * (rest_ - eta_next)));
-      eta_next = k.sign * eta_next + (1.0 - k.sign) * rest_;
+      v_next = k.sign * (v_next + k.kick * (omega2_ * (equilibrium_ - eta_next)));
+      eta_next = k.sign * eta_next + (1.0 - k.sign) * equilibrium_;
     }
     unbooked_.varying = unbooked_.varying || unbooked_.load_varies;
     if (unbooked_.varying) {
@@ -177,7 +177,8 @@ class ModalBeam final : public Beam {
   bool damped_;
 
   // Of the last step.
-  ArrayXd rest_, r_;  // where its first force would hold the modes, and what of that force their displacement leaves
+  ArrayXd equilibrium_,
+      r_;  // where its first force would hold the modes, and what of that force their displacement leaves
   std::array<ArrayXd, 3> force_, load_;  // modal force and its part that is the loads', with their rates [N/√kg, …]
   struct Unbooked {
     double size;

@@ -33,9 +33,9 @@ constexpr auto inverse_factorial = make_inverse_factorials();
 
 // Roots of μ² + dμ + x² = 0 as −d/2 ± iw (complex) or −d/2 ± w (real).
 struct Roots {
-  double x, d;  // ωt, ct
-  double w;     // |√(x² − d²/4)|
-  double rest;  // of w, if that is a phase: what its last digit leaves
+  double x, d;      // ωt, ct
+  double w;         // |√(x² − d²/4)|
+  double rounding;  // of w, if that is a phase: what its last digit leaves
   bool complex;
   double slow;  // |μ₊|, the smaller modulus
   double fast;  // |μ₋|
@@ -99,7 +99,7 @@ struct SineCosine {
 
 SineCosine sine_cosine(const Roots& z) {
   const double s = std::sin(z.w), c = std::cos(z.w);
-  return {s + z.rest * c, c - z.rest * s};
+  return {s + z.rounding * c, c - z.rounding * s};
 }
 
 Gamma by_closed_form(const Roots& z) {

@@ -24,7 +24,7 @@ OscillatorResponse oscillator_response(double omega, double c, double t);
 
 /// The undamped step under constant force as kick, drift and kick: with r(η) = f₀ − ω²η,
 ///   w = v₀ + kick r(η₀),   η = η₀ + drift w,   v = w + kick r(η),   kick = tan(x̃/2)/ω,   drift = sin(x̃)/ω,
-/// then, if sign = −1, reflected at the point of rest, η ← 2f₀/ω² − η, v ← −v. Here x̃ = ωt modulo 2π, less π where
+/// then, if sign = −1, reflected at the equilibrium, η ← 2f₀/ω² − η, v ← −v. Here x̃ = ωt modulo 2π, less π where
 /// that keeps |x̃| ≤ π/2. In exact arithmetic the map conserves an energy for *any* values of the three, so that
 /// rounding them changes the energy by 1e-16 once; the coefficients of η(t), v(t) above would do so at every step.
 struct UndampedStep {

@@ -60,9 +60,9 @@ void augment(const Timoshenko& mesh, VectorXd shape, MatrixXd& basis, Index& col
   for (int pass = 0; pass < 3; ++pass) {
     const VectorXd Mx = mesh.mass_times(shape);
     shape.noalias() -= basis.leftCols(columns) * (basis.leftCols(columns).transpose() * Mx);
-    const double rest = std::sqrt(mesh.mass_norm2(shape));
-    if (!(rest > (pass == 0 ? rank_tolerance * whole : 0.5))) return;
-    shape /= rest;
+    const double outside = std::sqrt(mesh.mass_norm2(shape));
+    if (!(outside > (pass == 0 ? rank_tolerance * whole : 0.5))) return;
+    shape /= outside;
   }
   basis.col(columns++) = shape;
 }

@@ -24,7 +24,7 @@ enum class InitialState { given = 1, at_rest = 2 };
 struct FmuParameters : Parameters {
   double tip_load_coefficient = 0.0, communication_step = 0.0;
   double gravity = 0.0;         ///< [m/s²]
-  double section_height = 0.0;  ///< [m], 0: not told
+  double section_height = 0.0;  ///< [m], 0: not given
   InitialState initial_state = InitialState::given;
   FmuParameters() { initial_velocity_slope = -1.0; }  // so that a first try shows a motion
 };
@@ -36,7 +36,7 @@ struct BeamModel final : fmi::Model {
   double tip_impulse = 0.0;
   std::unique_ptr<Beam> beam;
   std::array<double, 3> tip_response{};  ///< with communication_step > 0, otherwise 0
-  bool resting = false;                  ///< at the start, where that is a state of rest
+  bool starts_at_rest = false;           ///< at the start, where that is a state of rest
 
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override {
@@ -49,9 +49,9 @@ struct BeamModel final : fmi::Model {
 
   void evaluate(Acting acting) override {
     derived_ = {};
-    resting = acting == Acting::at_start && parameters.initial_state == InitialState::at_rest;
-    if (acting != Acting::as_stepped) beam->observe(tip_force[0], loads);
-    if (resting) beam->rest();
+    starts_at_rest = acting == Acting::at_start && parameters.initial_state == InitialState::at_rest;
+    if (acting != Acting::as_stepped) beam->set_forces(tip_force[0], loads);
+    if (starts_at_rest) beam->put_at_rest();
   }
 
   Reached step(double, double size, bool) override {
@@ -148,9 +148,9 @@ struct BeamModel final : fmi::Model {
 
 /// The partial derivative by an input where that is known: a state of rest follows the loads as a whole.
 template <class Partial>
-auto unless_resting(Partial partial) {
+auto unless_at_rest(Partial partial) {
   return [partial](const BeamModel& m) {
-    return m.resting ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(partial(m));
+    return m.starts_at_rest ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(partial(m));
   };
 }
 
@@ -179,7 +179,7 @@ fmi::Table fmi::make_table() {
   t.choices.push_back({"Integrator",
                        "time integration of the beam",
                        {"modal, the exact step of each mode under polynomial loads",
-                        "midpoint rule, which sees the mean of each force over the step"}});
+                        "midpoint rule, which uses the mean of each force over the step"}});
 
   fmi::TableBuilder<BeamModel> add(t);
   const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {
@@ -230,7 +230,7 @@ fmi::Table fmi::make_table() {
       .range(1, 2)
       .choice = "InitialState";
   parameter("section_height", "m", &FmuParameters::section_height,
-            "height of the cross-section h, for max_bending_stress; 0 = not told")
+            "height of the cross-section h, for max_bending_stress; 0 = not given")
       .at_least(0);
   parameter(
       "communication_step", "s", &FmuParameters::communication_step,
@@ -242,7 +242,7 @@ fmi::Table fmi::make_table() {
   add.input(
       "tip_force", "N",
       "contact force C on the tip, positive upward; its derivatives of order 1 and 2 hold for the next step only: "
-      "C(tau) = C + C' tau + C'' tau^2/2. The midpoint rule sees their mean over the step",
+      "C(tau) = C + C' tau + C'' tau^2/2. The midpoint rule uses their mean over the step",
       &BeamModel::tip_force);
   add.impulse("tip_impulse", "N.s", "upward impulse on the tip, applied at the start of the next step, then 0 again",
               &BeamModel::tip_impulse);
@@ -293,7 +293,7 @@ fmi::Table fmi::make_table() {
              of(&Beam::load_potential), [](const BeamModel& m) { return m.load_potential_rate(); })
       .from_all();
   add.depends("distributed_load",
-              unless_resting([](const BeamModel& m) { return -m.beam->load_work_per_unit(Loads::distributed); }));
+              unless_at_rest([](const BeamModel& m) { return -m.beam->load_work_per_unit(Loads::distributed); }));
   add.output(
       "load_work", "J",
       "work of all loads on the beam since the start, where it is 0: distributed_load, point_force, tip_load, "
@@ -305,7 +305,9 @@ fmi::Table fmi::make_table() {
              [](const BeamModel& m) { return m.refused; })
       .steps_only();
   add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam", of(&Beam::tip_mass))
-      .from_all();
+      .from({"density", "area", "second_moment_of_area", "young_modulus", "shear_modulus", "length",
+             "shear_coefficient", "n_elements", "element_degree", "n_modes", "reduced_integration", "integrator",
+             "mass_matrix"});
   add.output(
          "tip_velocity_forecast", "m/s",
          "mean velocity of the tip over the next two steps of communication_step were there no tip_force; 0 if that is "
@@ -313,7 +315,7 @@ fmi::Table fmi::make_table() {
          [](const BeamModel& m) { return m.forecast().velocity; }, [](const BeamModel& m) { return m.forecast_rate(); })
       .from_all();
   for (std::size_t i = 0; i < load_names.size(); ++i) {
-    add.depends(load_names[i], unless_resting([i](const BeamModel& m) { return m.forecast_per_load(i); }));
+    add.depends(load_names[i], unless_at_rest([i](const BeamModel& m) { return m.forecast_per_load(i); }));
   }
   add.local("tip_response", "m/N",
             "what 1 N held over one communication_step adds to tip_displacement at its end; 0 if that is 0",
@@ -328,7 +330,7 @@ fmi::Table fmi::make_table() {
         .from_all();
     const auto follows = [&](const std::string& input, std::size_t load) {
       add.depends(input,
-                  unless_resting([=](const BeamModel& m) { return of_response(m, m.beam->response_per_load(load)); }));
+                  unless_at_rest([=](const BeamModel& m) { return of_response(m, m.beam->response_per_load(load)); }));
     };
     follows("tip_force", Loads::tip);
     for (std::size_t i = 0; i < load_names.size(); ++i) follows(load_names[i], i);

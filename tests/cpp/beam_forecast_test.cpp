@@ -58,7 +58,7 @@ TEST(BeamForecast, DependsOnTheLoadAsItSays) {
       const auto under = [&](double value) {
         Loads loads;
         loads.set(i, {value, 0.0, 0.0});
-        b->observe(0.0, loads);
+        b->set_forces(0.0, loads);
         return b->forecast(H);
       };
       const Beam::Forecast per_load = b->forecast_per_load(H, i), one = under(-0.7), other = under(2.3);

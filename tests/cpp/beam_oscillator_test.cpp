@@ -136,11 +136,11 @@ TEST(BeamOscillator, IsExactToRoundingForAllFrequenciesAndDampings) {
 }
 
 // That step by hand in quadruple precision, for the dissipation.
-struct Motion {
+struct State {
   Quad eta, v, integral, integral_2;
 };
 
-Motion move(const Reference& g, double omega, double c, double t, Quad eta, Quad v, const std::array<double, 3>& f) {
+State move(const Reference& g, double omega, double c, double t, Quad eta, Quad v, const std::array<double, 3>& f) {
   const Quad w2 = Quad(omega) * omega, T = t;
   std::array<Quad, 6> G;
   Quad power = T;
@@ -148,7 +148,7 @@ Motion move(const Reference& g, double omega, double c, double t, Quad eta, Quad
     G[k] = power * g.gamma[k];
     power *= T;
   }
-  Motion m;
+  State m;
   m.eta = eta * (g.decay + c * G[0]) + v * G[0] + f[0] * G[1] + f[1] * G[2] + f[2] * G[3];
   m.v = v * g.decay + (f[0] - w2 * eta) * G[0] + f[1] * G[1] + f[2] * G[2];
   m.integral = eta * (G[0] + c * G[1]) + v * G[1] + f[0] * G[2] + f[1] * G[3] + f[2] * G[4];
@@ -184,7 +184,7 @@ TEST(BeamOscillator, DissipationEqualsTheEnergyThatIsMissing) {
         const double v0 = pattern & 1 ? 1.0 : 0.0;
         const std::array<double, 3> f = {pattern & 2 ? scale_r : 0.0, pattern & 4 ? -scale_r / t : 0.0,
                                          pattern & 8 ? 2.0 * scale_r / (t * t) : 0.0};
-        const Motion m = move(g, omega, c, t, 0, v0, f);
+        const State m = move(g, omega, c, t, 0, v0, f);
         const Quad end_force = f[0] + T * (f[1] + T * f[2] / 2);
         const Quad supplied = end_force * m.eta - f[1] * m.integral - f[2] * (T * m.integral - m.integral_2);
         const Quad missing = (Quad(v0) * v0 - m.v * m.v - w2 * m.eta * m.eta) / 2 + supplied;

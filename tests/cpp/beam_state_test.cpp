@@ -58,7 +58,7 @@ TEST(BeamState, AStepRepeatedFromTheSameStateIsBitIdentical) {
       b->apply_tip_impulse(0.2);
       b->apply_tip_impulse(-0.1);
       b->step(0.004, {-0.6, 0.0, 0.0}, 0.1);
-      b->observe(0.0, 0.4);
+      b->set_forces(0.0, 0.4);
       b->step(0.004, {-0.6, 0.0, 0.0}, 0.3);
       return outputs(*b);
     };

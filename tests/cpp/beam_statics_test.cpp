@@ -87,8 +87,8 @@ TEST(BeamStatics, MotionComesToRestInTheStaticShape) {
       const double EI = bending(p) + (reduced ? 0.0 : shearing(p) * h * h / 12.0);
       for (const Integrator integrator : {Integrator::modal, Integrator::midpoint}) {
         const auto b = make_beam(with_integrator(p, integrator));
-        b->observe(C, {});
-        if (integrator == Integrator::midpoint) b->rest();
+        b->set_forces(C, {});
+        if (integrator == Integrator::midpoint) b->put_at_rest();
         b->step(300.0, {C, 0.0, 0.0}, 0.0);  // what is left of the modal motion is e^{−t ω₁²α/2} ~ 1e-200
         EXPECT_NEAR(b->tip_displacement(), C * tip_compliance(p), 1e-12 * C * tip_compliance(p));
         EXPECT_NEAR(b->strain_energy(), 0.5 * C * C * tip_compliance(p), 1e-12 * C * C * tip_compliance(p));
@@ -114,8 +114,8 @@ TEST(BeamStatics, PutAtRestItStaysThere) {
   for (const Parameters& p : variants()) {
     const auto b = make_beam(p), moving = make_beam(p);
     for (Beam* one : {b.get(), moving.get()}) one->step(0.01, {0.3, 2.0, -50.0}, 0.1);
-    b->observe(0.7, 0.4);
-    b->rest();
+    b->set_forces(0.7, 0.4);
+    b->put_at_rest();
     const double u = b->tip_displacement();
     EXPECT_NEAR(b->tip_acceleration(), 0.0, 1e-9);
     EXPECT_EQ(b->dissipated_energy(), moving->dissipated_energy());
@@ -135,7 +135,7 @@ TEST(BeamStatics, TheClampOfAStraightBeamBearsNoMoment) {
     p.initial_deflection_slope = p.initial_velocity_slope = 0.0;
     const auto b = make_beam(p);
     Noise noise;
-    b->observe(0.7, every_load(1.0, noise));
+    b->set_forces(0.7, every_load(1.0, noise));
     EXPECT_NEAR(b->response().forces.moment[0], 0.0, 1e-12);
     EXPECT_GT(std::abs(b->tip_acceleration()), 0.1);
   }
@@ -169,8 +169,8 @@ TEST(BeamStatics, LoadsAreConsistent) {
     const Eigen::VectorXd shape = mesh.flexibility_times(mesh.load(Loads::tip));
     const auto at_rest = [&](const Loads& loads) {
       auto b = make_beam(p);
-      b->observe(0.0, loads);
-      if (integrator == Integrator::midpoint) b->rest();
+      b->set_forces(0.0, loads);
+      if (integrator == Integrator::midpoint) b->put_at_rest();
       b->step(1000.0, {0.0, 0.0, 0.0}, loads);
       return b;
     };

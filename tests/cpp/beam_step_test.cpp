@@ -201,7 +201,7 @@ TEST(BeamStep, MidpointRuleConvergesToTheModalSolutionInSecondOrder) {
 struct EnergyCase {
   Integrator integrator;
   double alpha_b;
-  bool polynomial;  // exact work is at hand only for a constant force, or where the integrator sees the mean
+  bool polynomial;  // exact work is at hand only for a constant force, or where the integrator uses the mean
 };
 
 TEST(BeamStep, EnergyIdentityHoldsToRounding) {
@@ -354,10 +354,10 @@ TEST(BeamStep, AccelerationIsTheDerivativeOfTheVelocity) {
   p.initial_deflection_slope = 0.2;
   const auto modal = make_beam(p), direct = make_beam(with_integrator(p, Integrator::midpoint));
   const double without = modal->tip_acceleration();
-  modal->observe(0.9, 0.0);
+  modal->set_forces(0.9, 0.0);
   EXPECT_NEAR(modal->tip_acceleration() - without, 0.9 / modal->tip_mass(), 1e-11 * std::fabs(without));
-  modal->observe(0.9, 0.7);
-  direct->observe(0.9, 0.7);
+  modal->set_forces(0.9, 0.7);
+  direct->set_forces(0.9, 0.7);
   EXPECT_NEAR(modal->tip_acceleration(), direct->tip_acceleration(), 1e-10 * std::fabs(direct->tip_acceleration()));
 }
 

@@ -121,7 +121,7 @@ def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
         scene["beam"] = {
             **beam.model_dump(exclude_unset=True),
             "alpha_b": 2.0 * cell["alpha_b"] / slowest_frequency(beam),
-            "integrator": cell["integrator"] if degree == 0 else "modal",  # the midpoint rule sees the mean of a force
+            "integrator": cell["integrator"] if degree == 0 else "modal",  # the midpoint rule uses the mean of a force
             "fidelity": cell["fidelity"],
             "distributed_load": distributed_load,
             "tip_load_coefficient": cell["direction"]
