@@ -184,7 +184,7 @@ command=${1:-help}
 [ $# = 0 ] || shift
 case $command in
   run)
-    build run fmus
+    build run beam_fmu spring_fmu advance # no more than a run takes
     [ $# -gt 0 ] || set -- soft
     exec $venv/bin/springbeam run "$@"
     ;;
@@ -304,7 +304,8 @@ print(*(name for name in extra if has[name]))')
     mapfile -t sources < <(find src_beam src_spring fmus master tests/cpp tests/fuzz -name '*.cpp' -o -name '*.hpp')
     run $venv/bin/clang-format --dry-run -Werror "${sources[@]}"
     mapfile -t units < <(find src_beam src_spring fmus master -name '*.cpp')
-    run $venv/bin/clang-tidy --quiet -p build "${units[@]}"
+    # It reads no headers that another compiler has read before.
+    run $venv/bin/clang-tidy --quiet -p build --extra-arg=-Wno-ignored-gch "${units[@]}"
     [ -z "$failed" ] || die "lint found something"
     ;;
   help | -h | --help) usage ;;
