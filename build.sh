@@ -16,7 +16,8 @@ usage() {
 ./build.sh browser                 install playwright and Chromium and look at the report in it
 ./build.sh docs                    make the pages of docs/ into a site, build/site/index.html
 ./build.sh wheel                   build a source archive, and from that a wheel, into dist/, and test the wheel
-./build.sh fuzz [SEED]             a million random calls of each FMU under sanitizers (about 10 minutes for each version of FMI)
+./build.sh sanitize                run the C++ tests and some random calls with sanitizers (memory, undefined behaviour, threads)
+./build.sh fuzz [SEED]             a million random calls of each FMU with sanitizers (about 10 minutes for each version of FMI)
 ./build.sh lint                    formatters, linters and type checker
 
 Set-up makes .venv here and installs Python packages into it; as root it also installs the system packages that are
@@ -180,6 +181,18 @@ build() {
   exec 9<&-
 }
 
+readonly fuzzers=(fuzz_beam fuzz_spring fuzz_beam3 fuzz_spring3)
+# build_sanitized NAME SANITIZERS TARGET… — in build/NAME.
+build_sanitized() {
+  local folder=build/$1 sanitizers=$2
+  shift 2
+  say "building with sanitizers: $sanitizers"
+  $venv/bin/cmake -S . -B "$folder" -G Ninja -DCMAKE_MAKE_PROGRAM="$PWD/$venv/bin/ninja" \
+    -DPython3_EXECUTABLE="$PWD/$python" -DSPRINGBEAM_SANITIZE="$sanitizers" >/dev/null || die "CMake stopped, see above"
+  $venv/bin/ninja -C "$folder" ${JOBS:+-j "$JOBS"} --quiet "$@" >&2 || die "the build stopped, see above"
+}
+readonly memory_sanitizers=address,undefined,float-cast-overflow
+
 command=${1:-help}
 [ $# = 0 ] || shift
 case $command in
@@ -266,19 +279,12 @@ print(*(name for name in extra if has[name]))')
     ls -l fmus/*.fmu fmus/*.ssp
     ;;
   fuzz)
-    build dev fuzz_beam fuzz_spring fuzz_beam3 fuzz_spring3
+    build dev fmu_describe
     seed=${1:-$(date +%s)}
     failed=
-    sanitized() { # NAME SANITIZERS: the fuzzers in build/NAME
-      $venv/bin/cmake -S . -B build/$1 -G Ninja -DCMAKE_MAKE_PROGRAM="$PWD/$venv/bin/ninja" \
-        -DPython3_EXECUTABLE="$PWD/$python" -DSPRINGBEAM_SANITIZE="$2" >/dev/null || die "CMake stopped, see above"
-      $venv/bin/ninja -C build/$1 ${JOBS:+-j "$JOBS"} --quiet \
-        fuzz_beam fuzz_spring fuzz_beam3 fuzz_spring3 >&2 || die "the build stopped, see above"
-    }
     get_sundials || true
-    say "building with sanitizers"
-    sanitized memory address,undefined,float-cast-overflow
-    sanitized thread thread
+    build_sanitized memory $memory_sanitizers "${fuzzers[@]}"
+    build_sanitized thread thread "${fuzzers[@]}"
     for body in beam spring beam3 spring3; do
       say "$body: 8 threads (seed $seed)"
       build/thread/tests/fuzz/fuzz_$body threads "$seed" || failed=1
@@ -286,6 +292,18 @@ print(*(name for name in extra if has[name]))')
       build/memory/tests/fuzz/fuzz_$body calls "$seed" 1000000 || failed=1
     done
     [ -z "$failed" ] || die "a promise is broken, see above; the same again: ./build.sh fuzz $seed"
+    ;;
+  sanitize)
+    build dev fmu_describe
+    get_sundials || true
+    build_sanitized memory $memory_sanitizers beam_tests spring_tests "${fuzzers[@]}"
+    build_sanitized thread thread "${fuzzers[@]}"
+    failed=
+    say "C++ tests and random calls"
+    $venv/bin/ctest --test-dir build/memory --output-on-failure --parallel "${JOBS:-$(nproc)}" || failed=memory
+    say "random calls in threads"
+    $venv/bin/ctest --test-dir build/thread --output-on-failure -R threads || failed="$failed threads"
+    [ -z "$failed" ] || die "failed with sanitizers:$failed"
     ;;
   docs)
     set_up_python docs

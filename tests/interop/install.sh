@@ -39,13 +39,14 @@ maestro() {
     maven -f "$2/pom.xml" org.apache.maven.plugins:maven-dependency-plugin:3.6.1:build-classpath \
       -Dmdep.outputFile="$2/classpath"
 }
-# Its build reads C headers with libclang, which is on PyPI too; GCC's own headers go with it.
+# Its build reads C headers with libclang, which is on PyPI too; GCC's own headers go with it. To optimise it would take
+# longer than it runs.
 fmi_sim() {
   command -v cargo || return 1
   "$python" -m venv "$2/venv" && "$2/venv/bin/pip" install -q libclang==18.1.1 || return 1
   LIBCLANG_PATH=$(dirname "$(find "$2/venv" -name 'libclang.so')") \
   BINDGEN_EXTRA_CLANG_ARGS="-I$(cc -print-file-name=include)" \
-    cargo install --locked --version "$1" --root "$2" fmi-sim && rm -rf "$2/venv"
+    cargo install --debug --locked --version "$1" --root "$2" fmi-sim && rm -rf "$2/venv"
 }
 # Its library needs TBB, which is on PyPI too.
 ecos() { "$python" -m venv "$2/venv" && "$2/venv/bin/pip" install -q "ecospy==$1" tbb==2023.2.0; }
