@@ -1,6 +1,6 @@
-"""What Python programs call; ``springbeam.simulate`` and the others are these.
+"""Functions for Python programs: ``springbeam.simulate`` and the others.
 
-A `Trajectory` is data. What it can do with rooms above its own is attached here.
+A `Trajectory` is data; its methods that need rooms above its own are attached here.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ def _plot(run: Trajectory, picture: str = "positions") -> Figure:
     """Return a matplotlib Figure: ``shapes_after_contact``, ``shapes_later``, ``positions``,
     ``velocities_and_forces``, ``gap_and_energy``, ``loads_and_clamp`` or ``moments``.
 
-    Raises ValueError for another name, and where the run has nothing of it to show.
+    Raises ValueError for another name, and if the run has no data for it.
     """
-    from .pictures.plots import figure_of  # takes a second to load: only for who has a picture
+    from .pictures.plots import figure_of  # takes a second to load: only for pictures
 
     return figure_of(run, picture)
 
@@ -42,7 +42,7 @@ def _save(run: Trajectory, directory: str | Path, *, replace: bool = False) -> P
 
 
 def _html(run: Trajectory) -> str:
-    """Show in a notebook what the run amounts to: its totals, as an HTML table."""
+    """Return the totals of the run as an HTML table, for notebooks."""
     summary = run.summary
     rows = [
         ("rows, events", f"{len(run)}, {len(run.events)}"),

@@ -77,7 +77,7 @@ def test_a_run_that_stops_early(here, unpainted, monkeypatch, error, fragments):
     replace_run(monkeypatch, error)
     result = command("run", "soft")
     assert result.exit_code == 3
-    for fragment in [*fragments, "what was computed is in results/soft"]:
+    for fragment in [*fragments, "the results so far are in results/soft"]:
         assert fragment in result.stderr
     assert "Traceback" not in result.output
     assert len(load_trajectory(here / "results" / "soft")) == 31

@@ -20,7 +20,7 @@ def test_doctor_has_an_exact_answer_of_each_fmu(monkeypatch):
     shown = printed("doctor")
     assert metadata.version("springbeam") in shown
     for file in FMUS:
-        off, bound = re.search(rf"^{file} .*off by (\S+) of \S+ m \(at most (\S+)\)", shown, re.M).groups()
+        off, bound = re.search(rf"^{file} .*error (\S+) of \S+ m \(at most (\S+)\)", shown, re.M).groups()
         assert float(off) <= float(bound) < 1e-7
 
 

@@ -70,7 +70,7 @@ def test_a_run_without_room_ends_with_3_and_leaves_what_there_was_room_for(tmp_p
     assert "the run stopped early: " in errors
     assert "File too large" in errors
     # Afterwards a measurement of coverage that has no room either may complain.
-    assert "Traceback" not in errors.partition("what was computed is in")[0]
+    assert "Traceback" not in errors.partition("the results so far are in")[0]
     trajectory = load_trajectory(directory)
     assert trajectory.summary["status"] == "stopped"
     assert "File too large" in trajectory.summary["cause"]

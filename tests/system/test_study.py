@@ -80,7 +80,7 @@ def test_an_interrupted_study_says_how_it_goes_on_and_does(here, monkeypatch):
     cut = command(*SWEEP)
     assert cut.exit_code == 3
     there = "2 of 5 records are in results/duffing-sweep"
-    assert f"error: interrupted; {there}; the same command goes on" in cut.stderr
+    assert f"error: interrupted; {there}; the same command continues" in cut.stderr
     printed(*SWEEP)
     resumed, whole = swept("results/duffing-sweep"), swept("whole")
     assert resumed == whole

@@ -256,7 +256,7 @@ def test_an_interrupted_fit_goes_on_where_it_was(here, monkeypatch):
     monkeypatch.setattr(fit, "simulate", lambda scene: interrupt() or made.append(scene) or right(scene))
     cut = command(*FIT)
     assert cut.exit_code == 3
-    assert re.search(r"interrupted; 19 of \d+ records are in f; the same command goes on", cut.stderr)
+    assert re.search(r"interrupted; 19 of \d+ records are in f; the same command continues", cut.stderr)
     assert (here / "f" / "study.jsonl").read_text().count("\n") == 20
     found = json.loads(printed(*FIT, "--json"))
     assert len(made) == (here / "f" / "fit.csv").read_text().count("\n") - 1

@@ -219,8 +219,8 @@ MOTION = np.abs(done().shapes[1]).max() + 2e-3 * max(np.abs(done().v_tip).max(),
         *(("gap", gap, phase, {}, "overlap or part by 2.0e-09")
           for gap, phase in ((2e-9, "tied"), (-2e-9, "touch"), (-2e-9, "free"))),
         ("gap", 1.0, "free", {}, None),
-        ("e_dissipated", -1e-6, "tied", {}, "energy lost by damping comes back"),
-        ("e_impact_loss", -1e-6, "tied", {}, "energy lost by impacts comes back"),
+        ("e_dissipated", -1e-6, "tied", {}, "energy lost by damping returns"),
+        ("e_impact_loss", -1e-6, "tied", {}, "energy lost by impacts returns"),
     ],
 )  # fmt: skip
 def test_what_must_not_be_is_garbage_whatever_the_energy(column, last, phase, scene, reason):

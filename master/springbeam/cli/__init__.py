@@ -1,9 +1,8 @@
 """The ``springbeam`` command: one module per group of commands.
 
-A command is a thin function: it reads its input, calls the library, prints. Its module is loaded when it is asked for,
-and what it calls when it is called: so that a command answers at once. ``--help`` loads the modules of all commands.
-Exit codes: 0 done, 1 a check failed, 2 bad input, 3 the run stopped early (what was computed is on disk), 4 a run
-cannot be compared (`crosscheck`).
+A command is a thin function: it reads its input, calls the library, prints. Modules are loaded only when a command
+needs them, so that it starts fast; ``--help`` loads those of all commands. Exit codes: 0 success, 1 a check failed,
+2 bad input, 3 the run stopped early (results so far are on disk), 4 a run cannot be compared (`crosscheck`).
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from functools import partial
 from importlib import import_module
 from typing import Annotated, Any
 
-# Typer checks arguments by pydantic, which else looks through all installed packages for plugins.
+# Typer uses pydantic, which would search all installed packages for plugins.
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 import typer
@@ -25,11 +24,11 @@ from .common import STOPPED, Command, Commands
 
 _WHAT = "A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs."
 _START = """\
-springbeam scenes                 which scenes there are
-springbeam run soft               run one; what comes of it is in results/soft
-springbeam report results/soft    look at it: one HTML page with a time slider
-springbeam crosscheck soft        is it right? beside an independent reference
-springbeam doctor                 is this installation sound?"""
+springbeam scenes                 list the shipped scenes
+springbeam run soft               run one; results go to results/soft
+springbeam report results/soft    write an HTML page with a time slider
+springbeam crosscheck soft        compare with an independent reference
+springbeam doctor                 check the installation"""
 
 #: Errors of a standard output that is a file.
 _NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
@@ -51,7 +50,7 @@ def main() -> None:
     except OSError as error:
         if error.errno not in _NO_ROOM or error.filename is not None:
             raise
-        # What Python still holds of the output would fail again at its end.
+        # The rest of the output that Python buffers would fail again at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         typer.echo(f"error: standard output: {error.strerror}", err=True)
         sys.exit(STOPPED)
@@ -82,13 +81,13 @@ _TITLES: dict[str, dict[str, tuple[str, ...]]] = {
     "Scenes": {"scenes": ("scenes", "keys", "new")},
     "Run": {"run": ("run",), "studies": ("sweep",), "paper": ("paper",)},
     "Look": {"look": ("report", "plot", "animate", "export", "compare", "spectrum"), "studies": ("fit",)},
-    "Choose scheme and accuracy": {"scenes": ("predict",), "studies": ("tradeoff", "converge")},
+    "Choose step, accuracy and mesh": {"scenes": ("predict",), "studies": ("tradeoff", "converge")},
     "Check": {"studies": ("crosscheck", "stability"), "checks": ("doctor",)},
 }
 
 
 def _made(name: str, module: str, title: str) -> Any:
-    """Return a command; only now its module is loaded."""
+    """Return a command; this loads its module."""
     alone = typer.Typer(add_completion=False)
     function = getattr(import_module(f".{module}", __name__), name)
     alone.command(cls=Command, rich_help_panel=title)(function)

@@ -28,15 +28,15 @@ _PACKAGES = (
 
 def doctor(
     scene: Annotated[
-        str | None, typer.Argument(metavar="[SCENE]", help="Examine the FMUs that this scene names instead.")
+        str | None, typer.Argument(metavar="[SCENE]", help="Check the FMUs that this scene names instead.")
     ] = None,
     settings: SettingsOption = None,
     as_json: JsonOption = False,
 ) -> Findings:
-    """Show versions, and whether the FMUs load here and give an answer that is known exactly. Exit code 1 if not.
+    """Check the installation: versions, and both FMUs against exact solutions. Exit code 1 if a check fails.
 
-    With a scene, examine the FMUs of others that it names, and show what they can do and what that allows. Exit code 2
-    if one is not what the scene or itself says, or cannot do what the scene asks for.
+    With a scene, check the FMUs of others that it names, and show their abilities. Exit code 2 if one contradicts its
+    declarations or the scene, or cannot be run in it.
 
     Example: springbeam doctor my-scene.toml
     """
@@ -74,7 +74,7 @@ def doctor(
 
 
 def _asked(name: str, version: str) -> dict[str, Any]:
-    """Return how far our FMU is off an exact answer, or why it gives none."""
+    """Return the error of our FMU against an exact solution, or why it has none."""
     from ..bodies.archive import own_fmu
     from ..bodies.known_answers import QUESTIONS
     from ..bodies.protocol import FmuError, StepRefused
@@ -86,12 +86,12 @@ def _asked(name: str, version: str) -> dict[str, Any]:
         error = question.ask(name, version)
     except (FmuError, StepRefused) as failure:
         return {**found, "error": None, "passed": False, "state": str(failure)}
-    state = f"off by {abs(error):.1e} of {question.exact:.6g} m (at most {question.bound:.1e}): {question.words}"
+    state = f"error {abs(error):.1e} of {question.exact:.6g} m (at most {question.bound:.1e}): {question.words}"
     return {**found, "error": error, "passed": abs(error) <= question.bound, "state": state}
 
 
 def _examine(scene: Scene) -> Findings:
-    """Return what the bodies of ``scene`` can do; it is an error if the scene cannot be run with them."""
+    """Return the abilities of the bodies of ``scene``; it is an error if the scene cannot be run with them."""
     from ..bodies.factory import findings
     from ..bodies.gate import OFFERED, refusals
     from ..bodies.units import described
@@ -102,13 +102,13 @@ def _examine(scene: Scene) -> Findings:
     for name, body in {"beam": scene.upper, "spring": scene.lower}.items():
         if name not in found:
             if body is not None:
-                shown.append(f"[{name}] {kind_of(body).replace('_', ' ')}: everything is offered")
+                shown.append(f"[{name}] {kind_of(body).replace('_', ' ')}: all couplings are possible")
             continue
         finding = found[name]
         given = scene.foreign[name]
         mass = "(measured)" if given.mass is None else f"measured, {given.mass:.9g} kg given"
         shown.append(Text(f"[{name}] {given.fmu}", style="bold"))
-        shown.append(f"mass that a force or an impulse meets: {finding.mass:.9g} kg {mass}")
+        shown.append(f"mass that an impulse moves: {finding.mass:.9g} kg {mass}")
         shown += described(given.named, finding.units)
         names = ("", "capability", "shown by", "what is offered")
         told = asdict(finding.abilities)

@@ -1,7 +1,6 @@
 """Arguments, exit codes and errors that all commands use.
 
-A command returns `Findings`. `Command` does the rest for all of them: bad input and an interruption are one error,
-and what was found is said as ``--json`` or ``--quiet`` asks for. A command need not look at these two itself.
+A command returns `Findings`. `Command` handles bad input, interruptions, ``--json`` and ``--quiet`` for all of them.
 
 Results go to stdout, progress and errors to stderr. ``--json`` puts one JSON document on stdout and nothing else,
 ``--quiet`` only the path of the results. Colours are for terminals, and NO_COLOR turns them off (rich sees to both).
@@ -33,12 +32,12 @@ if TYPE_CHECKING:
 DISAGREES = 1
 BAD_INPUT = 2
 STOPPED = 3
-#: Commands and options that there are no more, with what to do instead.
+#: Former commands and options, with their replacement.
 GONE = {
-    "--checkpoint": "what a run that ends early has computed is in its directory; run it again for the rest",
-    "resume": "run the scene again; a study goes on where its own command is given again",
-    "--mesh": "springbeam converge SCENE shows how far the mesh is from the continuous beam",
-    "verify": "springbeam doctor asks the FMUs for what is known exactly, springbeam crosscheck judges a scene",
+    "--checkpoint": "a run that ends early leaves its results in its directory; run it again for the rest",
+    "resume": "run the scene again; the command of a study, given again, continues it",
+    "--mesh": "springbeam converge SCENE shows the influence of the mesh",
+    "verify": "springbeam doctor compares the FMUs with exact solutions, springbeam crosscheck judges a scene",
 }
 #: How long a signal waits for Python to act on it [s].
 PATIENCE = 5.0
@@ -80,24 +79,24 @@ MeasuredArgument = Annotated[
 ]
 MapOption = Annotated[
     list[str] | None,
-    typer.Option("--map", metavar="NAME=COLUMN", help="Which column of a run, or module:function, a measured one is."),
+    typer.Option("--map", metavar="NAME=COLUMN", help="Column of a run, or module:function, that was measured."),
 ]
 ReadOption = Annotated[
     list[str] | None,
-    typer.Option("--read", metavar="KEY=VALUE", help="How the file is read, as missing=drop: keys of [[loads]]."),
+    typer.Option("--read", metavar="KEY=VALUE", help="Format of the file, such as missing=drop: keys of [[loads]]."),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document, and nothing else, on stdout.")]
 QuietOption = Annotated[
     bool, typer.Option("--quiet", "-q", help="No progress bar and no tables; print only the path of the results.")
 ]
-ForceOption = Annotated[bool, typer.Option("--force", "-f", help="Replace what is already there.")]
+ForceOption = Annotated[bool, typer.Option("--force", "-f", help="Replace existing results.")]
 NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help="Draw no picture.")]
 
 
 class Commands(TyperGroup):
-    """All commands, each made when it is asked for. One that is gone says what to do instead."""
+    """All commands, each made when it is needed. A former one names its replacement."""
 
-    #: What makes a command, by its name.
+    #: Functions that make the commands, by their names.
     makers: ClassVar[dict[str, Callable[[], Any]]] = {}
 
     def __init__(self, **given: Any) -> None:
@@ -116,9 +115,9 @@ class Commands(TyperGroup):
 
 
 class Command(TyperCommand):
-    """A command that can be interrupted. Its flags are shown without a type, so that no one tries --force true.
+    """A command that can be interrupted. Its flags are shown without a type, which --force true would follow.
 
-    An option that is gone says what to do instead.
+    A former option names its replacement.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -149,7 +148,7 @@ def _refuse_gone(words: list[str]) -> None:
 
 
 class _Results(Console):
-    """A console that leaves an output that is closed to `closed_output_reported`."""
+    """A console that leaves the error of a closed output to `closed_output_reported`."""
 
     def on_broken_pipe(self) -> None:
         raise BrokenPipeError
@@ -171,10 +170,10 @@ def progress_bar(*columns: ProgressColumn, quiet: bool) -> Progress:
 
 
 def say(found: Findings, *, quiet: bool, as_json: bool) -> None:
-    """Say what a command has found: one JSON document, or with ``quiet`` only the place, or all for a reader.
+    """Print findings of a command: one JSON document, or with ``quiet`` only the directory, or all in words.
 
-    Pictures are drawn when all else has been said. Ends the command with its code and error if it has any. In JSON, NaN
-    and infinity become strings.
+    Pictures are drawn last. Ends the command with its code and error if it has any. In JSON, NaN and infinity become
+    strings.
     """
     if as_json:
         from ..results.document import as_json as json_of
@@ -211,7 +210,7 @@ def results_directory(path: Path) -> Path:
 
 @contextmanager
 def closed_output_reported() -> Iterator[None]:
-    """End the command with exit code 3 if nothing reads its standard output any more, as of ``| head``."""
+    """End the command with exit code 3 if its standard output is closed, as by ``| head``."""
     try:
         yield
     except BrokenPipeError:
@@ -246,7 +245,7 @@ def _fmu_error() -> type[Exception]:
 
 
 def cause_of(error: BaseException, place: Path | str) -> str:
-    """Return an error in words; of a file it names the file, or the ``place`` where nothing knows which."""
+    """Return an error in words; that of a file names the file, or ``place`` if the file is unknown."""
     if isinstance(error, OSError):
         return f"{error.filename or place}: {error.strerror or error}"
     return "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
@@ -257,8 +256,8 @@ def interruptible() -> Iterator[None]:
     """End the command with exit code 3 on Ctrl-C, and on SIGTERM, which batch systems send.
 
     Python acts on a signal when the call into an FMU returns. The wakeup descriptor gets it at once: if Python has not
-    acted within `PATIENCE`, the process ends. What a run has handed over is on disk then, as after a kill. An exception
-    that is raised in a finaliser, or in a function that an FMU has called, is lost: the signal is sent again.
+    acted within `PATIENCE`, the process ends, and the results so far are on disk. An exception that is raised in a
+    finaliser, or in a function that an FMU has called, is lost: the signal is sent again.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -25,7 +25,7 @@ from .common import (
     results_directory,
 )
 
-#: Of a picture of runs beside each other.
+#: Size of a picture that compares runs.
 _DPI = 160
 
 
@@ -36,7 +36,7 @@ def report(
     ] = None,
     force: ForceOption = False,
 ) -> Findings:
-    """Write a run as one HTML page: motion with a time slider, charts, numbers, the scene. It needs no network.
+    """Write a run as one HTML page without a network: motion with a time slider, charts, results, scene.
 
     Example: springbeam report results/soft
     """
@@ -58,7 +58,7 @@ def plot(
     ] = None,
     everything: Annotated[bool, typer.Option("--all", help="Draw all of them.")] = False,
 ) -> Findings:
-    """Draw pictures of a run into its directory, without options the overview that springbeam run draws.
+    """Draw pictures of a run into its directory; without options, the overview.
 
     Example: springbeam plot results/soft --picture moments --picture gap_and_energy
     """
@@ -73,7 +73,7 @@ def plot(
     trajectory = load_trajectory(results_directory(directory))
     written = plot_run(trajectory, directory, PICTURES if everything else names or (OVERVIEW,))
     if not written:
-        fail(BAD_INPUT, f"{directory}: the run has nothing to show of {', '.join(names or PICTURES)}")
+        fail(BAD_INPUT, f"{directory}: the run has no data for {', '.join(names or PICTURES)}")
     return Findings(files=[("", file) for file in written])
 
 
@@ -84,7 +84,7 @@ def export(
         typer.Option("--format", help="csv: trajectory.csv anew. parquet: rows, events and shapes."),
     ] = "csv",
 ) -> Findings:
-    """Write the tables of a run from its records (steps.bin), also of one that was killed or still runs.
+    """Write the tables of a run from its records (steps.bin), also of a run that was killed or is not finished.
 
     Example: springbeam export results/soft --format parquet
     """
@@ -102,7 +102,7 @@ def animate(
         ),
     ] = None,
     seconds: Annotated[
-        float, typer.Option("--seconds", metavar="SECONDS", min=0.1, max=600.0, help="How long it plays.")
+        float, typer.Option("--seconds", metavar="SECONDS", min=0.1, max=600.0, help="Duration of the animation.")
     ] = 10.0,
     fps: Annotated[int, typer.Option("--fps", metavar="N", min=1, max=50, help="Frames per second.")] = 20,
     force: ForceOption = False,
@@ -149,16 +149,16 @@ def compare(
         float | None,
         typer.Option("--shift", metavar="SECONDS", help="Move the measurement's clock. Default: by correlation."),
     ] = None,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Where the picture goes.")] = Path(
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="File of the picture.")] = Path(
         "results/comparison.png"
     ),
     no_plots: NoPlotsOption = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> Findings:
-    """Compare runs: the keys that differ, the results that matter, and their motions and forces in one picture.
+    """Compare runs: keys that differ, results, and motions and forces in one picture.
 
-    Beside a file of measurements: how far the run is from them.
+    With a file of measurements: the differences of the run to them.
 
     Example: springbeam compare results/soft results/light
     """
@@ -191,7 +191,7 @@ def spectrum(
         typer.Option(
             "--of",
             metavar="COLUMN",
-            help="Column whose power is wanted, as a_tip, or module:function of the run; may be repeated.",
+            help="Column for the power spectrum, such as a_tip, or module:function of the run; may be repeated.",
         ),
     ] = None,
     low: Annotated[float | None, typer.Option("--low", metavar="HZ", help="Lowest oscillator of the shock.")] = None,
@@ -208,13 +208,13 @@ def spectrum(
     ] = 1,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="DIR", help="Where tables and picture go. Default: DIR-spectrum."),
+        typer.Option("--out", "-o", metavar="DIR", help="Directory for tables and picture. Default: DIR-spectrum."),
     ] = None,
     no_plots: NoPlotsOption = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> Findings:
-    """Find spectra of a run: shock response, power, and the points and the period of a driven motion.
+    """Compute spectra of a run: shock response, power, and the points and the period of a driven motion.
 
     Example: springbeam spectrum results/soft --of a_tip --quality 25
     """

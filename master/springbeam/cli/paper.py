@@ -19,14 +19,16 @@ _PICTURES = ("shapes_after_contact", "shapes_later", "positions", "velocities_an
 
 def paper(
     figure: Annotated[
-        Literal["2", "3", "4", "5"], typer.Argument(metavar="FIGURE", help="Which figure's case: 2, 3, 4 or 5.")
+        Literal["2", "3", "4", "5"], typer.Argument(metavar="FIGURE", help="Number of the figure: 2, 3, 4 or 5.")
     ],
     monolithic: Annotated[
         bool, typer.Option("--monolithic", help="Solve each step as one system, not through the FMUs.")
     ] = False,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="DIR", help="Where results go. Default: results/paper-figN, or …-2, …"),
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Directory for results. Default: results/paper-figN, or …-2, …"
+        ),
     ] = None,
     settings: SettingsOption = None,
     no_plots: NoPlotsOption = False,
@@ -34,7 +36,7 @@ def paper(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> Findings:
-    """Run Algorithm 1 of Ahn & Tate on the case of a figure; write what springbeam run writes.
+    """Run Algorithm 1 of Ahn & Tate on the case of a figure; write the files of springbeam run.
 
     Example: springbeam paper 2 --monolithic
     """
@@ -62,7 +64,7 @@ def paper(
     line = f"Table 2   {solves:.3f} iterations per solve of (53), printed {printed:.3f}"
     found = replace(found, shown=[*found.shown, line])
     if failed:
-        return replace(found, code=STOPPED, error=f"{failed}; what was computed is in {directory.path}")
+        return replace(found, code=STOPPED, error=f"{failed}; the results so far are in {directory.path}")
     return found
 
 

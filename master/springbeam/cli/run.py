@@ -50,7 +50,7 @@ def run(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="DIR", help="Where results go. Default: results/SCENE, or results/SCENE-2, …"
+            "--out", "-o", metavar="DIR", help="Directory for results. Default: results/SCENE, or results/SCENE-2, …"
         ),
     ] = None,
     settings: SettingsOption = None,
@@ -59,7 +59,7 @@ def run(
         typer.Option(
             "--accuracy",
             metavar="RELATIVE",
-            help="Largest relative error of motion, contact times and impulses; picks scheme and steps.",
+            help="Largest relative error of motion, contact times and impulses; sets degree and steps.",
         ),
     ] = None,
     interval: Annotated[
@@ -75,7 +75,7 @@ def run(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> Findings:
-    """Run a scene; write its results, events and an overview into a directory. springbeam plot draws more.
+    """Run a scene; write results, events and an overview into a directory.
 
     Example: springbeam run soft --set coupling.macro_step=5e-4 --out results/fine
     """
@@ -108,7 +108,7 @@ def _refuse_options(scene: Scene, interval: float | None) -> None:
 
 
 def picked(scene: Scene) -> Trajectory | None:
-    """Return the run that keeps the accuracy asked for; ``None`` if none is."""
+    """Return the run with the accuracy of the scene; ``None`` if the scene has none."""
     if scene.accuracy is None:
         return None
     from ..run.accuracy import pick
@@ -152,7 +152,7 @@ def carry_out(
         cause = cause_of(stopped, directory.path)
         what = cause if isinstance(stopped, KeyboardInterrupt) else f"the run stopped early: {cause}"
         where = f"(reached t = {recorder.time:.9g} s of {t_end:g} s)"
-        error = f"{what} {where}; what was computed is in {directory.path}"
+        error = f"{what} {where}; the results so far are in {directory.path}"
     finally:
         if not recorder.begun:
             directory.discard()
@@ -165,14 +165,14 @@ def carry_out(
 
 
 def _drawn(directory: Path, names: Sequence[str]) -> Findings:
-    """Draw pictures of the run in ``directory``; an error is that there is no room for them, or no time."""
+    """Draw pictures of the run in ``directory``; report an error if that fails."""
     from ..pictures.plots import plot_run  # matplotlib takes a second to load
     from ..results.files import load_trajectory
 
     try:
         pictures = plot_run(load_trajectory(directory), directory, names)
     except (KeyboardInterrupt, OSError) as trouble:
-        lost = f"no picture: {cause_of(trouble, directory)}; what was computed is in {directory}"
+        lost = f"no picture: {cause_of(trouble, directory)}; the results are in {directory}"
         return Findings(code=STOPPED, error=lost)
     return Findings(files=[("picture", file) for file in pictures])
 
@@ -202,7 +202,7 @@ def _progress(t_end: float, *, quiet: bool) -> Iterator[Progress]:
 
 
 def _in_words(scene: Scene, summary: Mapping[str, Any], events: list[Event]) -> Iterator[str | Text | Table]:
-    """Yield what a run has come to: its events, totals, residuals and warnings."""
+    """Yield the events, totals, residuals and warnings of a run."""
     from ..results.totals import in_words
 
     yield Text(scene.title or "(untitled scene)", style="bold")
@@ -210,7 +210,7 @@ def _in_words(scene: Scene, summary: Mapping[str, Any], events: list[Event]) -> 
         yield _event_table(events, scene)
         kinds = Counter(event.kind for event in events)
         yield f"events    {', '.join(f'{number} {kind}' for kind, number in kinds.most_common())}"
-        yield "          (on tip, of stop: impulses, upward; lost: energy that events take)"
+        yield "          (on tip, of stop: impulses, upward; lost: energy)"
     results = Table.grid(padding=(0, 2))
     for words, value in in_words(summary):
         results.add_row(Text(words), Text(value))
@@ -219,7 +219,7 @@ def _in_words(scene: Scene, summary: Mapping[str, Any], events: list[Event]) -> 
 
 
 def _lines(summary: Mapping[str, Any]) -> Iterator[str]:
-    """Yield how the run was made and how far it can be trusted."""
+    """Yield cost, residuals, accuracy and warnings of a run."""
     if "macro_steps" in summary and "wall_time" in summary:
         yield f"run       {summary['macro_steps']} macro steps in {summary['wall_time']:.3g} s"
     if "coupling" in summary:
@@ -235,7 +235,7 @@ def _lines(summary: Mapping[str, Any]) -> Iterator[str]:
 
 
 def picked_in_words(accuracy: Mapping[str, Any]) -> str:
-    """Return what was asked for and what was picked, from ``accuracy`` of a summary."""
+    """Return the accuracy and the settings found for it, from ``accuracy`` of a summary."""
     found = accuracy["picked"]
     return f"{accuracy['asked']:g} asked: {found['scheme']} {found['degree']}, H = {found['macro_step']:.3g} s"
 
@@ -243,7 +243,7 @@ def picked_in_words(accuracy: Mapping[str, Any]) -> str:
 def _event_table(events: list[Event], scene: Scene) -> Table:
     """Return the events as a table; of a cascade the first one, and the sums over the others.
 
-    Of many events of a kind, the sums over all but the first stand below: they push out no events of other kinds.
+    For many events of a kind, the sums over all but the first stand below, so that events of other kinds stay visible.
     """
     from ..results.trajectory import cascades, rounded
 

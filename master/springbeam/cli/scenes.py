@@ -50,9 +50,7 @@ def keys(
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON Schema of scene files, for editors.")
     ] = False,
-    metrics: Annotated[
-        bool, typer.Option("--metrics", help="List the numbers of a run that sweep and converge know instead.")
-    ] = False,
+    metrics: Annotated[bool, typer.Option("--metrics", help="List metrics of sweep and converge instead.")] = False,
     as_json: JsonOption = False,
 ) -> Findings:
     """List every key of a scene with unit, allowed values, default and meaning.
@@ -90,7 +88,7 @@ def keys(
 
 
 def new(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="The file is NAME.toml; it must not be there yet.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The file is NAME.toml; it must not exist.")],
 ) -> Findings:
     """Write a commented scene to start from: an aluminium beam above a rubber bumper above a stop.
 
@@ -103,7 +101,7 @@ def new(
     return Findings(files=[("", f"{path}: a scene to change; springbeam predict checks its values")])
 
 
-#: A mesh that is so much too stiff is said to lock.
+#: Relative stiffness above which a mesh locks.
 _LOCKS = 1.05
 
 
@@ -112,7 +110,7 @@ def predict(
     settings: SettingsOption = None,
     as_json: JsonOption = False,
 ) -> Findings:
-    """Predict, without a run, frequencies, stable macro steps, whether the motion is resolved, and the best scheme.
+    """Check a scene without a run: mass, frequencies, first contact, probable mistakes, resolution, stability.
 
     Example: springbeam predict soft --set coupling.macro_step=4e-3
     """
@@ -128,7 +126,7 @@ def predict(
 
 
 def _lines(p: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield what is predicted, a line a subject."""
+    """Yield the predictions, a line per subject."""
     e = p["estimates"]
     H = p["macro_step"]
     yield "mass", _listed(("beam {:.4g} kg", e["beam_mass"]), ("spring {:.4g} kg", e["spring_mass"]))
@@ -150,7 +148,7 @@ def _lines(p: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "contact", contact
     yield "H", f"{H:g} s"
     if p["omega_1"] is not None:
-        beside = f", beside {p['static_shapes']} static shapes" if p["static_shapes"] else ""
+        beside = f" and {p['static_shapes']} static shapes" if p["static_shapes"] else ""
         yield "beam", (f"ω₁H = {p['omega_1'] * H:.3g}, ω_max H = {p['omega_max'] * H:.3g}; "
                        f"{p['resolved_modes']} of {p['modes']} modes resolved (ωH ≤ 1){beside}")  # fmt: skip
         yield "", f"tip mass {p['tip_mass']:.3g} kg, impedance Z = {p['impedance']:.3g} N·s/m"
@@ -162,7 +160,7 @@ def _lines(p: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _listed(*told: tuple[str, float | None]) -> str:
-    """Return what there is of numbers with their words."""
+    """Return the known numbers with their words."""
     return ", ".join(words.format(value) for words, value in told if value is not None)
 
 

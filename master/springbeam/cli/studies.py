@@ -1,7 +1,7 @@
 """The commands that carry out a study: sweep, fit, tradeoff, converge, crosscheck, stability.
 
-Each is a function that makes the study of its own options. `study_command` adds what all studies share: where records
-go, progress, how a study stops and goes on.
+Each is a function that makes the study of its own options. `study_command` adds the common parts: directory, progress,
+interruption and continuation.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Frame:
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="DIR", help="Directory of the results; a study that was begun there goes on."
+            "--out", "-o", metavar="DIR", help="Directory for results; a study that was begun there is continued."
         ),
     ] = None
     force: ForceOption = False
@@ -72,7 +72,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Once:
-    """What is found at once, with no cases to keep and to go on from."""
+    """Findings that are computed at once, without cases to store."""
 
     kind: str  #: names the directory of the results
     announced: str  #: what there is to compute
@@ -80,7 +80,7 @@ class Once:
 
 
 def study_command(*of_workers: str) -> Callable[[Callable[..., Study | Once]], Callable[..., Findings]]:
-    """Return what makes a command of a function that returns a study: with its options, then those of `Frame`.
+    """Return a decorator that makes a command of a function that returns a study: its options, then those of `Frame`.
 
     ``of_workers`` names the options of workers that the command offers.
     """
@@ -106,7 +106,7 @@ def study_command(*of_workers: str) -> Callable[[Callable[..., Study | Once]], C
 
 
 def find(once: Once, scene: str, frame: Frame) -> Findings:
-    """Find it, write the files into a directory of their own, and return what was found.
+    """Compute findings, write their files into a directory of their own, and return them.
 
     The directory is ``out``, else ``results/SCENE-KIND``, or with -2, -3, … behind it where there are results.
     """
@@ -131,7 +131,7 @@ def find(once: Once, scene: str, frame: Frame) -> Findings:
 
 @contextmanager
 def _new_directory(default: Path, frame: Frame) -> Iterator[Path]:
-    """Make and claim the directory of the results; it goes again where nothing is written there."""
+    """Make and claim the directory of the results; remove it if nothing is written there."""
     if frame.out is None and not frame.force:
         directory = RunDirectory.create_numbered(default)
     else:
@@ -145,7 +145,7 @@ def _new_directory(default: Path, frame: Frame) -> Iterator[Path]:
 
 
 def carry_out(study: Study, scene: str | None, frame: Frame) -> Findings:
-    """Compute what of a study is not yet in its directory, write its files, and return what was found.
+    """Compute the missing cases of a study, write its files, and return the findings.
 
     The directory is ``out``, else ``results/SCENE-KIND``, or with -2, -3, … behind it where another study is.
     """
@@ -172,7 +172,7 @@ def _opened(study: Study, default: str, frame: Frame) -> Records:
 
 @contextmanager
 def _going_on(records: Records, total: int) -> Iterator[None]:
-    """End the command with the cause, and how the study goes on, where it stops."""
+    """End the command with the cause, and how to continue the study, if it stops."""
     from ..monolithic.hybrid_system import ReferenceFailure
     from ..run.outcome import RunStopped
 
@@ -183,12 +183,12 @@ def _going_on(records: Records, total: int) -> Iterator[None]:
     except (KeyboardInterrupt, RunStopped, ReferenceFailure, OSError) as error:
         if isinstance(error, OSError) and not records.by_name:
             raise
-        there = f"; {len(records.by_name)} of {total} records are in {directory}; the same command goes on"
+        there = f"; {len(records.by_name)} of {total} records are in {directory}; the same command continues"
         fail(STOPPED, cause_of(error, directory) + there * bool(records.by_name))
 
 
 def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
-    """Return all records, and show meanwhile how far it is."""
+    """Return all records, and show the progress."""
     from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
 
     from ..studies.engine import dask_cluster
@@ -221,9 +221,9 @@ MetricOption = Annotated[
         help="A metric of each run (springbeam keys --metrics), or a Python function of it; may be repeated.",
     ),
 ]
-QuickOption = Annotated[bool, typer.Option("--quick", help="A smaller study, for a first look.")]
+QuickOption = Annotated[bool, typer.Option("--quick", help="A smaller study, for a first impression.")]
 SeedOption = Annotated[
-    int, typer.Option("--seed", metavar="N", min=0, help="Seed of the samples; one seed gives the same runs again.")
+    int, typer.Option("--seed", metavar="N", min=0, help="Seed of the samples; the same seed gives the same runs.")
 ]
 
 
@@ -244,7 +244,7 @@ def sweep(
         int, typer.Option("--samples", metavar="N", min=0, help="Number of samples of the ranges, instead of a grid.")
     ] = 0,
     sampling: Annotated[
-        Literal["latin_hypercube", "random"], typer.Option("--sampling", help="How --samples are placed.")
+        Literal["latin_hypercube", "random"], typer.Option("--sampling", help="Distribution of --samples.")
     ] = "latin_hypercube",
     seed: SeedOption = 0,
     metric: MetricOption = None,
@@ -257,7 +257,7 @@ def sweep(
         ),
     ] = "",
 ) -> Study:
-    """Run a scene over many values of its keys, on all cores or a Dask cluster; one row per run.
+    """Run a scene with many values of its keys, on all cores or a Dask cluster; write one row per run.
 
     Example: springbeam sweep soft --vary spring.linear_stiffness=1:200:64:log
     """
@@ -283,7 +283,7 @@ def fit(
         typer.Option(
             "--vary",
             metavar="KEY=GUESS",
-            help="A key to find, and its rough size, or a range LOW:HIGH; may be repeated.",
+            help="A key to find, and a guess or a range LOW:HIGH; may be repeated.",
             autocompletion=complete_key,
         ),
     ] = None,
@@ -291,15 +291,15 @@ def fit(
     read: ReadOption = None,
     shift: Annotated[
         float | None,
-        typer.Option("--shift", metavar="SECONDS", help="Move the clock of the measurement by this. Default: found."),
+        typer.Option("--shift", metavar="SECONDS", help="Shift of the clock of the measurement. Default: fitted."),
     ] = None,
     repeat: Annotated[
         Path | None,
-        typer.Option("--repeat", metavar="FILE", help="The same, measured once more: how large the noise is."),
+        typer.Option("--repeat", metavar="FILE", help="A second measurement of the same, which shows the noise."),
     ] = None,
     settings: SettingsOption = None,
 ) -> Study:
-    """Find keys of a scene by measured curves, with confidence intervals. Exit code 1 if the data does not
+    """Fit keys of a scene to measured curves, with confidence intervals. Exit code 1 if the data does not
     determine them.
 
     Example: springbeam fit soft measured.csv --vary spring.linear_stiffness=3 --vary spring.damping=0.1
@@ -323,7 +323,9 @@ def tradeoff(
     settings: SettingsOption = None,
     until: Annotated[
         float | None,
-        typer.Option("--until", metavar="SECONDS", help="End of the comparison. Default: while comparable."),
+        typer.Option(
+            "--until", metavar="SECONDS", help="End of the comparison. Default: as long as the runs are comparable."
+        ),
     ] = None,
     repeats: Annotated[
         int,
@@ -332,7 +334,7 @@ def tradeoff(
     quick: Annotated[
         bool,
         typer.Option(
-            "--quick", help="Every third configuration of a kind, timed once; the slow ones are left out sooner."
+            "--quick", help="Every third configuration of a kind, timed once; slow ones are left out earlier."
         ),
     ] = False,
 ) -> Study:
@@ -354,7 +356,7 @@ def converge(
     ] = 4,
     metric: MetricOption = None,
 ) -> Once:
-    """Show how the results settle with finer meshes and more modes: observed orders, extrapolated values, cost.
+    """Show the convergence of results with finer meshes and more modes: observed orders, extrapolated values, cost.
 
     Example: springbeam converge steel-bumper --metric contact_force_max
     """
@@ -381,7 +383,7 @@ def crosscheck(
 ) -> Once:
     """Compare the co-simulation with the monolithic reference of its law.
 
-    Exit code 1 if they differ, 4 if they cannot be compared over the run that was asked for.
+    Exit code 1 if they differ, 4 if they cannot be compared over the whole run.
 
     Example: springbeam crosscheck soft --set coupling.degree=2 --orders
     """

@@ -70,7 +70,7 @@ def integrate(
     Raises
     ------
     ReferenceFailure
-        If an integration or the event logic cannot go on, or ``time_limit`` is over.
+        If an integration or the event logic fails, or ``time_limit`` is over.
     SceneError
         If the scene has no reference: `refuse`.
     ValueError

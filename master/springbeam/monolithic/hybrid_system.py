@@ -30,7 +30,7 @@ NOISE = 16.0 * float(np.finfo(float).eps)
 
 
 class ReferenceFailure(RuntimeError):
-    """The reference cannot go on; the message says why and at which time."""
+    """The reference failed; the message has the cause and the time."""
 
 
 class Held(NamedTuple):
@@ -91,7 +91,7 @@ class HybridSystem:
         self.floor = self.stop.position * self.scene.elastic_stop
         #: What counts of ẋ²/2 as kinetic energy.
         self.inertia = np.ones(self.n)
-        #: Strain energy [J] under the constant loads that x does not tell.
+        #: Strain energy [J] under the constant loads that does not depend on x.
         self._hidden = 0.0
         self.size = 2 * self.n + 3
         self.A = slice(0, self.n)
@@ -231,9 +231,9 @@ class QuasiStaticSystem(HybridSystem):
 
         k (u + α_b u̇ − u_F) = C
         free    C = 0: α_b ü + u̇ = 0 from u̇ = (u_F − u)/α_b on; undamped, u = u_F
-        joined  u = y: the spring bears k, α_b k and k u_F as well, and C follows
+        joined  u = y: k, α_b k and k u_F act on the spring as well, and C follows
 
-    A tip that is let go undamped jumps to u_F, and ½ k (u − u_F)² is lost. Meeting the spring costs nothing.
+    An undamped tip that is released jumps to u_F, and ½ k (u − u_F)² is lost. Meeting the spring loses nothing.
     """
 
     def __init__(self, scene: Scene) -> None:

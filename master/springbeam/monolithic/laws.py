@@ -2,7 +2,7 @@
 
 C [N] lifts the tip and presses the spring; p = y − u is the penetration [m], ṗ = z − v its rate. A rigid law has u = y
 in every phase but `free`, and C is the multiplier of that; any other law is a force C(p, ṗ). To add one, write a class
-here and name it in `REFERENCE_LAWS`: the equations of motion, the integrator and the event logic ask it for the rest.
+here and name it in `REFERENCE_LAWS`; the equations of motion, the integrator and the event logic use it.
 
 Phases: `free` without force; `tied` and `touch`, joined for either sign of C and while C ≥ 0; `slack`, touching without
 force (results have it as `touch`).

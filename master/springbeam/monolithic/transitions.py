@@ -1,11 +1,11 @@
-"""What events do to the state of a `HybridSystem`: impacts, changes of phase, and what is booked with them.
+"""Effects of events on the state of a `HybridSystem`: impacts, changes of phase, energy losses.
 
 =============  ====================================================================================================
 impact         tip and spring meet: perfectly inelastic, J = (z − v)/(eᵀM⁻¹e + 1/m) on the tip, −J on the spring. A law
                that is a force: no impulse
 stop_impact    y = φ with z < 0: z → −e z, and the joined tip likewise, by J = −(1+e) v/(eᵀM⁻¹e); without a spring
                the tip on the stop
-release        tied, y rises through Ψ; goes on as `touch` if C > 0 there, else as `free`
+release        tied, y rises through Ψ; continues as `touch` if C > 0 there, else as `free`
 retie          touch, y falls through Ψ
 separation     touch, C becomes negative (a law that is a force: the penetration ends); at once where a meeting above
                Ψ leaves C < 0. A tip without inertia loses what it springs back with, here and at a release
@@ -91,7 +91,7 @@ class HybridState:
         """Begin the phase that follows; ``before`` is the energy [J] before an impact."""
         s = self.system
         X = self.X
-        if s.scene.massless and before is None:  # a tip that is let go may jump
+        if s.scene.massless and before is None:  # a tip that is released may jump
             before = self._mechanical_energy()
         contact, kind = s.law.after(happened, s.motion(ReferencePhase("tied"), X), s.noise("m", X))
         self.phase = ReferencePhase(contact, self.phase.seated)
@@ -161,7 +161,7 @@ class HybridState:
     def seat_height(self) -> float:
         """Return the height [m] below which a flight after an impact on the foundation does not take place.
 
-        It is 1e-12 of the distance |Ψ − φ|, or of the tip's deflection if larger. What is cut off changes no impulse,
+        It is 1e-12 of the distance |Ψ − φ|, or of the tip's deflection if larger. This changes no impulse,
         and the displacement by less than (velocity × remaining time) of the bounces left out.
         """
         s = self.system

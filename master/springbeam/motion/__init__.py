@@ -1,4 +1,4 @@
-"""What the ends do in a step and at its end: paths between two rows, and kinds of events.
+"""Motion of the ends in a step: paths between two rows, and kinds of events.
 
-Imports nothing of the package. Contact, coupling, run, results and references share these words.
+Imports nothing of the package. Contact, coupling, run, results and references share it.
 """

@@ -1,4 +1,4 @@
-"""What happens to the ends at an instant."""
+"""Events of the ends."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import Enum
 
 
 class EventKind(str, Enum):
-    """What happens at an event; the values are the words in ``events.csv``."""
+    """Kinds of events; the values are the words in ``events.csv``."""
 
     IMPACT = "impact"  #: the tip meets what is below it
     STOP_IMPACT = "stop_impact"  #: the lower end strikes the foundation and rebounds
@@ -36,7 +36,7 @@ class EventKind(str, Enum):
 
 
 class Joint(str, Enum):
-    """How the beam's tip and what lies below it are joined; the values are the words in ``events.csv``."""
+    """Connection of the beam's tip with the end below it; the values are the words in ``events.csv``."""
 
     FREE = "free"  #: no contact force
     TIED = "tied"  #: bilateral, u_tip = y < Ψ

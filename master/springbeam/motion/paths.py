@@ -1,9 +1,9 @@
 """The path of a position inside a step: a quintic through both ends' values and rates, with the step's two moments.
 
 The cubic through values and rates alone hides what is shallower than its own error, of order 4 in the step. The bodies
-report ∫ w and ∫∫ w as well: with these the polynomial is of order 6, and its distance from the cubic tells how well
-the step is resolved. Its zeros are those of a polynomial: the zeros of its derivative say between which places each
-lies. Coefficients of polynomials ascend; they are plain floats, since numpy's overhead would be most of the time.
+report ∫ w and ∫∫ w as well: with these the polynomial is of order 6, and its distance from the cubic shows how well
+the step is resolved. Its zeros are those of a polynomial, isolated by the zeros of its derivative. Coefficients of
+polynomials ascend; they are plain floats, because numpy would take most of the time.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ Means = tuple[float, float]
 #: Largest values in (0, 1) of s²(1 − s)² and of s²(1 − s)²(2s − 1).
 _EVEN = 1.0 / 16.0
 _ODD = 0.0178885438
-#: By how much the last of the moments moves a path at most, over the size of its coefficient of s⁵, 2 odd: about the
-#: error of the path, where that is not small.
+#: Largest displacement of a path by the last of the moments, over its coefficient of s⁵, 2 odd: about the error of the
+#: path, unless that is small.
 LAST_MOMENT = 0.5 * _ODD
 EPS = 2.0**-52
 _MAX_ITERATIONS = 100
@@ -64,7 +64,7 @@ class Path(NamedTuple):
 
     @property
     def moments_beside_cubic(self) -> float:
-        """By how much path and cubic differ in ∫ f ds or in 2 ∫∫ f ds ds, whichever is more."""
+        """Largest difference of path and cubic in ∫ f ds or in 2 ∫∫ f ds ds."""
         mean = self.even / 30.0
         return max(abs(mean), abs(mean - self.odd / 210.0))
 
@@ -94,7 +94,7 @@ class Path(NamedTuple):
 
 
 class Place(NamedTuple):
-    """What is known of f at a time of a step."""
+    """Values of f at a time of a step."""
 
     time: float  #: since the start of the step [s]
     sample: Sample

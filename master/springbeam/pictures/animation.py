@@ -25,7 +25,7 @@ _DPI = 100
 
 
 class AnimationError(RuntimeError):
-    """The animation cannot be made; the message says why and what to do."""
+    """The animation cannot be made; the message names cause and remedy."""
 
 
 def animate(
@@ -45,11 +45,11 @@ def animate(
     path
         ``.gif``, or ``.mp4``, which needs ffmpeg.
     seconds
-        How long it plays [s].
+        Duration of the animation [s].
     fps
         Frames per second; a GIF counts in hundredths of a second.
     progress
-        Gets the times of all frames and hands them on, one when the last is drawn.
+        Takes the times of all frames and yields each when the frame before it is drawn.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def _writer(path: Path, fps: int) -> AbstractMovieWriter:
 
 
 class _Picture:
-    """The figure, and what moves in it."""
+    """The figure and its moving parts."""
 
     def __init__(self, trajectory: Trajectory, frames: Frames) -> None:
         self.trajectory = trajectory
@@ -107,7 +107,7 @@ class _Picture:
         self._words = self.figure.text(0.99, 0.985, "", fontsize=9.0, ha="right", va="top", family="monospace")
         above.set_title(mark(trajectory), fontsize=9.0, loc="right", color=VERMILLION, y=1.0)
         self.figure.draw_without_rendering()
-        self.figure.set_layout_engine("none")  # what stands still stays where it is
+        self.figure.set_layout_engine("none")  # parts at rest stay
 
     def show(self, frame: int) -> None:
         frames = self.frames

@@ -1,6 +1,6 @@
-"""Diagrams: curves over something else than the time of a run, as errors over cost, spectra, what was measured.
+"""Diagrams: curves over quantities other than the time of a run, such as errors over cost, spectra, measurements.
 
-Nothing here loads matplotlib, which takes a second, before something is drawn.
+matplotlib, which takes a second to load, is loaded only to draw.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _MARKED = 60
 
 
 class Diagram(NamedTuple):
-    """Curves by their names, each of shape (n, 2); and what stands along and above the axes."""
+    """Curves by their names, each of shape (n, 2); labels and title of the axes."""
 
     across: str
     up: str
@@ -60,7 +60,7 @@ def draw_diagrams(
 
 
 def figure_with(count: int, wide: int, size: tuple[float, float], title: str) -> tuple[Figure, list[Axes]]:
-    """Return a figure with ``count`` axes of ``size`` [inch], at most ``wide`` beside each other."""
+    """Return a figure with ``count`` axes of ``size`` [inch], at most ``wide`` in a row."""
     from matplotlib.figure import Figure
 
     wide = max(1, min(wide, count))

@@ -1,6 +1,6 @@
-"""What plots, report and animation share: looks and words, units, thinning, and what is large enough to be seen.
+"""Common parts of plots, report and animation: looks and words, units, thinning, thresholds of visibility.
 
-Colours are those of Okabe and Ito, told apart with any colour vision. Widths and sizes are in points.
+Colours are those of Okabe and Ito, which any colour vision can distinguish. Widths and sizes are in points.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 
 
 class Line(NamedTuple):
-    """Width and dashes, which distinguish lines besides their colour."""
+    """Width and dashes, which distinguish lines in addition to their colour."""
 
     width: float = 1.1  #: [pt]
     dashed: bool = False
@@ -198,7 +198,7 @@ def event_marks(trajectory: Trajectory) -> list[EventMark]:
     return found
 
 
-#: The mark of pictures whose run says of itself that it is `springbeam.scene.resolution.not_resolved`.
+#: The mark of pictures of a run that is `springbeam.scene.resolution.not_resolved`.
 NOT_RESOLVED = "NOT RESOLVED by the macro step: see the warnings"
 
 
@@ -244,7 +244,7 @@ def shaded_phases(trajectory: Trajectory) -> list[tuple[Look, list[tuple[float, 
 
 
 def drawable(trajectory: Trajectory) -> bool:
-    """Tell whether there is anything to draw over time: two rows at different times."""
+    """Return whether a run can be drawn over time: it has two rows at different times."""
     return len(trajectory) > 1 and bool(trajectory.time[-1] > trajectory.time[0])
 
 
@@ -262,7 +262,7 @@ def length_along(scene: Scene) -> tuple[Unit, float]:
 
 
 def level_side(symbol: str, beside: Collection[str]) -> Literal["bottom", "top", "center"]:
-    """Return where the name of a level stands: Ψ above and φ below, alone in the middle."""
+    """Return the position of the name of a level: Ψ above and φ below, alone in the middle."""
     return "center" if len(beside) < 2 else "bottom" if symbol == "Ψ" else "top"
 
 

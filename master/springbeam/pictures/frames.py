@@ -30,7 +30,7 @@ Part = Literal["beam", "coil", "top"]
 #: More frames than this are thinned.
 MOST_FRAMES = 600
 _TURNS = 6
-#: Room around what moves, and height of a coil that nothing carries, as parts of the range of motion.
+#: Room around the motion, and height of an unloaded coil, as parts of the range of motion.
 _ROOM = 0.08
 _COIL = 0.4
 #: A coil of unit height and half-width, from its foot up; only the heights follow the spring.
@@ -50,9 +50,9 @@ COIL_HEIGHTS = np.array([0.0, 0.12, *np.linspace(0.12, 0.92, 2 * _TURNS + 2)[1:-
 class Frames:
     """Frames at ``time`` [s], shape (n,): recorded values, without interpolation.
 
-    ``deflection`` [m], shape (n, 21), and ``y`` [m], shape (n,), are ``None`` for a body that is not there. ``row`` is
-    each frame's row of the trajectory. ``low`` and ``high`` [m] hold all of it with room around, and the heights of
-    ``levels`` that are near; ``foot`` [m] is where the coil stands, below the stop.
+    ``deflection`` [m], shape (n, 21), and ``y`` [m], shape (n,), are ``None`` for an absent body. ``row`` is each
+    frame's row of the trajectory. ``low`` and ``high`` [m] enclose the motion and ``levels`` near it, with room around;
+    ``foot`` [m] is the lower end of the coil, below the stop.
     """
 
     time: np.ndarray

@@ -1,4 +1,4 @@
-"""What is drawn of a run over time: panels of curves, with units and limits.
+"""Panels of curves of a run over time, with units and limits.
 
 ``timeline`` paints them with matplotlib, ``report.charts`` makes plotly's charts of them.
 """
@@ -34,7 +34,7 @@ from .drawing import (
     readable_unit,
 )
 
-#: Name, heading, quantity, unit, columns and height of the panels that show what the bodies feel.
+#: Name, heading, quantity, unit, columns and height of the panels of accelerations, clamp forces and stress.
 _ON_BODIES: tuple[tuple[str, str, str, str, dict[str, Look], float], ...] = (
     ("accelerations", "Accelerations", "acceleration", "m/s²", ACCELERATIONS, 1.6),
     ("clamp-force", "Force of the clamp", "force", "N", {"clamp_force": Look(BLUE, "of the clamp, upward")}, 1.2),
@@ -51,9 +51,9 @@ _COMPARED = (
     ("impulse, tip", "N·s", ("impulse_contact",)),
     ("impulse, foundation", "N·s", ("impulse_foundation",)),
 )
-#: A motion smaller than this share of another cannot be seen beside it.
+#: A motion smaller than this share of another cannot be seen in the same panel.
 _SEEN_BESIDE = 0.02
-#: How the first column of such a panel is drawn, and the second.
+#: Looks of the first and the second column of such a panel.
 _COMPARED_LINES = (Line(1.4), Line(0.8, dashed=True))
 
 
@@ -89,12 +89,12 @@ class Panel:
 
     @property
     def axis(self) -> str:
-        """What stands along the axis."""
+        """The label of the axis."""
         return f"{self.quantity} [{self.unit.name}]"
 
 
 def panels(trajectory: Trajectory) -> list[Panel]:
-    """Return all panels that the run has something to show for."""
+    """Return all panels for which the run has data."""
     if not drawable(trajectory):
         return []
     gap = Look(BLUE, "u(t, L) − y" if "y" in trajectory.columns else "u(t, L) − φ")
@@ -114,7 +114,7 @@ def panels(trajectory: Trajectory) -> list[Panel]:
 
 
 def positions(trajectory: Trajectory) -> Panel:
-    """Return tip and spring top, with the levels that are near what moves."""
+    """Return tip and spring top, with the levels near the motion."""
     curves = _curves(trajectory, POSITIONS)
     near = near_levels(trajectory.scene, [trajectory[name] for name in present(trajectory, POSITIONS)])
     ends = trajectory["time"][[0, -1]]
@@ -123,7 +123,7 @@ def positions(trajectory: Trajectory) -> Panel:
 
 
 def enlarged(trajectory: Trajectory) -> Panel:
-    """Return a panel of its own for the one of two positions whose motion is lost beside the other's."""
+    """Return a panel for the smaller of two motions, if it cannot be seen together with the other."""
     ranges = {name: float(np.ptp(trajectory[name])) for name in present(trajectory, POSITIONS)}
     looks = {
         name: Look(POSITIONS[name].colour, f"{POSITIONS[name].words}, enlarged")
@@ -165,7 +165,7 @@ def loads(trajectory: Trajectory) -> list[Panel]:
 
 
 def inside(trajectory: Trajectory) -> list[Panel]:
-    """Return accelerations, what the clamp does to the beam, and the largest stress along it."""
+    """Return accelerations, clamp force and moment, and the largest stress along the beam."""
     run = trajectory.without_start()
     return [
         Panel(name, heading, quantity, unit, _curves(run, looks), height)
@@ -208,7 +208,7 @@ def residual(trajectory: Trajectory) -> Panel:
     rows = rows[relative[rows] > 0.0]
     look = Look(VERMILLION, "over the largest energy", Line(0.8))
     curve = Curve("energy_residual", look, trajectory["time"][rows], relative[rows])
-    heading = "Energy residual: what the sum of all energies has changed by since the start"
+    heading = "Energy residual: change of the sum of all energies since the start"
     panel = Panel("residual", heading, "energy residual", "–", [curve] if len(rows) else [], 1.4)
     if len(rows):
         panel.logarithmic = 0.3 * max(float(np.min(curve.values)), 1e-18), 3.0 * float(np.max(curve.values))
@@ -218,7 +218,7 @@ def residual(trajectory: Trajectory) -> Panel:
 def compared(runs: Mapping[str, Trajectory]) -> list[Panel]:
     """Return panels with the curves of several runs, a colour each; only those of positions may be all zero.
 
-    What strikes leaves impulses and no force: they have panels of their own.
+    Impulses of impacts have panels of their own.
     """
     found = []
     for quantity, unit, columns in _COMPARED:
@@ -251,7 +251,7 @@ def _curves(trajectory: Trajectory, looks: Mapping[str, Look], rows: np.ndarray 
 
 
 def _stems(trajectory: Trajectory, looks: Mapping[str, Look]) -> list[Curve]:
-    """Return the impulses of events, fields of theirs, of those kinds of which there were any."""
+    """Return the impulses of events, fields of `Event`, for kinds that happened."""
     found = []
     for name, look in looks.items():
         if points := [(e.time, getattr(e, name)) for e in trajectory.events if getattr(e, name)]:

@@ -1,7 +1,6 @@
-"""Pictures of a run: an overview; the sub-figures (A)–(E) of Ahn & Tate's Figures 2–5; loads, and what the beam feels.
+"""Pictures of a run: an overview; the sub-figures (A)–(E) of Ahn & Tate's Figures 2–5; loads and inner forces.
 
-Besides colours, lines differ in width or dashes and events in shape, so that the pictures survive a black-and-white
-printer.
+Lines differ in colour and in width or dashes, events in shape, so that pictures can be printed in black and white.
 """
 
 from __future__ import annotations
@@ -37,22 +36,22 @@ _SHAPES_EARLY = 20
 _SHAPES_LATER = 24
 #: Of the heights of panels, in the overview.
 _ON_ONE_PAGE = 0.75
-#: Early to late, dark to light, but not so light that a line is lost on paper.
+#: Early to late, dark to light, but visible on paper.
 _CLOCK = ListedColormap(matplotlib.colormaps["cividis"](np.linspace(0.0, 0.9, 256)), "clock")
 
 
 @matplotlib.rc_context(STYLE)
 def plot_run(trajectory: Trajectory, directory: str | Path, names: Iterable[str] = (OVERVIEW,)) -> list[Path]:
-    """Draw pictures of `springbeam.results.directory.PICTURES`, those that the run has something to show for.
+    """Draw pictures of `springbeam.results.directory.PICTURES`, those for which the run has data.
 
     Parameters
     ----------
     trajectory
-        Any run, also one that stopped early; with fewer than two rows there is nothing to draw.
+        Any run, also one that stopped early; without two rows no picture is drawn.
     directory
-        Where the PNG files go; it must exist.
+        Directory for the PNG files; it must exist.
     names
-        Which pictures.
+        Names of the pictures.
 
     Returns
     -------
@@ -74,7 +73,7 @@ def figure_of(trajectory: Trajectory, picture: str) -> Figure:
         raise ValueError(f"no picture {picture!r}; there are {', '.join(PICTURES)}")
     figure = _drawn(trajectory, picture)
     if figure is None:
-        raise ValueError(f"the run has nothing to show of {picture!r}")
+        raise ValueError(f"the run has no data for {picture!r}")
     return figure
 
 
@@ -145,7 +144,7 @@ def _later(trajectory: Trajectory, title: str, quantities: Mapping[str, tuple[st
 def _side_by_side(
     trajectory: Trajectory, title: str, quantities: Mapping[str, tuple[str, np.ndarray, np.ndarray]]
 ) -> tuple[Figure, list[Axes]]:
-    """Draw curves along the beam, unit, times and values of each quantity; the key shows which time each colour is."""
+    """Draw curves along the beam, unit, times and values of each quantity; the key has the time of each colour."""
     figure = figure_for(trajectory, title, 3.6)
     axes: list[Axes] = list(figure.subplots(1, len(quantities), squeeze=False)[0])
     for ax, (what, (unit, times, values)) in zip(axes, quantities.items(), strict=True):
@@ -157,7 +156,7 @@ def _side_by_side(
 def _curves(
     ax: Axes, trajectory: Trajectory, times: np.ndarray, curves: np.ndarray, what: str, unit: str
 ) -> LineCollection:
-    """Draw curves over x, coloured from early (dark) to late; beside deflections [m] the levels that are near."""
+    """Draw curves over x, coloured from early (dark) to late; with deflections [m] the levels near them."""
     readable = readable_unit([curves], unit)
     clock = readable_unit([times], "s")
     along, length = length_along(trajectory.scene)
@@ -176,7 +175,7 @@ def _curves(
     return lines
 
 
-#: What draws the pictures along the beam, (A), (B) and (G), and titles and panels of those over time.
+#: Functions of the pictures along the beam, (A), (B) and (G), and titles and panels of those over time.
 _ALONG: dict[str, Callable[[Trajectory], Figure | None]] = {
     "shapes_after_contact": _shapes_after_contact,
     "shapes_later": _shapes_later,

@@ -1,4 +1,4 @@
-"""Axes over time: one panel below the other, phases shaded, events marked; and what all pictures look like."""
+"""Axes over time: one panel below the other, phases shaded, events marked; and the common look of all pictures."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ _AXIS = 0.45
 _LINE = 0.19
 _MARK_ROW = 0.11
 _ROOM = 0.12
-#: Most characters in a line of a key beside a panel, and the height of a line [inch].
+#: Most characters in a line of a panel's key, and the height of a line [inch].
 _KEY_WIDTH = 24
 _KEY_LINE = 0.16
 
@@ -123,7 +123,7 @@ def _reach(axes: Sequence[Axes], k: int) -> tuple[float, float]:
 def _mark_events(figure: Figure, axes: list[Axes], marks: Sequence[EventMark], trajectory: Trajectory) -> list[Line2D]:
     """Mark events above the first panel, in a row for each kind, and by lines through all unless they are many.
 
-    Returns what the key shows.
+    Returns the entries of the key.
     """
     factor = time_unit(trajectory).factor
     inch = figure.get_figheight() * axes[0].get_position().height
@@ -230,5 +230,5 @@ def _heading(title: str, trajectory: Trajectory) -> str:
 
 @matplotlib.rc_context(STYLE)
 def draw_compared(runs: Mapping[str, Trajectory]) -> Figure:
-    """Return the figure of runs by their names, in the panels that any of them has something to show for."""
+    """Return the figure of runs by their names, in the panels for which any of them has data."""
     return _painted(compared(runs), Unit(1.0, "s"), _ROOM, 0.0)[0]

@@ -12,11 +12,11 @@ from ..scene import Scene, Spring
 from .steps import BEAM_TELLS, PHASE_NAMES, SPRING_TELLS, STEP_COLUMNS, common, joined
 from .trajectory import BODY_COLUMNS, Trajectory, columns_of
 
-#: Largest value of a column that the motion does not depend on [N]; pictures multiply two of them.
+#: Limit of a column that does not affect the motion [N]; pictures multiply two of them.
 MOST_SHOWN = 1e150
-#: Records of which columns are made at once, so that those of a long run need no memory.
+#: Records from which columns are made at once, to bound the memory for a long run.
 _TOGETHER = 4096
-#: Columns that the beam tells, and their fields in a record.
+#: Columns from the beam, and their fields in a record.
 _TOLD_BY_BEAM = {
     "a_tip": "tip_acceleration",
     **{name: name for name in ("clamp_force", "clamp_moment", "bending_stress")},
@@ -24,7 +24,7 @@ _TOLD_BY_BEAM = {
 
 
 def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the columns that records of a run of ``scene`` amount to, those of `columns_of`.
+    """Return the columns of records of a run of ``scene``, those of `columns_of`.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     if rigid:
         v, z = (np.where(apart, own, common(steps, steps["phase"] >= 3.0, "v_tip_after", "z_after")) for own in (v, z))
     phase = PHASE_NAMES[steps["phase"].astype(int)]
-    if rigid:  # ends that touch and part at once: what they would pull by is no contact force
+    if rigid:  # ends that touch and part at once: a pulling force is no contact force
         contact = np.where(phase == "touch", np.maximum(contact, 0.0), contact)
     inside = contact
     if scene.coupled and scene.contact.strikes:
@@ -71,7 +71,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     if told & SPRING_TELLS and scene.spring is not None:
         found["a_y"] = _acceleration(scene, scene.spring, found, steps)
     if rigid and "a_tip" in found and (scene.lower is None or "a_y" in found):
-        # Ends that are joined move as one: beside that, the tip's own acceleration alternates from step to step.
+        # Joined ends move as one; the tip's own acceleration alternates from step to step.
         found["a_tip"] = np.where(apart, found["a_tip"], found.get("a_y", 0.0))
     return {name: np.array(found[name]) for name in columns_of(scene) if name in found or name not in BODY_COLUMNS}
 
@@ -113,7 +113,7 @@ def blocks(scene: Scene, steps: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
 def trajectory_of(
     scene: Scene, steps: np.ndarray, events: list[Event], shapes: np.ndarray | None, summary: dict[str, Any]
 ) -> Trajectory:
-    """Return the run that records, events and shapes amount to; parameters as of `springbeam.results.recording`."""
+    """Return the run of records, events and shapes; parameters as of `springbeam.results.recording`."""
     inside = steps if steps["size"].any() else None
     return Trajectory(scene, columns(scene, steps, steps[:1]), events, shapes, summary, inside)
 

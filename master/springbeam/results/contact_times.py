@@ -1,7 +1,6 @@
-"""Times at which contact opens, closes and strikes the foundation, their impulses, and how far two runs differ in them.
+"""Times of contact and of impacts on the foundation, their impulses, and the differences of two runs in them.
 
-What lasts less than a window and passes on hardly any impulse is no evidence either way: whether such a contact closes
-at all is decided by rounding.
+Contacts shorter than a window with a negligible impulse are ignored: rounding decides whether they close at all.
 """
 
 from __future__ import annotations
@@ -18,10 +17,10 @@ from ..scene import Scene
 from .steps import impulse
 from .trajectory import Trajectory
 
-#: Share of the impulse of a run below which a contact or a stroke is none to speak of.
+#: Share of the impulse of a run below which a contact or a stroke is negligible.
 SLIGHT = 2e-3
 
-#: From when to when something is touched [s]; an impact that lets go at once has no length.
+#: Beginning and end of a contact [s]; an impact that separates at once has no length.
 Interval = tuple[float, float]
 
 
@@ -50,12 +49,12 @@ def contact_changes(run: Trajectory, window: float) -> list[ContactChange]:
 
 
 def contact_time_difference(first: Trajectory, second: Trajectory, window: float) -> float:
-    """Return how far the times of two runs are apart [s].
+    """Return the largest difference of the times of contact of two runs [s].
 
     Each beginning and end of a contact is compared with the nearest one of the other run, or with the end of the run,
-    if it is the later. Contacts closer than ``window`` [s] to each other are one. Those shorter than that which pass on
-    less than `SLIGHT` of the impulse are left out; so are all short ones of tip and spring in a run without steps, as
-    of a reference, whose impulses are not known.
+    if it is the later. Contacts closer than ``window`` [s] to each other are one. Shorter ones with less than `SLIGHT`
+    of the impulse are left out; so are all short ones of tip and spring in a run without steps, as of a reference,
+    whose impulses are not known.
     """
     end = float(second.time[-1])
     worst = 0.0
@@ -66,9 +65,9 @@ def contact_time_difference(first: Trajectory, second: Trajectory, window: float
 
 
 def impulse_difference(run: Trajectory, reference: Trajectory) -> float:
-    """Return how far the sums of all impacts' impulses are apart, over those of ``reference``; NaN if it has none.
+    """Return the relative difference of the sums of all impacts' impulses to ``reference``; NaN if it has none.
 
-    The sums are of what the tip gets and of what the foundation gives.
+    The sums are of the impulses on the tip and of those of the foundation.
     """
     found, exact = (
         np.sum([(0.0, 0.0), *((event.impulse_contact, event.impulse_foundation) for event in of.events)], axis=0)
@@ -79,14 +78,14 @@ def impulse_difference(run: Trajectory, reference: Trajectory) -> float:
 
 
 def tip_contacts(scene: Scene, events: Iterable[Event], end: float) -> list[Interval]:
-    """Return when tip and spring are joined; a contact that goes on ends at ``end`` [s]. One body alone has none."""
+    """Return the contacts of tip and spring; a last one without an end ends at ``end`` [s]. A single body has none."""
     if not scene.coupled:
         return []
     return _intervals(((event.time, event.joint != "free") for event in events), end)
 
 
 def touches(events: Iterable[Event]) -> list[Interval]:
-    """Return from when to when ends that are not tied touch until they part [s]."""
+    """Return the intervals in which ends that are not tied touch until they part [s]."""
     joints = groupby(events, key=lambda event: event.joint)
     phases = [(joint, next(alike).time) for joint, alike in joints]
     return [
@@ -97,7 +96,7 @@ def touches(events: Iterable[Event]) -> list[Interval]:
 
 
 def foundation_contacts(events: Iterable[Event], end: float) -> list[Interval]:
-    """Return the impacts on the foundation, and the rests on it; a rest that goes on ends at ``end`` [s]."""
+    """Return the impacts on the foundation, and the rests on it; a last rest without an end ends at ``end`` [s]."""
     changes = []
     for event in events:
         if event.kind.strikes:
@@ -107,7 +106,7 @@ def foundation_contacts(events: Iterable[Event], end: float) -> list[Interval]:
 
 
 def _intervals(changes: Iterable[tuple[float, bool]], end: float) -> list[Interval]:
-    """Return when something is touched, from ``changes``: times [s], and whether it is touched from then on."""
+    """Return the intervals of contact from ``changes``: times [s], and whether there is contact from then on."""
     begun = dropwhile(lambda change: not change[1], changes)
     edges = [next(alike)[0] for _, alike in groupby(begun, key=lambda change: change[1])]
     return list(zip_longest(edges[::2], edges[1::2], fillvalue=end))
@@ -124,10 +123,9 @@ def _merged(intervals: list[Interval], window: float) -> list[Interval]:
 
 
 def _contacts_and_strokes(run: Trajectory, end: float) -> Iterator[tuple[list[Interval], np.ndarray, np.ndarray]]:
-    """Yield the contacts of tip and spring, and those with the foundation; what goes on ends at ``end`` [s].
+    """Yield the contacts of tip and spring, and those with the foundation, in a run that ends at ``end`` [s].
 
-    Beside them are times [s] and the impulse passed on up to each since the one before, without its sign [N·s]; none
-    if it is not known.
+    With them are times [s] and the magnitude of the impulse up to each since the one before [N·s]; none if unknown.
     """
     times = np.empty(0)
     passed = np.empty(0)

@@ -1,6 +1,6 @@
-"""Results that the scene rules out: an end below a rigid stop, ends that pass through each other, times beyond the run.
+"""Results that contradict the scene: an end below a rigid stop, ends beyond each other, times beyond the run.
 
-A step that misses an event leaves no other trace, so these are looked for in what was recorded, whatever made it.
+A step that misses an event leaves no other trace, so the records of every run are searched for these.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from ..motion.events import Event
 from ..scene import Scene
 from .dense import Extremes, extremes
 
-#: How far an end may be where it cannot be, over its own range: what curves between right rows may be off by.
+#: Largest penetration over the range of an end: the error of curves between right rows.
 _MOST = 0.01
 #: Times closer than this share of the run are one.
 _SAME = 1e-9
 
 
 def contradictions(scene: Scene, steps: np.ndarray, events: Sequence[Event], contact_time: float) -> list[str]:
-    """Return in words which results of a run ``scene`` rules out; a right run has none.
+    """Return in words the results of a run that contradict ``scene``; a right run has none.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def contradictions(scene: Scene, steps: np.ndarray, events: Sequence[Event], con
     steps, events
         Of the whole run so far; steps of dtype `springbeam.results.steps.STEP`.
     contact_time
-        How long all contacts of the run last together [s].
+        Total duration of all contacts of the run [s].
     """
     if not len(steps):
         return []

@@ -5,11 +5,11 @@ record as at a row, and its columns follow from that (`springbeam.results.column
 
 * positions and velocities of ends that move apart follow the path of order 6 through both ends of the step with its two
   moments (`springbeam.motion.paths`), velocities its slope (order 5);
-* ends that a rigid law joins move together: both take the path of what they have in common, free of the mismatch of
-  their velocities, with what the rows say of the gap, linear between them; so does a tip that the foundation holds;
-* contact and foundation force are those of both rows and, between them, the polynomials applied, without what turns
+* ends that a rigid law joins follow the path of their common motion, free of the mismatch of their velocities, plus the
+  gap, linear between the rows; so does a tip that the foundation holds;
+* contact and foundation force are those of both rows and, between them, the polynomials applied, without the part of
   the mismatch (`forces`: order 6 for a rigid law, d + 3 for a soft one; of an exchange, linear);
-* the energies are linear between the rows (order 2); what an event takes is taken at its row.
+* the energies are linear between the rows (order 2); an event changes them at its row.
 
 At the time of a row the values are the row's, at an event those after it. Orders are those of the polynomials: values
 between rows are no more accurate than the rows.
@@ -43,7 +43,7 @@ _LINEAR = (
 )
 #: Columns that are polynomials between rows, whose extremes `extremes` finds.
 MOTION = ("u_tip", "v_tip", "y", "z", "gap")
-#: Steps of which extremes are looked for at once, so that those of a long run need little memory.
+#: Steps whose extremes are found at once, to bound the memory for a long run.
 _TOGETHER = 65536
 #: Times closer than this share are one.
 _SAME = 1e-12
@@ -58,7 +58,7 @@ _PLACES = ("u_tip", "y")
 _SPEEDS = ("v_tip", "z")
 #: Share of the largest position that the rounding of a step's moments may add to its curve.
 _ROUNDING = 1e-13
-#: Values that differ by less than this share of the largest one are alike: well above what rounding leaves.
+#: Values that differ by less than this share of the largest one are equal: well above rounding.
 _ALIKE = 1e-13
 
 
@@ -84,7 +84,7 @@ setattr(Trajectory, at.__name__, at)
 
 
 def rows_at(run: Trajectory, times: Any) -> Trajectory:
-    """Return what `at` does without shapes, for many times."""
+    """Return the result of `at` without shapes, for many times."""
     wanted = np.atleast_1d(np.asarray(times, dtype=float))
     if wanted.ndim != 1:
         raise ValueError(f"times of shape {wanted.shape}: one number, or a sequence of them")
@@ -145,10 +145,10 @@ def extremes(scene: Scene, steps: np.ndarray, name: str) -> Extremes:
 
 
 def between_rows(scene: Scene, steps: np.ndarray) -> float:
-    """Return how far an end may be from its curve between the rows, over its largest distance from its start.
+    """Return the largest error of the curve of an end between the rows, over its largest distance from its start.
 
-    A part of the motion that turns far in a step may pass unseen through rows that are right. The last moment of a step
-    tells: what it adds to the curve is 0.8 to 2 times the error where that is above a percent, and more of it below.
+    Rows that are right may miss a part of the motion that turns far in a step. The last moment of a step shows it: its
+    part of the curve is 0.8 to 2 times the error where that is above a percent, and more below.
     """
     found = 0.0
     for _, curves in _curves(scene, steps):
@@ -189,7 +189,7 @@ def motion(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
     held = before["phase"] >= 3.0
 
     def of(end: int, records: np.ndarray, field: str) -> Any:
-        """Return a field of an end; of ends that are together what they have in common."""
+        """Return a field of an end; for joined ends that of their common motion."""
         names = [name + field for name in (_PLACES if field.startswith("_integral") else _SPEEDS)]
         return np.where(together, common(records, held, *names), records[names[end]])
 
@@ -213,7 +213,7 @@ def motion(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
 def forces(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
     """Return C and N over ``steps`` [N] as Legendre series of 2τ/H − 1, shape (6, n); parameters as of `motion`.
 
-    They are the polynomials applied less a defect D. Of a soft law D has no part of a degree up to d; of a tie it is
+    They are the polynomials applied minus a defect D. For a soft law D has no part of a degree up to d; for a tie it is
     μ g̈, whose parts up to degree 3 follow from the rates and the moments of the gap. The parts of the next two degrees
     bring both forces to what they are at the ends of the step. Between two exchanges of values they are linear.
     """
@@ -276,8 +276,8 @@ def _between(
         found["phase"] = np.where(before["phase"] >= 3.0, before["phase"], np.where(curves["gap"] < 0.0, 2.0, 0.0))
     for name in _LINEAR:
         found[name] = linear(name, after[name])
-    # What the event at the end of the step moves and takes is kinetic, or springs back with a massless tip. Where ends
-    # part without an impact, all of it counts as the spring's: how much is the tip's is not in the records.
+    # An event at the end of the step changes kinetic energy, or releases a massless tip. Where ends part without an
+    # impact, all of it counts as the spring's, because the records do not have the share of the tip.
     lost = after["impact_loss"] - before["impact_loss"]
     impulses = np.array([0.0, *(event.impulse_contact for event in events)])  # of the last event up to a record
     of_tip = impulses[after["events"].astype(int)] * 0.5 * (after["v_tip"] + after["v_tip_after"])

@@ -39,7 +39,7 @@ ANIMATIONS = ("animation.gif", "animation.mp4")
 
 
 class ResultsExist(FileExistsError):
-    """The directory already holds results, which are never overwritten unasked."""
+    """The directory already holds results, which only ``replace`` overwrites."""
 
 
 class ResultsInUse(RuntimeError):

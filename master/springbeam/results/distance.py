@@ -1,4 +1,4 @@
-"""How far a run is from an exact one, or from a finer one: one measure for all that compares two runs."""
+"""Distance of a run from an exact or a finer one: one measure for all comparisons of two runs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _BETWEEN = np.arange(4.0) / 4.0
 
 
 class Distance(NamedTuple):
-    """How far two runs are apart. All are relative; see `distance`."""
+    """Relative differences of two runs; see `distance`."""
 
     motion: float
     times: float
@@ -28,14 +28,14 @@ class Distance(NamedTuple):
 
 
 def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
-    """Return how far ``run`` is from ``exact``, a finer run or a reference.
+    """Return the differences of ``run`` to ``exact``, a finer run or a reference.
 
     Parameters
     ----------
     run, exact
         Two runs of one scene; a reference has values at its rows only, of two references the common ones count.
     window
-        Contacts and flights shorter than this [s] are no evidence, those that pass on hardly any impulse.
+        Contacts and flights shorter than this [s] are ignored if their impulse is negligible.
 
     Returns
     -------
@@ -43,10 +43,9 @@ def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
         ``motion``: the largest difference of u_tip or of y, over the largest change of the exact one from its start
         (`apart`), taken at all rows of both and at three times between each two; with a reference at its rows. ∞ where
         the two have no body in common. ``times``: the largest difference of a beginning or an end of a contact, over
-        the time that is run. ``impulses``: the difference of the sums of all impacts' impulses on the tip and on the
+        the length of the run. ``impulses``: the difference of the sums of all impacts' impulses on the tip and on the
         foundation, over the smaller sum that is not 0; 0 where both are. ``force``: the difference of the peaks of a
-        soft contact force, each a mean over its window, over the larger; ``None`` of a rigid law and where a peak is
-        not known.
+        soft contact force, each a mean over its window, over the larger; ``None`` for a rigid law and unknown peaks.
     """
     times = exact.time if exact.steps is None else _all_times(run, exact)
     if run.steps is None:

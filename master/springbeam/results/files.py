@@ -36,7 +36,7 @@ def lines(rows: Iterable[Sequence[Any]]) -> bytes:
 
 
 def event_lines(events: Iterable[Event]) -> bytes:
-    """Return ``events`` as lines of ``events.csv``, what a body is missing for left empty."""
+    """Return ``events`` as lines of ``events.csv``; values of absent bodies are empty."""
     rows = ([getattr(event, name) for name in EVENT_COLUMNS] for event in events)
     return lines(["" if v is None else v if isinstance(v, str | bool) else float(v) for v in row] for row in rows)
 
@@ -58,7 +58,7 @@ def write_summary(run: RunDirectory, summary: Mapping[str, Any]) -> None:
 
 @contextmanager
 def replaced(path: Path) -> Iterator[BinaryIO]:
-    """Open a file that takes the place of ``path`` once it is written; if that fails, the file is as before."""
+    """Open a file that replaces ``path`` once it is written; if that fails, the old file stays."""
     part = path.with_name(f"{path.name}.part")
     try:
         with part.open("wb") as file:
@@ -74,7 +74,7 @@ def replaced(path: Path) -> Iterator[BinaryIO]:
 
 
 def load_trajectory(directory: str | Path) -> Trajectory:
-    """Read a run directory, also of a run that was stopped or killed: of that, the steps that it has written.
+    """Read a run directory, also of a run that was stopped or killed, with the steps that it has written.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def refuse_cut(run: RunDirectory, written: Mapping[str, int]) -> None:
 
 
 def read_run(run: RunDirectory) -> Trajectory:
-    """Return what the files hold, whole or not. Raises ResultsUnreadable."""
+    """Return the content of the files, complete or not. Raises ResultsUnreadable."""
     summary = load_summary(run.path)
     summary.pop("files", None)  # of the directory, not of the run
     scene = scene_from_dict(summary["scene"], source=f"{run.summary}: scene")

@@ -1,4 +1,4 @@
-"""Where a run leaves its records, events and shapes, a thousand steps at a time: in memory, or in a directory."""
+"""Recorders of a run's records, events and shapes, a thousand steps at a time: in memory, or in a directory."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .trajectory import SHAPE_COLUMNS, Trajectory
 
 
 class MemoryRecorder:
-    """What a run reports to, any number of blocks and then ``finish``: everything is kept in memory.
+    """Keep a run in memory: any number of blocks and then ``finish``.
 
     Parameters
     ----------
@@ -69,18 +69,18 @@ class MemoryRecorder:
     def finish(self, summary: Mapping[str, Any]) -> None:
         """End the record with ``summary``, which is JSON-like; the scene as run is added.
 
-        The command line reports ``status`` (``done``, ``stopped``, ``interrupted``), ``macro_steps``, ``wall_time``
-        [s], ``max_energy_residual`` (relative) and ``warnings`` (list of str), those that are there.
+        The command line shows ``status`` (``done``, ``stopped``, ``interrupted``), ``macro_steps``, ``wall_time`` [s],
+        ``max_energy_residual`` (relative) and ``warnings`` (list of str) if present.
         """
         self._summary = _with_scene(summary, self.scene)
 
 
 class FileRecorder(AbstractContextManager["FileRecorder"]):
-    """Streams what `MemoryRecorder` keeps into a `RunDirectory`, so that memory does not grow with the run.
+    """Write a run into a `RunDirectory`, so that memory does not grow with the run.
 
-    Records are appended a block at a time, after their events and shapes: a run that is killed loses no more than that,
-    and ``summary.json`` says from the start which scene they belong to. Rows are made from the records at the end.
-    Results of an earlier run stay until this one has something to record; then they are removed.
+    Records are appended a block at a time, after their events and shapes: a run that is killed loses no more than one
+    block, and ``summary.json`` has the scene from the start. Rows are made from the records at the end. Results of an
+    earlier run are removed when this one has something to record.
 
     As a context it closes the files.
 

@@ -1,4 +1,4 @@
-"""The record of a step: all that a run leaves of it, from which columns, totals and dense output follow.
+"""The record of a step, from which columns, totals and dense output follow.
 
 A run is a sequence of these records, of fixed size, one per accepted step. Between two rows the motion follows from the
 state after the event of the row before, the end of the step and its two moments, the force from the step's polynomial.
@@ -19,7 +19,7 @@ STEP_COLUMNS = (
     # Contact force and foundation force with two derivatives at its start; where it has no size, at the row.
     *("contact_force", "contact_force_rate", "contact_force_rate_2"),
     *("foundation_force", "foundation_force_rate", "foundation_force_rate_2"),
-    # Contact force and foundation force at the end of the step [N], whatever the polynomials are there.
+    # Contact force and foundation force at the end of the step [N], which may differ from the polynomials.
     *("contact_force_end", "foundation_force_end"),
     # The row: the ends and both forces after its event, the phase (`PHASE_NAMES`), and the number of events up to here.
     *("u_tip_after", "v_tip_after", "y_after", "z_after", "contact_force_after", "foundation_force_after"),
@@ -33,16 +33,16 @@ STEP_COLUMNS = (
     *("impact_loss", "beam_received", "spring_received"),
     # All energies when the run began, before an impact at its start [J].
     "energy_at_start",
-    # What the beam tells at the end of the step, before the event, as of `springbeam.bodies.protocol.InnerForces`; and
-    # which bodies tell, `BEAM_TELLS` and `SPRING_TELLS` added up, the same in all records of a run.
+    # Inner forces of the beam at the end of the step, before the event (`springbeam.bodies.protocol.InnerForces`); and
+    # the bodies that report them, the sum of `BEAM_TELLS` and `SPRING_TELLS`, the same in all records of a run.
     *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress", "told"),
-    # The same in all records: the degree of the contact force, the tip's part in the velocity that joined ends have in
-    # common, m_tip/(m_tip + m), and their reduced mass, 1/(1/m_tip + 1/m) [kg], 0 if no rigid law joins them.
+    # The same in all records: the degree of the contact force, the tip's share of the common velocity of joined ends,
+    # m_tip/(m_tip + m), and their reduced mass, 1/(1/m_tip + 1/m) [kg], 0 if no rigid law joins them.
     *("degree", "tip_share", "reduced_mass"),
 )
 #: The contact force of a step: C and its two derivatives at the step's start.
 FORCE_COLUMNS = ("contact_force", "contact_force_rate", "contact_force_rate_2")
-#: In ``told``: the record holds what the beam tells; the lower body is the spring of the scene.
+#: Flags in ``told``: the record has the inner forces of the beam; the lower body is the spring of the scene.
 BEAM_TELLS = 1
 SPRING_TELLS = 2
 #: Little-endian doubles, on every machine.

@@ -1,7 +1,7 @@
-"""The numbers of a run that engineers ask for: how hard, how long, how fast back, and where the energy went.
+"""Results of a run: forces, durations, velocities, impulses and energy losses.
 
-They go into ``summary.json``, and each is a metric of sweeps. The impulse of a
-step is that of the polynomial that was applied, without the part that turns a mismatch of velocities round (`impulse`).
+They go into ``summary.json``, and each is a metric of sweeps. The impulse of a step is that of the applied polynomial
+without the part of the mismatch of velocities (`impulse`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .steps import FORCE_COLUMNS, impulse, joined
 
 
 class Quantity(NamedTuple):
-    """What a number of a run is; ``unit`` is "" for a count."""
+    """Meaning and unit of a result; ``unit`` is "" for a count."""
 
     words: str
     unit: str
@@ -31,19 +31,19 @@ TOTALS = {
     "contact_impulse": Quantity("impulse of the contact, ∫ C dt and impacts", "N·s"),
     "contact_force_max": Quantity("peak contact force, mean over the window", "N"),
     "contact_force_window": Quantity("window of the peak contact force", "s"),
-    "contact_force_max_time": Quantity("when that window begins", "s"),
+    "contact_force_max_time": Quantity("beginning of that window", "s"),
     "contact_duration": Quantity("longest contact", "s"),
     "contact_duration_total": Quantity("all contacts together", "s"),
     "number_of_contacts": Quantity("contacts", ""),
-    "bounce_time": Quantity("from the first contact until nothing opens again", "s"),
+    "bounce_time": Quantity("time from the first contact until the last opening", "s"),
     "last_impact_time": Quantity("last impact", "s"),
-    "rebound_velocity": Quantity("upward velocity of the tip when it last leaves", "m/s"),
-    "deepest_tip": Quantity("lowest place of the tip", "m"),
-    "deepest_tip_time": Quantity("when the tip is lowest", "s"),
-    "stop_strokes": Quantity("strokes on the foundation", ""),
+    "rebound_velocity": Quantity("upward velocity of the tip after the last contact", "m/s"),
+    "deepest_tip": Quantity("lowest position of the tip", "m"),
+    "deepest_tip_time": Quantity("time of the lowest position", "s"),
+    "stop_strokes": Quantity("impacts on the foundation", ""),
     "foundation_impulse": Quantity("impulse of the foundation", "N·s"),
 }
-#: Where energy is lost, by summary key [J].
+#: Causes of energy losses [J], by summary key.
 LOSS_NAMES = {
     "loss_beam": "damping of the beam",
     "loss_spring": "damping of the spring",
@@ -51,9 +51,9 @@ LOSS_NAMES = {
     "loss_impact": "impacts of tip and spring",
     "loss_stop": "impacts on the stop",
 }
-#: Numbers of `TOTALS` that say something only beside others.
+#: Numbers of `TOTALS` that belong to others.
 _BESIDE = ("contact_force_window", "contact_force_max_time", "deepest_tip_time")
-#: Impulses that differ by less than this share of all that has been passed on are one: well above what rounding leaves.
+#: Impulses that differ by less than this share of the total are equal: well above rounding.
 _ALIKE = 1e-13
 
 
@@ -131,14 +131,14 @@ def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float
 
 
 def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tuple[float, float]:
-    """Return the largest mean of C [N] over windows of ``window`` [s], wherever they begin, and when the first begins.
+    """Return the largest mean of C [N] over all windows of ``window`` [s], and the time at which the first one begins.
 
     ``at_events`` are the impulses [N·s] that act at each row, as of `kicks`. One at the edge of a window belongs to it
     if that makes the mean larger.
     """
     rows = steps["time"]
-    # What has been passed on up to each row, after its impulses, and the powers of the time since then up to the next
-    # row; before the run and after it there is no force.
+    # The impulse up to each row, including impacts there, and the powers of the time since then up to the next row;
+    # before the run and after it there is no force.
     begins = np.append(rows[0] - 2.0 * window, rows)
     passed = np.zeros((4, len(begins)))
     passed[0, 1:] = np.cumsum(impulse(steps) + at_events)

@@ -52,7 +52,7 @@ COLUMNS = {
     "e_total": Column("J", "", "sum of the six energies"),
     "energy_residual": Column("J", "", "change of e_total since the start; it should be zero"),
 }
-#: Columns after the loads; a body that does not tell them leaves them out.
+#: Columns after the loads, from our own bodies.
 BODY_COLUMNS = {
     "a_tip": Column(
         "m/s²", "beam", "acceleration of the tip relative to the base; of the lower end while a law joins them"
@@ -67,7 +67,7 @@ PHASES = ("free", "tied", "touch", "seated")
 #: Columns of the table of shapes: time [s], then deflections [m], bending moments [N·m] and shear forces [N] at
 #: `SHAPE_POINTS`.
 SHAPE_COLUMNS = ("time", *(f"{part}_{i}" for part in ("u", "moment", "shear") for i in range(len(SHAPE_POINTS))))
-#: A number below this share of its table's largest is a zero, rounded.
+#: A number below this share of its table's largest is a rounded zero.
 _NOISE = 1e-13
 
 
@@ -108,7 +108,7 @@ def columns_of(scene: Scene) -> dict[str, str]:
 
 
 def rounded(value: float, scale: float) -> str:
-    """Return ``value`` in four digits; "0" for a zero rounded, told by ``scale``, the largest of its kind."""
+    """Return ``value`` in four digits; "0" if it is a rounded zero compared with ``scale``, the largest of its kind."""
     return "0" if abs(value) <= _NOISE * scale else f"{value:.4g}"
 
 
@@ -125,7 +125,7 @@ class Trajectory:
     events: list[Event] = field(default_factory=list)
     shape_table: np.ndarray | None = None
     summary: dict[str, Any] = field(default_factory=dict)
-    #: What lies between the rows, a step per row (`springbeam.results.steps.STEP`); ``None`` without such data.
+    #: Records between the rows, a step per row (`springbeam.results.steps.STEP`); ``None`` without such data.
     steps: np.ndarray | None = None
 
     if TYPE_CHECKING:
@@ -183,9 +183,9 @@ class Trajectory:
         return np.split(np.asarray(self.shape_table)[:, 1:], 3, axis=1)[part]
 
     def without_start(self) -> Trajectory:
-        """Return the run without its start, where the beam leans or turns there as its clamp does not let it.
+        """Return the run without its first row if the initial slope or velocity of the beam contradicts the clamp.
 
-        Forces in clamp and sections at that instant grow with the number of elements and has gone by the next row.
+        Clamp and inner forces at that instant grow with the number of elements; they are finite in the next row.
         """
         beam = self.scene.beam
         later = self.time > self.time[:1]
@@ -228,7 +228,7 @@ class Trajectory:
 
 
 def _of_extra(package: str) -> Any:
-    """Return a package that only the extra ``data`` brings. Raises ImportError, which says how to get it."""
+    """Return a package of the extra ``data``. Raises ImportError, which names the remedy."""
     try:
         return import_module(package)
     except ImportError as error:

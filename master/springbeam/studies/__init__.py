@@ -1,4 +1,4 @@
-"""What many runs tell: accuracy, checks against references, speed against accuracy, stability, sweeps.
+"""Studies of many runs: accuracy, checks against references, cost of an accuracy, stability, sweeps, fits.
 
 Imports everything but `cli` and ``api``; each study draws its own picture. One module or package per command.
 """

@@ -1,4 +1,4 @@
-"""Runs beside each other, and a run beside a file of measurements (``springbeam compare``)."""
+"""Compare runs with each other, or a run with a file of measurements (``springbeam compare``)."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def beside_measured(run: Trajectory, file: Path, names: list[str], shift: float 
 
 
 def differing_keys(scenes: list[Scene]) -> dict[str, list[Any]]:
-    """Return the values of the keys that are not the same in all scenes, ``None`` where a scene has no such key."""
+    """Return the values of the keys that differ between scenes; ``None`` if a scene has no such key."""
     flat = [scene.flat() for scene in scenes]
     names = dict.fromkeys(name for keys in flat for name in keys)
     values = {name: [keys.get(name) for keys in flat] for name in names}
@@ -80,8 +80,8 @@ def results_of(runs: list[Trajectory]) -> dict[str, list[Any]]:
 def _over_one_window(runs: list[Trajectory]) -> list[dict[str, Any]]:
     """Return the runs' summaries with their peak forces over one window, the longest of theirs.
 
-    A mean over another window is another quantity. A run without steps, which has no force between its rows, has no
-    peak beside those of other windows.
+    Means over different windows are not comparable. A run without steps, which has no force between its rows, has no
+    peak for another window.
     """
     common = max(run.summary.get("contact_force_window", 0.0) for run in runs)
     summaries = [dict(run.summary) for run in runs]

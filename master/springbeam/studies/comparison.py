@@ -4,14 +4,14 @@ The bound of a quantity at time t is
 
     4 · max over [t₀, t] of |q_H − q_{H/2}|   +   (ε_IDA · steps + rounding) · growth · scale of q:
 
-what halving the macro step changes is an upper estimate of the discretisation error for any order ≥ 1 (twice the
-difference at order 1), doubled again because events mix orders; the second term is the tolerance of the spring's
-integrator in every step and the rounding of the beam's modes, grown as fast as the reference grows a perturbation.
-Nothing in it knows the reference, so a wrong sign, mass or law, which converges to something else, fails.
+The difference of halving the macro step is an upper estimate of the discretisation error for any order ≥ 1 (twice the
+difference at order 1), doubled again because events mix orders. The second term is the tolerance of the spring's
+integrator in every step and the rounding of the beam's modes, amplified like a perturbation of the reference. The bound
+does not depend on the reference, so a wrong sign, mass or law, which converges to something else, fails.
 
-The verdict is about the run that was asked for. Nonsmooth trajectories separate: comparable is what comes before the
-first change of contact that the macro step, or a tiny perturbation of the reference, moves to another place in the
-order of events. A run that is not resolved at its macro step cannot be compared at all.
+Nonsmooth trajectories separate: they are comparable until the first change of contact that the macro step, or a tiny
+perturbation of the reference, moves to another position in the order of events. A run that is not resolved at its macro
+step cannot be compared at all.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ from .tables import Row
 Verdict = Literal["agrees", "differs", "not comparable"]
 #: Largest change by halving the macro step, relative to the largest displacement (velocity), of a resolved motion.
 _RESOLVED = {"u_tip": 0.05, "y": 0.05, "v_tip": 0.25, "z": 0.25}
-#: Factor on what halving the macro step changes.
+#: Factor on the difference of halving the macro step.
 _SAFETY = 4.0
-#: Least relative error of a step, where IDA's tolerance is not a looser one.
+#: Least relative error of a step, unless IDA's tolerance is larger.
 _LEAST = 1e-12
 #: Relative change of the initial velocity that shows how fast two solutions separate, and how far that may grow.
 PERTURBATION = 1e-7
 _GROWTH = 1e4
-#: Intervals of contact shorter than this many macro steps are no evidence either way.
+#: Intervals of contact shorter than this many macro steps are ignored.
 SHORT = 2.0
 #: The same where nothing has macro steps, as a share of the time.
 SHORT_SHARE = 2e-3
@@ -53,12 +53,12 @@ _DRAWN = ("time", "u_tip", "y", "v_tip", "z", "contact_force", "foundation_force
 
 
 def compare(scene: Scene) -> Row:
-    """Run ``scene`` and the reference of its law and return what was found.
+    """Run ``scene`` and the reference of its law and return the comparison.
 
     Returns
     -------
     Row
-        ``verdict``; ``from``, ``horizon``, ``t_end``: compared from and to, and asked for [s]; ``growth`` of a
+        ``verdict``; ``from``, ``horizon``, ``t_end``: compared from and to, and end of the run [s]; ``growth`` of a
         perturbation of the reference up to the horizon; ``quantities``: a row each, with the largest error (where a
         bound is broken the furthest out of it), when it occurred, its root mean square, the bound then, and whether it
         has passed; ``events``: a row per change of contact, whose ``time`` is ``None`` where the run lacks it;
@@ -140,10 +140,10 @@ def _beside_event_driven(scene: Scene, found: Row) -> tuple[Trajectory, ...]:
 
 
 def _same_story_until(coarse: Trajectory, fine: Trajectory) -> float:
-    """Return the time [s] up to which a run and that at half its macro step tell the same story.
+    """Return the time [s] up to which a run and that at half its macro step agree.
 
-    That is the same events, a run that does not call itself unresolved, and displacements and velocities, away from
-    events, that halving hardly changes.
+    They agree if they have the same events, the run is resolved, and halving hardly changes displacements and
+    velocities away from events.
     """
     times = macro_points(coarse.scene)
     size = coarse.scene.coupling.H
@@ -161,14 +161,14 @@ def _same_story_until(coarse: Trajectory, fine: Trajectory) -> float:
 
 
 def _step_error(scene: Scene) -> float:
-    """Return the relative error that the spring's integrator may make in a step."""
+    """Return the relative tolerance of the spring's integrator in a step."""
     return _LEAST if scene.spring is None else max(_LEAST, scene.spring.relative_tolerance)
 
 
 def _rounding(scene: Scene, name: str) -> float:
-    """Return the relative rounding of the beam's slow motion beside its fastest modes, estimated.
+    """Return an estimate of the relative rounding of the beam's slow motion by its fastest modes.
 
-    It is ε √(λ_max/λ₁), of accelerations and of forces inside, which follow from these, ε λ_max/λ₁.
+    It is ε √(λ_max/λ₁); for accelerations and inner forces ε λ_max/λ₁.
     """
     beam = scene.beam
     if beam is None:
@@ -178,7 +178,7 @@ def _rounding(scene: Scene, name: str) -> float:
 
 
 def _agree_until(first: list[ContactChange], second: list[ContactChange], start: float, t_end: float) -> float:
-    """Return the time [s] before the first change that the other run does not have in the same place of the order."""
+    """Return the time [s] before the first change that the other run does not have at the same position."""
     before = start
     for a, b in itertools.zip_longest(first, second):
         soonest = min(change.time for change in (a, b) if change is not None)
@@ -216,8 +216,8 @@ def reference_and_perturbed(scene: Scene, times: np.ndarray) -> tuple[Trajectory
 def perturbed(scene: Scene, share: float, **options: Any) -> Iterator[Trajectory]:
     """Yield the reference of ``scene`` from initial velocities changed by ``share`` of them; ``options`` of its run.
 
-    First the beam's; then that of a spring beside it, to less and more, where it may have any: a spring that the tip
-    meets a little above Ψ is met a little below it, where another phase follows.
+    First the beam's; then that of a spring, decreased and increased, if it may have any: a spring that the tip meets a
+    little above Ψ may be met a little below it, where another phase follows.
     """
     change = share * initial_speed(scene)
     yield event_driven.integrate(scene, velocity_perturbation=change, **options)
@@ -225,13 +225,13 @@ def perturbed(scene: Scene, share: float, **options: Any) -> Iterator[Trajectory
         start = scene.spring.initial_velocity
         speed = change * scene.beam.length
         for velocity in (start - speed, start + speed):
-            with suppress(SceneError):  # a spring that is kept still until the tip has come
+            with suppress(SceneError):  # a spring that is held until the tip arrives
                 pushed = with_changes(scene, spring={"initial_velocity": velocity})
                 yield event_driven.integrate(pushed, **options)
 
 
 def initial_speed(scene: Scene) -> float:
-    """Return a speed of the start [m/s], of the slope of a beam [1/s], that a perturbation is relative to."""
+    """Return the speed at the start [m/s], of a beam's slope [1/s], to which a perturbation is relative."""
     if scene.beam is not None:
         return abs(scene.beam.initial_velocity_slope) or abs(scene.beam.initial_deflection_slope) or 1.0
     assert scene.spring is not None

@@ -1,7 +1,7 @@
 """Convergence of a run's results with finer meshes and more modes.
 
-A macro step, a scheme, an accuracy say how well the equations of one mesh are solved. This study changes the mesh, and
-shows how fast each quantity settles (Richardson 1911, Roache 1994).
+Macro step, scheme and accuracy concern the solution of the equations of one mesh. This study changes the mesh, and
+shows how fast each quantity converges (Richardson 1911, Roache 1994).
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from .metrics import heading, metrics_of
 from .study import measured, troubles
 from .tables import Findings, Row, difference, table
 
-#: Quantities that are compared unless others are asked for, those that a scene has.
+#: Default quantities, those that a scene has.
 QUANTITIES = (
     *("u_tip_end", "u_tip_min", "y_end", "y_min", "contact_force_max", "contact_impulse", "contact_duration"),
     *("rebound_velocity", "first_impact", "first_stop_impact", "first_release", "first_separation"),
 )
 #: Factor from one level to the next.
 _RATIO = 2
-#: Values that converge more slowly have no limit that one would trust; faster ones are as good as there.
+#: Limits of the order: slower convergence has no reliable limit; a higher order is not used.
 _LEAST_ORDER = 0.5
 _MOST_ORDER = 20.0
 #: Changes below this part of the value are rounding.
@@ -39,7 +39,7 @@ _ROUNDING = 1e-12
 
 
 class Extrapolated(NamedTuple):
-    """How a quantity converges; ``None`` where its values do not say."""
+    """Convergence of a quantity; ``None`` if its values do not show it."""
 
     change: float | None = None  #: from the last level but one to the last
     order: float | None = None  #: observed, in the size of the mesh
@@ -73,7 +73,7 @@ def extrapolated(values: Sequence[float | None], sizes: Sequence[int], *, comple
 
 
 def converge(scene: Scene, *, levels: int = 4, metric: Sequence[str] = ()) -> Findings:
-    """Run ``scene`` on finer and finer meshes, and with more and more modes of its own mesh, and judge what settles.
+    """Run ``scene`` on finer and finer meshes, and with more and more modes of its own mesh, and judge the convergence.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def meshes(scene: Scene, levels: int) -> dict[str, Row]:
 
 
 def judged(scene: Scene, rows: Sequence[Row], metric: Sequence[str] = ()) -> Findings:
-    """Judge by a row per mesh how the quantities settle: those asked for, or those that the scene has.
+    """Judge the convergence of the quantities: the given ones, or those that the scene has.
 
     In the table errors are from the limits of a sequence. All modes of a mesh are its solution: no mode lies beyond
     the last.

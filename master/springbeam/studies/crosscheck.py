@@ -1,4 +1,4 @@
-"""``springbeam crosscheck``: a run beside the reference of its law, and the orders of smaller steps."""
+"""``springbeam crosscheck``: compare a run with the reference of its law, and show the orders of smaller steps."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .tables import Findings, Row, difference, in_words, table
 #: Exit codes of the command.
 CODES: dict[Verdict, int] = {"agrees": 0, "differs": 1, "not comparable": 4}
 _STOPPED = 3
-#: How often the macro step is halved; once less if quick.
+#: Number of halvings of the macro step; one less if quick.
 _HALVINGS = 3
 
 
@@ -58,7 +58,7 @@ def crosscheck(scene: Scene, *, quick: bool = False) -> Findings:
             f"a perturbation of the reference has grown {record['growth']:.3g} times"
         )
     verdict: Verdict = record["verdict"]
-    over = " over the run that was asked for" * (verdict == "not comparable")
+    over = " over the whole run" * (verdict == "not comparable")
     looks = {"agrees": "bold green", "differs": "bold red", "not comparable": "bold"}
     shown.append(Text(f"{verdict}{over}", style=looks[verdict]))
     told = {name: found for name, found in record.items() if name != "runs"}

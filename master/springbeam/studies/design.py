@@ -1,4 +1,4 @@
-"""What studies vary: keys, as ``TABLE.KEY=VALUES``, with the values that they take, and couplings."""
+"""Variations of studies: keys with their values, as ``TABLE.KEY=VALUES``, and couplings."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def parse_axis(text: str) -> Axis:
     Raises
     ------
     SceneError
-        If it is none of these; the message says what is allowed.
+        If it is none of these; the message names the allowed forms.
     """
     target, separator, values = text.partition("=")
     split = split_key(target)
@@ -111,7 +111,7 @@ def parse_axis(text: str) -> Axis:
 
 
 def _is(kind: type, value: Any) -> bool:
-    """Tell whether a column of values of ``kind`` can hold ``value``, allowed or not."""
+    """Return whether a column of values of ``kind`` can hold ``value``, allowed or not."""
     if kind in (str, bool):
         return isinstance(value, kind)
     return isinstance(value, float) or (type(value) is int and abs(value) <= _LARGEST_WHOLE)
@@ -139,7 +139,7 @@ def design(axes: Sequence[Axis], samples: int, seed: int, sampling: Sampling) ->
             )
         return list(itertools.product(*(axis.values for axis in axes)))
     if sampling == "latin_hypercube":
-        from scipy.stats import qmc  # takes a second to load: only for who samples
+        from scipy.stats import qmc  # takes a second to load: only for samples
 
         unit = qmc.LatinHypercube(len(axes), seed=seed).random(samples)
     else:

@@ -1,4 +1,4 @@
-"""Compute cases, each by itself and in any order: in this process, in processes of their own, or on a cluster."""
+"""Compute cases, independently and in any order: in this process, in several processes, or on a cluster."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ Measure = Callable[[Row], Row]
 Report = Callable[[Row], None]
 #: ``keep(name, record)``, called for each record that is new and whole.
 Keep = Callable[[str, Row], None]
-#: Cases under way: on a cluster, and for each process here.
+#: Cases in progress: on a cluster, and for each process here.
 _AHEAD_ON_CLUSTER = 256
 _AHEAD = 2
-#: The matrices are small: more threads of a worker only wait for each other.
+#: The matrices are small: more threads of a worker would only wait for each other.
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
@@ -56,15 +56,15 @@ def record_all(
     cases
         The axes of each case, by its name.
     measure
-        What is measured of a case.
+        Makes the record of a case.
     known
-        Records that are there.
+        Existing records.
     keep
-        Where new ones go, before the next case is done.
+        Stores a new record before the next case is finished.
     workers
         Processes; 0: this one, where cases follow one another.
     cluster
-        Takes the place of processes of this machine.
+        Replaces processes of this machine.
     report
         Called with each new record.
     lost
@@ -108,7 +108,7 @@ def _computed(
 def _as_done(
     submit: Callable[..., Future[Row]], measure: Measure, todo: Mapping[str, Row], ahead: int, died: type[Exception]
 ) -> Iterator[tuple[str, Row | None]]:
-    """Yield records as they come, from cases of which at most ``ahead`` are under way; one that died is tried again."""
+    """Yield finished records, with at most ``ahead`` cases in progress; a case whose process died is tried again."""
     waiting = iter(todo.items())
     again = set()
     running: dict[Future[Row], str] = {}
@@ -129,9 +129,9 @@ def _as_done(
 
 
 def _refuse_unguarded(workers: int) -> None:
-    """Raise ArgumentError if a script asks for processes outside of ``if __name__ == "__main__"``.
+    """Raise ArgumentError if a script starts processes outside of ``if __name__ == "__main__"``.
 
-    Each process runs the script again up to there, and would ask for processes as well.
+    Each process runs the script again up to there, and would start processes as well.
     """
     main = sys.modules["__main__"]
     path = getattr(main, "__file__", None)
@@ -149,9 +149,9 @@ def _refuse_unguarded(workers: int) -> None:
 
 @contextmanager
 def _processes(workers: int) -> Iterator[Callable[..., Future[Row]]]:
-    """Open a pool of processes, of which one that dies is replaced; they are ended at once if its user gives up.
+    """Open a pool of processes; one that dies is replaced, and an exception of the caller ends all at once.
 
-    They end without clearing up after themselves, so the folder of their temporary files is removed here.
+    They end without cleaning up, so the folder of their temporary files is removed here.
     """
     _refuse_unguarded(workers)
     with TemporaryDirectory(prefix="springbeam-", ignore_cleanup_errors=True) as folder:

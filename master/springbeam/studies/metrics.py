@@ -109,11 +109,11 @@ def _stroboscopic(run: Trajectory) -> list[float] | None:
 _UNITS = {name: column.unit for name, column in (COLUMNS | BODY_COLUMNS).items() if column.unit and name != "time"}
 
 METRICS: dict[str, Metric] = {
-    "u_tip_min": Metric("m", "lowest place of the tip", _extreme("u_tip", attrgetter("lowest"))),
-    "u_tip_max": Metric("m", "highest place of the tip", _extreme("u_tip", attrgetter("highest"))),
+    "u_tip_min": Metric("m", "lowest position of the tip", _extreme("u_tip", attrgetter("lowest"))),
+    "u_tip_max": Metric("m", "highest position of the tip", _extreme("u_tip", attrgetter("highest"))),
     "u_tip_end": Metric("m", "the tip at the end", _end("u_tip")),
-    "y_min": Metric("m", "lowest place of the spring's top", _extreme("y", attrgetter("lowest"))),
-    "y_max": Metric("m", "highest place of the spring's top", _extreme("y", attrgetter("highest"))),
+    "y_min": Metric("m", "lowest position of the spring's top", _extreme("y", attrgetter("lowest"))),
+    "y_max": Metric("m", "highest position of the spring's top", _extreme("y", attrgetter("highest"))),
     "y_end": Metric("m", "the spring's top at the end", _end("y")),
     "z_max": Metric("m/s", "largest speed of the spring's top", _extreme("z", _magnitude)),
     "gap_max": Metric("m", "largest gap", _extreme("gap", attrgetter("highest"))),
@@ -148,7 +148,7 @@ METRICS: dict[str, Metric] = {
 }
 #: Those that are kept where none is named.
 USUAL = tuple(name for name, metric in METRICS.items() if not metric.asked)
-#: What a picture shows of a sweep that was asked for no metric in particular.
+#: Metrics in the picture of a sweep without ``--metric``.
 PRINCIPAL = (
     *("contact_force_max", "contact_impulse", "contact_duration", "rebound_velocity", "deepest_tip", "stop_strokes"),
     *("y_min", "u_tip_end", "y_end"),

@@ -31,10 +31,10 @@ class Scale(NamedTuple):
     name: str
     label: str
     log: bool = False
-    words: bool = False  #: evenly, each with its value beside it
+    words: bool = False  #: evenly, each labelled with its value
 
     def places(self, values: Sequence[Any]) -> tuple[np.ndarray, list[Any]]:
-        """Return where ``values`` are drawn, and the different ones of them in the order of their places."""
+        """Return the positions of ``values``, and the different values in the order of their positions."""
         if self.words:
             levels = list(dict.fromkeys(values))
             return np.array([levels.index(value) for value in values], dtype=float), levels

@@ -1,14 +1,14 @@
 """One engine for experiments: a study is a table of cases, each a run of a scene with other values of some keys.
 
 * The columns of a case are its **axes**: keys of a scene, as ``spring.mass``, with their values, or labels. Its record
-  adds columns: how the run ended, **metrics** of it, ``error_…`` beside a **reference**, ``cost_…``.
-* A `Study` holds what was asked for as plain values. They alone decide its cases, so the same command
-  goes on with what is in the results.
-* A case is computed by itself, in any order, in this process or by workers. Each record is in ``study.jsonl`` of the
-  results as soon as its case is done. The first line there says which study it is, with which version and which FMUs.
-  Nothing is written before the FMUs are found, and nothing stays where no case was done.
+  adds columns: how the run ended, **metrics** of it, ``error_…`` against a **reference**, ``cost_…``.
+* A `Study` holds its settings as plain values. They alone decide its cases, so the same command can continue an
+  interrupted study.
+* A case is computed independently, in any order, in this process or by workers. Each record is in ``study.jsonl`` of
+  the results as soon as its case is finished. The first line there identifies the study, the version and the FMUs.
+  Nothing is written before the FMUs are found, and nothing stays if no case was finished.
 * A case whose record is there is not computed again. A study with all records is shown at once.
-* `Findings` are made from the records alone: table (``KIND.parquet``, ``KIND.csv``), pictures and what is shown.
+* `Findings` are made from the records alone: table (``KIND.parquet``, ``KIND.csv``), pictures and messages.
 
 `record_all` (`studies/engine.py`) computes, `Records` is the file, `cli/studies.py` has the commands.
 """
@@ -36,12 +36,12 @@ from .metrics import Metric, costs
 from .tables import Findings, Row
 
 FILE = "study.jsonl"
-#: How the files of studies begin.
+#: Format of the files of studies.
 _KINDS = ("sweep", "tradeoff", "stability", "fit")
 
 
 class Study(BaseModel, ABC):
-    """What was asked for. A subclass adds its settings, its cases, and what it makes of their records."""
+    """Settings of a study. A subclass adds its settings, its cases, and the findings from their records."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -52,7 +52,7 @@ class Study(BaseModel, ABC):
 
     scene: Scene | None = None
     quick: bool = False  #: a smaller table of cases
-    remarks: tuple[str, ...] = ()  #: said before what is found
+    remarks: tuple[str, ...] = ()  #: printed before the findings
 
     @abstractmethod
     def cases(self) -> Mapping[str, Row]:
@@ -60,7 +60,7 @@ class Study(BaseModel, ABC):
 
     @property
     def expected(self) -> int:
-        """Number of records when all is done; raises as `cases`."""
+        """Number of records of the finished study; raises as `cases`."""
         return len(self.cases())
 
     @abstractmethod
@@ -97,7 +97,7 @@ class Study(BaseModel, ABC):
         """Judge the records, which come in the order of the cases. The table is named as the study's `kind`."""
 
     def settings(self) -> dict[str, Any]:
-        """Return what tells one study from another, with the files that it needs. Raises FmuError if one is missing."""
+        """Return the identity of the study, with the files that it needs. Raises FmuError if one is missing."""
         return {
             "study": self.kind,
             "springbeam": metadata.version("springbeam"),
@@ -177,8 +177,8 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Row], int]:
 def measured(at: Callable[[], Scene], metrics: Mapping[str, Metric]) -> Row:
     """Run the scene that ``at`` returns; return how the run ended, its metrics and its cost.
 
-    ``status`` is ``done``, ``stopped`` (early) or ``refused`` (bad input), ``error`` says why. Raises FmuError if an
-    FMU cannot be loaded.
+    ``status`` is ``done``, ``stopped`` (early) or ``refused`` (bad input), ``error`` has the cause. Raises FmuError if
+    an FMU cannot be loaded.
     """
     row: Row = {"status": "done", "error": "", "warnings": "", **dict.fromkeys(metrics)}
     try:

@@ -1,11 +1,11 @@
 """Run a scene with many values of its keys: one row of metrics per run, also of one that fails.
 
-The rows depend on the design alone: not on the number of workers, nor on the order in which they finish.
+The rows depend on the design alone, not on the number of workers or the order in which they finish.
 
-Over the amplitude and the duration of a pulse a sweep shows the damage boundary of a product: which pulses bring a
-number of it to its limit. A pulse is told by its peak and by the velocity that it changes, ∫ a dt. At each duration the
-critical peak is that at which the metric first reaches its limit, linear between the amplitudes swept and 0: each
-duration has a run without the pulse.
+Over the amplitude and the duration of a pulse a sweep shows the damage boundary of a product: the pulses for which a
+metric reaches its limit. A pulse is described by its peak and by its change of velocity, ∫ a dt. At each duration the
+critical peak is that at which the metric first reaches its limit, interpolated linearly between the amplitudes swept
+and 0: each duration has a run without the pulse.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .study import Study, measured
 from .tables import Findings, Row, table
 
 STATUSES = ("done", "stopped", "refused", "lost")
-#: How many rows are shown on the terminal; the files have all.
+#: Number of rows shown on the terminal; the files have all.
 _FIRST_ROWS = 10
 #: A metric that varies less, relative to its largest value, is constant.
 _ROUNDING = 1e-12
@@ -37,7 +37,7 @@ _POINTS = 20_001
 
 
 class Sweep(Study):
-    """What is swept: ``vary`` holds ``TABLE.KEY=VALUES``."""
+    """A sweep over the values in ``vary``, ``TABLE.KEY=VALUES`` each."""
 
     kind: ClassVar[str] = "sweep"
     parallel: ClassVar[bool] = True
@@ -48,7 +48,7 @@ class Sweep(Study):
     sampling: Sampling = "latin_hypercube"
     seed: int = 0
     metric: tuple[str, ...] = ()  #: the usual ones if empty
-    boundary: str = ""  #: METRIC=LIMIT, where the sweep is over a pulse and its damage boundary is wanted
+    boundary: str = ""  #: METRIC=LIMIT of the damage boundary, for a sweep over a pulse
 
     @property
     def axes(self) -> tuple[Axis, ...]:
@@ -67,7 +67,7 @@ class Sweep(Study):
         return list(metrics_of(self.metric, several=True)) or PRINCIPAL
 
     def cases(self) -> dict[str, Row]:
-        """Return the values of the axes. Raises SceneError if a key or a metric is not there."""
+        """Return the values of the axes. Raises SceneError for an unknown key or metric."""
         _ = self.metrics, self.boundary and self._pulse  # both raise where something is not there
         names = [axis.name for axis in self.axes]
         for name in names:
@@ -92,7 +92,7 @@ class Sweep(Study):
         return measured(lambda: with_keys(self.scene, case), self.metrics)
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
-        """Count the rows by status; show the first values of metrics that were asked for, and the damage boundary."""
+        """Count the rows by status; show the first values of the given metrics, and the damage boundary."""
         rows = self.rows(records)
         critical = list[Row]()
         shown = list[Any]()
@@ -114,7 +114,7 @@ class Sweep(Study):
         return Findings(document, shown, code=code, tables=tables, pictures=self._pictures(rows, critical))
 
     def _pictures(self, rows: Sequence[Row], critical: Sequence[Row]) -> dict[str, Callable[[], Any]]:
-        """Return pictures of what of the metrics the axes change, and of the boundary: what lies above it damages."""
+        """Return pictures of the metrics that change over the axes, and of the boundary; pulses above it damage."""
         pictures: dict[str, Callable[[], Any]] = {}
         words = [any(isinstance(row[axis.name], str) for row in rows) for axis in self.axes]
         scales = [Scale(a.name, self._labelled(a), a.log, word) for a, word in zip(self.axes, words, strict=True)]
@@ -141,7 +141,7 @@ class Sweep(Study):
 
     @property
     def _limit(self) -> tuple[str, float]:
-        """The metric of the boundary, and what it must not reach. Raises SceneError for anything else."""
+        """The metric of the boundary and its limit. Raises SceneError for anything else."""
         metric, _, value = self.boundary.rpartition("=")
         with suppress(ValueError):
             limit = float(value)
@@ -198,7 +198,7 @@ def _varies(values: np.ndarray) -> bool:
 
 
 def _in_words(found: Sequence[Mapping[str, float]], limit: str, exceeded: bool) -> list[str]:
-    """Return what the boundary says: both of its sides, or that there is none."""
+    """Return the boundary in words: both of its sides, or that there is none."""
     if exceeded:
         return [f"boundary  none: {limit} is reached without the pulse; raise the limit"]
     if not found:

@@ -1,4 +1,4 @@
-"""What was found: for programs, for a terminal as tables of one look, and as CSV and Parquet files."""
+"""Findings: for programs, for a terminal as tables of one format, and as CSV and Parquet files."""
 
 from __future__ import annotations
 
@@ -19,17 +19,16 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Findings:
-    """What a command or a study has found."""
+    """The findings of a command or a study."""
 
     document: Any = None  #: for programs (``--json``)
     shown: Sequence[Any] = ()  #: tables and lines for a terminal
-    files: Sequence[tuple[str, Any]] = ()  #: where files are, each with a word before it
-    where: Path | None = None  #: the place of all of them (``--quiet``)
+    files: Sequence[tuple[str, Any]] = ()  #: paths of files, each after a word
+    where: Path | None = None  #: directory of all of them (``--quiet``)
     code: int = 0  #: exit code of the command
     error: str = ""  #: why, in words
-    draw: Callable[[], Findings] | None = None  #: draws pictures, which takes a while, and says where they are
-    #: What belongs into a directory, by the names of the files: tables, each as CSV and Parquet; texts; and pictures,
-    #: which are drawn where they are wanted.
+    draw: Callable[[], Findings] | None = None  #: draws pictures, and returns their paths
+    #: Files of the directory by name: tables, each as CSV and Parquet; texts; and pictures, drawn on demand.
     tables: Mapping[str, Sequence[Row]] = field(default_factory=dict)
     texts: Mapping[str, str] = field(default_factory=dict)
     pictures: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
@@ -66,7 +65,7 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = ""
 
 
 def in_words(value: Any, form: str) -> str:
-    """Return what a cell shows: nothing for ``None``, floating-point numbers as ``form`` says, what a list holds."""
+    """Return the text of a cell: "" for ``None``, floating-point numbers in ``form``, the elements of a list."""
     if isinstance(value, float):
         return format(value, form)
     return (

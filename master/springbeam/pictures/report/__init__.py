@@ -1,4 +1,4 @@
-"""A run as one HTML page that needs nothing else: no network, no server, no other file.
+"""A run as one HTML page without a network, a server or other files.
 
 ``charts`` makes the charts, ``page.html``, ``page.js`` and ``page.css`` the page around them.
 """
@@ -54,7 +54,7 @@ def page(trajectory: Trajectory) -> str:
     Parameters
     ----------
     trajectory
-        Any run, also one that stopped early or has no rows: then only what is there is shown.
+        Any run, also one that stopped early or has no rows; missing parts are left out.
     """
     time = trajectory.columns["time"]
     over_time = charts(trajectory)
@@ -99,12 +99,12 @@ def page(trajectory: Trajectory) -> str:
 
 
 def _warnings(trajectory: Trajectory) -> list[str]:
-    """Return what a reader must know before believing a curve, the gravest first."""
+    """Return warnings for the reader, the most severe first."""
     summary = trajectory.summary
     found = []
     status = summary.get("status", "done")
     if status == "running":
-        found.append("The run is not finished: it was still going on when this page was made, or it was killed.")
+        found.append("The run is not finished: it was still running when this page was made, or it was killed.")
     elif status != "done":
         when = f" at t = {summary['time']:.9g} s" if isinstance(summary.get("time"), float) else ""
         found.append(f"The run was {status}{when}: {summary.get('cause', 'cause unknown')}")
@@ -129,7 +129,7 @@ def _numbers(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
     for body in ("beam", "spring"):
         if f"{body}_steps" in summary:
             taken_back = summary[f"{body}_rollbacks"]
-            yield f"steps of the {body} FMU", f"{summary[f'{body}_steps']}, {taken_back} of them taken back"
+            yield f"steps of the {body} FMU", f"{summary[f'{body}_steps']}, {taken_back} of them repeated"
 
 
 def _data(trajectory: Trajectory, drawn: list[Chart], moving: list[Sketch], frames: Frames | None) -> dict[str, Any]:
@@ -164,7 +164,7 @@ def _readings(trajectory: Trajectory, frames: Frames) -> Iterator[dict[str, Any]
 
 
 def _short(values: np.ndarray) -> Any:
-    """Return numbers as the JSON of a page has them: nine digits are more than a screen shows."""
+    """Return numbers for the JSON of a page, with nine digits, more than a screen shows."""
     return [_short(row) for row in values] if values.ndim > 1 else [
         float(f"{value:.9g}") if isinstance(value, float) else value for value in values.tolist()
     ]  # fmt: skip
@@ -177,7 +177,7 @@ def _as_script(data: dict[str, Any] | None) -> str:
 
 
 def described(scene: Scene) -> Iterator[tuple[str, str]]:
-    """Return what each part of the scene is, in the order of the drawing from above."""
+    """Return a description of each part of the scene, in the order of the drawing from above."""
     beam = scene.beam
     spring = scene.spring
     stop = scene.stop

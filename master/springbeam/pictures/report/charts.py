@@ -45,7 +45,7 @@ class Chart:
 
 
 def charts(trajectory: Trajectory) -> list[Chart]:
-    """Return the charts over time that the run has something to show for, in the order of the page."""
+    """Return the charts over time for which the run has data, in the order of the page."""
     shown = [_of_panel(trajectory, panel) for panel in panels(trajectory)]
     eventful = trajectory.events or set(trajectory["phase"]) != {"free"}
     return [_timeline(trajectory), *shown] if shown and eventful else shown

@@ -1,5 +1,5 @@
 """Where the coupling is stable: predicted from the linear(ised) step, and measured on a grid of extreme scenes.
 
 `predict` has the matrices of a step and applies them to a scene. `draw` draws scenes of a range, `judge` runs one and
-judges the run; `grid` does both over the extremes, ``tests/campaign`` over what is usual.
+judges the run; `grid` does both for extreme scenes, ``tests/campaign`` for usual ones.
 """

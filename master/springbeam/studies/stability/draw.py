@@ -1,9 +1,9 @@
 """Random scenes: a range of ``ranges.toml`` has axes, a cell has a value for each, `scene_dict` is the scene of a cell.
 
-Values are relative to the beam and to the motion, so that a range says what kind of scene it has: the cell's stiffness,
-length, density and speed give the units. `EXTREME` has all that a scene may ask for, `USUAL` what a bench may have. A
-Latin hypercube covers a range; a slice of the extreme one takes two parameters from end to end, the others at rest.
-The same seed gives the same cells.
+Values are relative to the beam and to the motion, so that a range describes a kind of scene: the cell's stiffness,
+length, density and speed give the units. `EXTREME` covers all possible scenes, `USUAL` common ones. A Latin hypercube
+covers a range; a slice of the extreme one varies two parameters over their ranges, with the others at rest. The same
+seed gives the same cells.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ..design import RIGID, SOFT, Axis, design
 
 #: Radians of the spring's own motion in one macro step, and in a cell: IDA takes some hundred steps for each.
 _MOST_PHASE_PER_STEP, _MOST_PHASE = 30.0, 1000.0
-#: law, scheme, degree: all that a scene may ask for.
+#: law, scheme, degree: all possible couplings.
 COUPLINGS = (
     *(("transmission", *scheme) for scheme in RIGID),
     *(("compliance", *scheme) for scheme in SOFT),
@@ -41,11 +41,11 @@ def _tuples(value: Any) -> Any:
 
 
 _RANGES = tables_of(Path(__file__).with_name("ranges.toml"))
-#: What a parameter is where a range does not have it, and in slices.
+#: Values of parameters that a range does not have, and in slices.
 AT_REST: dict[str, Any] = {name: _tuples(value) for name, value in _RANGES["at_rest"].items()}
 EXTREME = (Axis("coupling", COUPLINGS), *_axes(_RANGES["extreme"]))
 USUAL = _axes(_RANGES["usual"])
-#: Two axes over their ranges by the name of the slice, and what else is not at rest.
+#: Two axes over their ranges by the name of the slice, and other values that are not at rest.
 SLICES: dict[str, tuple[str, str, dict[str, Any]]] = {
     name: (*fixed.pop("axes"), {key: _tuples(value) for key, value in fixed.items()})
     for name, fixed in _RANGES["slices"].items()
@@ -170,7 +170,7 @@ def _beam(cell: dict[str, Any]) -> Beam:
 
 
 def _spring_frequency(mass: float, k1: float, k2: float, psi: float, energy: float, load: float) -> float:
-    """Return an upper estimate [rad/s], at the deflection that takes all the energy and bears the loads."""
+    """Return an upper estimate [rad/s], at the static deflection under the loads plus that of all the energy."""
     linear = sqrt(2.0 * energy / k1) + 2.0 * load / k1
     cubic = (4.0 * energy / k2) ** 0.25 + 2.0 * (load / k2) ** (1.0 / 3.0) if k2 > 0.0 else inf
     y = psi + min(linear, cubic)

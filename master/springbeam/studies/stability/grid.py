@@ -1,4 +1,4 @@
-"""The grid of extreme scenes: each cell is a run that is judged; what the classes of all amount to.
+"""The grid of extreme scenes: run and judge each cell, count the classes.
 
 The same settings give the same cells and outcomes, in whatever order and in however many processes they run.
 """
@@ -24,7 +24,7 @@ from ..tables import Findings, Row, table
 from .draw import COUPLINGS, EXTREME, SLICES, drawn, scene_dict, slice_cells
 from .judge import CLASSES, ended, judge
 
-#: What a coupling is, and columns of the table.
+#: Columns that define a coupling, and columns of the table.
 _NAMES = ("law", "scheme", "degree")
 #: Of `CLASSES`; residuals outside are drawn in the colours of the ends.
 _COLOURS, _RESIDUALS = (BLUE, SKY, GREEN, STONE, ORANGE, BLACK), (1e-16, 1.0)
@@ -54,7 +54,7 @@ class Grid(Study):
         return {str(number): cell for number, cell in enumerate(cells)}
 
     def record(self, case: Mapping[str, Any]) -> Row:
-        """Run and judge the scene of a cell; one that the schema refuses is refused."""
+        """Run and judge the scene of a cell; it is refused if the schema rejects it."""
         try:
             scene = scene_from_dict(scene_dict(dict(case)), source="cell")
         except SceneError as error:

@@ -1,4 +1,4 @@
-"""Judge a run: put it into a class by what it recorded, and compare it with the event-driven reference."""
+"""Judge a run: classify it by its records, and compare it with the event-driven reference."""
 
 from __future__ import annotations
 
@@ -37,26 +37,26 @@ CLASSES = tuple(MEANINGS)
 #: A run without an accuracy is wrong if an end is further from the reference than this share of its largest change:
 #: what `springbeam.run.misplaced` is to warn of.
 WRONG = 0.01
-#: Relative change of the initial velocity that shows the conditioning: of the size of the errors that are judged, so
-#: that a contact which such an error makes or misses is one. How many times larger the motion's, or a time's, may be.
+#: Relative change of the initial velocity that shows the conditioning, as large as the errors that are judged; and the
+#: largest amplification of it in the motion or in a time.
 CHANGE, WELL_CONDITIONED = 1e-3, 30.0
-#: Times at which a run is compared, and the processor time that each reference may take [s].
+#: Number of times at which a run is compared, and the limit of the processor time of each reference [s].
 TIMES, PATIENCE = 200, 30.0
 #: Of a record: parts of the `distance` from the reference.
 ERRORS = ("error_motion", "error_times", "error_impulses")
 #: A run is cut after so many accepted steps, and so many for each macro step: a contact that opens and closes in each.
 _MOST_STEPS, _MOST_PER_MACRO_STEP = 100, 4.0
-#: Bodies may overlap or, joined, part by so much of their motion, or by the coupling's tolerance if that is larger.
+#: Largest overlap or gap of joined bodies over their motion, or the coupling's tolerance if that is larger.
 _OVERLAP = 1e-9
-#: A coupling that changes no energy, at whatever step, may change it by so much of the largest, or by what loose
-#: tolerances allow: what rounding leaves of a gap costs energy where the force of a step is very large.
+#: Largest relative change of the energy by an exact coupling, unless tolerances are looser: a rounded gap costs energy
+#: if the force of a step is very large.
 _GUARANTEED = 1e-6
 #: Rounding of a sum of energies, of the largest so far.
 _SLACK = 1e-10
 
 
 class Reference:
-    """The event-driven solution of a scene, and how well the scene is conditioned; each is computed when it is needed.
+    """The event-driven solution of a scene, and the conditioning of the scene; each is computed when needed.
 
     The conditioning is that of the solution itself, not of runs: a run that misses an event would excuse itself.
     """
@@ -68,7 +68,7 @@ class Reference:
 
     @cached_property
     def run(self) -> Trajectory | None:
-        """The solution; ``None`` where there is none, or not in `PATIENCE`."""
+        """The solution; ``None`` if there is none within `PATIENCE`."""
         try:
             return event_driven.integrate(self.scene, **self._options)
         except (SceneError, ValueError, event_driven.ReferenceFailure):
@@ -76,7 +76,7 @@ class Reference:
 
     @cached_property
     def condition(self) -> float:
-        """How many times larger than that of the initial velocity the change of the motion or of a time is.
+        """Ratio of the change of the motion or of a time to the relative change of the initial velocity.
 
         It is infinite where the change ends the solution.
         """
@@ -118,12 +118,11 @@ def judge(scene: Scene, reference: Reference | None = None) -> Row:
 def ended(kind: str, reason: str = "") -> Row:
     """Return the record of a run that ended as one of `CLASSES`.
 
-    ``reason``: refused, stopped, garbage: why; approximate: the run's warnings. ``warns``: the run is not resolved, or
-    warns of what does not follow from the scene alone. ``residual``: the largest energy residual over the largest
-    energy until then; ``overlap`` of bodies, or the gap of joined ones, over the largest motion. Of runs that were
-    compared, except those whose errors an ill-conditioned scene explains: `ERRORS`, and ``factor``, the error over
-    what it may be: that of the motion over `WRONG`, or the largest over the accuracy that the scene asks for. ``H``:
-    the macro step [s].
+    ``reason``: the cause of refused, stopped, garbage, or the warnings of approximate. ``warns``: the run is not
+    resolved, or has a warning that its computation gave. ``residual``: the largest energy residual over the largest
+    energy until then; ``overlap`` of bodies, or the gap of joined ones, over the largest motion. For compared runs,
+    unless an ill-conditioned scene explains their errors: `ERRORS`, and ``factor``, the error of the motion over
+    `WRONG`, or the largest over the accuracy of the scene. ``H``: the macro step [s].
     """
     measured: Row = dict.fromkeys(("residual", "overlap", *ERRORS, "factor", "H"))
     counts = dict.fromkeys(("macro_steps", "events", "do_steps"), 0)
@@ -131,9 +130,9 @@ def ended(kind: str, reason: str = "") -> Row:
 
 
 def judged(run: Trajectory, cause: str = "", reference: Reference | None = None) -> Row:
-    """Return the class of a run that is done, or has stopped for ``cause``, from what it recorded, and its errors.
+    """Return the class of a run that is done, or has stopped for ``cause``, from its records, and its errors.
 
-    A run that warns is compared with the reference only where that is given.
+    A run that warns is compared only with a given reference.
     """
     picked = run.summary.get("accuracy", {})
     calls = run.do_steps + picked.get("pilot_steps", 0)
@@ -155,12 +154,12 @@ def judged(run: Trajectory, cause: str = "", reference: Reference | None = None)
     errors = _errors(run, reference or Reference(run.scene), found["warns"])
     if errors and errors["factor"] > 1.0 and not found["warns"]:
         off = max(errors[name] for name in ERRORS)
-        found |= {"kind": "garbage", "reason": f"does not warn, and is up to {off:.1e} from the reference"}
+        found |= {"kind": "garbage", "reason": f"does not warn, and differs by up to {off:.1e} from the reference"}
     return found | errors
 
 
 def warns(run: Trajectory) -> bool:
-    """Tell whether ``run`` is not resolved, or warns of what does not follow from its scene alone."""
+    """Return whether ``run`` is not resolved, or has a warning that its computation gave."""
     of_scene = {*suspicions(run.scene), peak_force_doubt(run.scene)}
     return not run.summary["resolved"] or not of_scene.issuperset(run.summary["warnings"])
 
@@ -199,11 +198,11 @@ def _class(run: Trajectory, cause: str, relative: np.ndarray, scale: np.ndarray,
     said = [text for text in run.summary["warnings"] if "energy" in text]
     if said or residual <= allowed:
         return "approximate", "; ".join(said)
-    return "garbage", f"energy residual {residual:.1e}, and nothing says so"
+    return "garbage", f"energy residual {residual:.1e} without a warning"
 
 
 def _faults(run: Trajectory, overlap: float, scale: np.ndarray) -> Iterator[str]:
-    """Yield what must not be, whatever the scene."""
+    """Yield faults that no scene explains."""
     for name, values in run.columns.items():
         if name != "phase" and not np.all(np.isfinite(values)):
             yield f"{name} is not finite"
@@ -211,13 +210,13 @@ def _faults(run: Trajectory, overlap: float, scale: np.ndarray) -> Iterator[str]
     for what, energy in lost.items():
         change = np.diff(energy)
         if np.any(change < -_SLACK * scale[1:]):
-            yield f"energy lost by {what} comes back: {change.min() / scale[-1]:.1e} of the largest"
+            yield f"energy lost by {what} returns: {change.min() / scale[-1]:.1e} of the largest"
     if overlap > max(_OVERLAP, run.scene.coupling.tolerance):
         yield f"the bodies overlap or part by {overlap:.1e} of their motion"
 
 
 def _overlap(run: Trajectory) -> float:
-    """Return the largest overlap of bodies that may not, over the largest deflection or motion in a step."""
+    """Return the largest inadmissible overlap of bodies, over the largest deflection or motion in a step."""
     scene, overlaps = run.scene, [0.0]
     positions = [run[name] for name in ("u_tip", "y") if name in run.columns]
     if run.shapes is not None and len(run.shapes[0]):

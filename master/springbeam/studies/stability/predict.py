@@ -1,4 +1,4 @@
-"""Predict a scene's coupling before it runs: is it stable, is the motion resolved.
+"""Predict stability and resolution of a scene before a run.
 
 The scene is linearised where it is stiffest: the hardening spring at the largest deflection and the contact law at the
 largest penetration that the energy at first contact allows; a softening spring at rest.
@@ -35,7 +35,7 @@ from ...scene.suspicions import suspicions
 THRESHOLD = 1e-3
 #: Beams with more modes are predicted with so many.
 MOST_MODES = 128
-#: Modes with less than this share of 1/m_tip do not take part: the tip neither moves nor shows them.
+#: Modes with less than this share of 1/m_tip are left out: the tip neither excites nor shows them.
 _UNMOVED = 1e-12
 #: ωH up to which a mode is called resolved: 2π steps a period.
 RESOLVED = 1.0
@@ -49,18 +49,18 @@ def predict(scene: Scene) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``None`` where the scene lacks a body or key that is needed:
+        ``None`` if the scene lacks a needed body or key:
 
-        * ``estimates``: what the scene is, by hand calculation, see `_estimates`; ``frequencies``: the lowest three of
-          the beam's mesh [Hz];
+        * ``estimates``: by hand calculation, see `_estimates`; ``frequencies``: the lowest three of the beam's mesh
+          [Hz];
         * ``macro_step``: H [s];
         * ``omega_1``, ``omega_max``: lowest and highest frequency kept of the beam; ``spring_frequency`` of the
           linearised spring, 0 where it does not oscillate; ``contact_frequency`` of tip and spring top on the
           linearised contact law [rad/s];
         * ``tip_mass`` [kg]; ``impedance`` Z = √(KAG ρA) [N·s/m];
-        * ``modes`` of the beam, ``resolved_modes`` among them, with ωH ≤ `RESOLVED`, and ``static_shapes`` that are
-          kept beside them where not all modes are;
-        * ``exchange``: of a scheme that can be unstable, ``scheme``, ``degree``, ``spectral_radius`` at H,
+        * ``modes`` of the beam, ``resolved_modes`` among them, with ωH ≤ `RESOLVED`, and ``static_shapes``, which are
+          kept in addition if not all modes are;
+        * ``exchange``: for a scheme that can be unstable, ``scheme``, ``degree``, ``spectral_radius`` at H,
           ``critical_step``, the smallest unstable H [s], and ``threshold`` of the spectral radius above 1, from which
           on it is unstable;
         * ``notes``.
@@ -106,7 +106,7 @@ def predict(scene: Scene) -> dict[str, Any]:
         found["contact_frequency"] = pair.contact_frequency if pair.soft else None
         scheme = scene.coupling.scheme
         degree = scene.degree
-        # The scheme energy changes no energy at any H: there is nothing to ask.
+        # The scheme energy is stable at any H.
         if scene.coupling.exchanges:
             found["exchange"] = {
                 "scheme": scheme,
@@ -126,7 +126,7 @@ def predict(scene: Scene) -> dict[str, Any]:
 
 
 def _estimates(scene: Scene) -> dict[str, float | None]:
-    """Return what ``scene`` is, by hand calculation; ``None`` where it has no such thing.
+    """Return properties of ``scene`` by hand calculation; ``None`` if it has no such property.
 
     ``frequency`` is the lowest of the beam, tip free, without a mesh [Hz], ``tip_stiffness`` static, 1/(L³/3EI + L/KAG)
     [N/m], ``locking`` the static stiffness of the mesh over that of the beam; ``contact_time`` is that of the first
@@ -188,8 +188,8 @@ def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
 def critical_step(pair: LinearPair, scheme: str, degree: int, threshold: float = THRESHOLD) -> float | None:
     """Return the smallest H [s] with a spectral radius above 1 + ``threshold``, to 1e-3 of itself; None without one.
 
-    Of an exchange. What it adds to a step is of the order of (r H)², r the rate of the contact law on both ends: the
-    search begins where that is 1e-4, and goes up by factors of 2 until the slowest mode turns 10 rad.
+    For an exchange, which adds to a step about (r H)², r the rate of the contact law on both ends. The search begins
+    where that is 1e-4, and proceeds by factors of 2 until the slowest mode turns 10 rad.
     """
     rates = np.sqrt(np.abs(np.concatenate([pair.beam.omega2, pair.spring.omega2])))
     slowest = float(rates[rates > 0.0].min())
@@ -253,7 +253,7 @@ class LinearBody:
 
     @property
     def mass(self) -> float:
-        """What an impulse at the interface meets [kg]; ∞ of a wall, which has no modes."""
+        """Mass that an impulse at the interface moves [kg]; ∞ for a wall, which has no modes."""
         mobility = float(self.b @ self.b)
         return 1.0 / mobility if mobility > 0.0 else math.inf
 
@@ -287,19 +287,19 @@ class LinearPair:
 
     @property
     def contact_frequency(self) -> float:
-        """Return √(k (1/m_tip + 1/m)) of a soft law [rad/s], 0 of a tie."""
+        """Return √(k (1/m_tip + 1/m)) of a soft law [rad/s], 0 for a tie."""
         return math.sqrt(self.stiffness * (1.0 / self.beam.mass + 1.0 / self.spring.mass)) if self.soft else 0.0
 
     @property
     def contact_rate(self) -> float:
-        """Return the larger of the frequency and of what the damping of a soft law takes, c (1/m_tip + 1/m) [1/s]."""
+        """Return the larger of the frequency and the damping rate of a soft law, c (1/m_tip + 1/m) [1/s]."""
         return max(self.contact_frequency, self.damping * (1.0 / self.beam.mass + 1.0 / self.spring.mass))
 
 
 def amplification(pair: LinearPair, scheme: str, degree: int, h: float) -> np.ndarray:
     """Return the matrix of one macro step of size ``h`` [s], for states (ξ, ξ̇) of the beam, then of the spring.
 
-    Of an exchange, which has a soft law.
+    For an exchange, which has a soft law.
     """
     (A, of_C, u, u_of_C) = pair.beam.step(h)
     (B, of_force, y, _) = pair.spring.step(h)
