@@ -20,14 +20,17 @@ from time import time
 
 from .protocol import FmuError
 
-#: Largest size of all members together that are unpacked, and largest number of members.
-MOST_BYTES, MOST_MEMBERS = 1 << 31, 10_000
+#: Largest size of all members that are unpacked.
+MOST_BYTES = 1 << 31
+#: Largest number of members.
+MOST_MEMBERS = 10_000
 #: Parts that mean no other folder on any system, between slashes.
 _PLAIN = re.compile(r"(?:(?!\.{1,2}(?:/|$))[^/\\:\x00-\x1f]+(?:/|$))+")
 #: What a running FMU may use beside the binaries of this platform. The sources of the beam, with Eigen's, are 300
 #: files: they would take most of the time.
 _USED = ("modelDescription.xml", "resources/")
-_BINARIES, _EXECUTABLE = "binaries/", 0o111
+_BINARIES = "binaries/"
+_EXECUTABLE = 0o111
 #: What the names of our FMUs end with, by version of FMI.
 ENDINGS = {"2.0": "", "3.0": "3"}
 #: Entries of the cache that nobody has used for so long go [s].

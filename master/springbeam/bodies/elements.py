@@ -91,7 +91,8 @@ class SpringDamper(EndLoaded):
         self._sign = 1.0 if upper else -1.0
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        (before, dissipated, load_work, _), on_end = self.state, self._on_end
+        before, dissipated, load_work, _ = self.state
+        on_end = self._on_end
         forces = [self._sign * c + n + q for c, n, q in zip(contact, foundation, on_end, strict=True)]
         at_end = value((forces[0], forces[1], forces[2]), size)
         forces[0] += self._load + self._stiffness * self._rest

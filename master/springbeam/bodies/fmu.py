@@ -132,7 +132,9 @@ class Fmu:
         self._worst = 0  #: status of the calls that have failed
         self._closed = False
         #: The state as marked, before a trial step, and as initialised, of our own FMUs.
-        self._state, self._before_trial, self._start = c_void_p(), c_void_p(), None
+        self._state = c_void_p()
+        self._before_trial = c_void_p()
+        self._start = None
         self._key: Hashable = None  #: what the instance was made of, of those of `of`
         #: Parameters by how FMPy sets them and by value reference.
         self._parameters: dict[str, dict[int, Value]] = {}
@@ -158,7 +160,8 @@ class Fmu:
         if self._own and identifier != self._name:
             raise FmuError(f"{self.path}: model identifier {identifier!r}, expected {self._name!r}")
         #: What it says it can do, and the version of FMI.
-        self.says, self.version = description.coSimulation, opened.VERSION
+        self.says = description.coSimulation
+        self.version = opened.VERSION
         self._variables = {v.name: v for v in description.modelVariables}
         self._units = {unit.name: unit for unit in description.unitDefinitions}
         clocks = [v.name for v in description.modelVariables if v.causality == "independent"]

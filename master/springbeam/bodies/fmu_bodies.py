@@ -44,8 +44,10 @@ _MASS_MATRICES = {"consistent": 1, "averaged": 2}
 _AT_REST = 2
 #: What tells `InnerForces`, and `Body.shape`: variables, and how many numbers each has.
 _INNER_FORCES = ("tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
-_ALONG, _POINTS = ("deflection", "bending_moment", "shear_force"), len(SHAPE_POINTS)
-_SHAPE_3, _SHAPE_2 = (_ALONG, _POINTS), (tuple(f"{name}[{i}]" for name in _ALONG for i in range(1, _POINTS + 1)), 1)
+_ALONG = ("deflection", "bending_moment", "shear_force")
+_POINTS = len(SHAPE_POINTS)
+_SHAPE_3 = (_ALONG, _POINTS)
+_SHAPE_2 = (tuple(f"{name}[{i}]" for name in _ALONG for i in range(1, _POINTS + 1)), 1)
 
 
 #: What FMI 3.0 lets an FMU ask for after a step, and is not given.
@@ -305,7 +307,9 @@ class OwnBody(FmuBody):
         return self._port.trial(given, self._acceleration)[0]
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        (c, dc, ddc), (n, dn, ddn), (values, slopes) = contact, foundation, self._loads
+        c, dc, ddc = contact
+        n, dn, ddn = foundation
+        values, slopes = self._loads
         impulse = self.state.pending
         self.steps += 1
         self._moved = True

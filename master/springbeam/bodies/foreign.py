@@ -25,8 +25,10 @@ from .isolated import RemotePort
 from .protocol import NO_FORCE, Abilities, Body, BodyFailed, Energies, FmuError, Force, Motion
 from .units import Unit
 
-#: Relative tolerance of a holding force, and the share of motion without it that it may leave.
-_AT_REST, _STAYS = 1e-12, 1e-6
+#: Relative tolerance of a holding force.
+_AT_REST = 1e-12
+#: Share of the motion without a holding force that it may leave.
+_STAYS = 1e-6
 
 
 @dataclass(frozen=True)
@@ -162,7 +164,8 @@ class ForeignBody(FmuBody, EndLoaded):
     """
 
     #: Longest time that a call may take [s], and what is said of when it was made.
-    PATIENCE, OCCASION = 60.0, ""
+    PATIENCE = 60.0
+    OCCASION = ""
     state: ForeignState
     _port: RemotePort
 
@@ -241,7 +244,8 @@ class ForeignBody(FmuBody, EndLoaded):
 
     def _take(self, told: tuple[float, ...], size: float = 0.0) -> Motion:
         """See `FmuBody._take`; what the FMU does not tell of its motion over ``size`` [s] is made up for."""
-        by_key, (w0, v0, *_) = dict(zip(self._keys, told, strict=True)), self.state.motion
+        by_key = dict(zip(self._keys, told, strict=True))
+        w0, v0, *_ = self.state.motion
         w = by_key["displacement"]
         if "velocity" not in by_key:
             v0 = by_key["velocity"] = (w - w0) / size if size > 0.0 else self.found.velocity

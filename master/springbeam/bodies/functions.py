@@ -20,7 +20,11 @@ from fmpy.logging import addLoggerProxy
 from typing_extensions import Self
 
 #: Values of fmi2Status and fmi3Status.
-OK, WARNING, DISCARD, ERROR, FATAL = 0, 1, 2, 3, 4
+OK = 0
+WARNING = 1
+DISCARD = 2
+ERROR = 3
+FATAL = 4
 #: Takes the status and the text of a message of an FMU.
 Log = Callable[[int, bytes | None], None]
 #: Folders of the binaries that can be loaded here, by FMI 2.0 and 3.0.
@@ -111,7 +115,8 @@ class Slave:
 
 
 #: Numbers of the instances of FMI 2.0, by which each of their messages finds who takes it.
-_NUMBERS, _LOGS = count(1), dict[int, Log]()
+_NUMBERS = count(1)
+_LOGS = dict[int, Log]()
 
 
 def _number_of(name: bytes | None) -> int:
@@ -143,10 +148,17 @@ def _logger() -> Any:
 class FMU2(Slave, fmi2.FMU2Slave):  # type: ignore[misc]
     """An FMU of FMI 2.0."""
 
-    TYPES, VERSION, PREFIX, REAL, ENUMERATION, STATE = fmi2, "2.0", "fmi2", "Real", "Integer", "FMUstate"
+    TYPES = fmi2
+    VERSION = "2.0"
+    PREFIX = "fmi2"
+    REAL = "Real"
+    ENUMERATION = "Integer"
+    STATE = "FMUstate"
     #: The function that sets derivatives of inputs, what it calls those of order 1 and 2, and whether the functions
     #: that get and set are told the number of values as well.
-    SET_DERIVATIVES, DERIVATIVES, COUNTED = "SetRealInputDerivatives", ("{}", "{}"), False
+    SET_DERIVATIVES = "SetRealInputDerivatives"
+    DERIVATIVES = ("{}", "{}")
+    COUNTED = False
 
     def make(self, log: Log) -> None:
         """Instantiate the FMU."""
@@ -178,8 +190,15 @@ class FMU3(Slave, fmi3.FMU3Slave):  # type: ignore[misc]
     Inputs are held over a step, but for those of our FMUs, whose derivatives are inputs.
     """
 
-    TYPES, VERSION, PREFIX, REAL, ENUMERATION, STATE = fmi3, "3.0", "fmi3", "Float64", "Int64", "FMUState"
-    SET_DERIVATIVES, DERIVATIVES, COUNTED = "SetFloat64", ("der({})", "der({},2)"), True
+    TYPES = fmi3
+    VERSION = "3.0"
+    PREFIX = "fmi3"
+    REAL = "Float64"
+    ENUMERATION = "Int64"
+    STATE = "FMUState"
+    SET_DERIVATIVES = "SetFloat64"
+    DERIVATIVES = ("der({})", "der({},2)")
+    COUNTED = True
 
     def make(self, log: Log) -> None:
         self.instantiate(logMessage=lambda _environment, status, _category, text: log(status, text))

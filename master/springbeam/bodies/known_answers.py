@@ -62,7 +62,9 @@ def _spring() -> Question:
     larger = 1.0
     smaller = sqrt(1.0 - cubic * amplitude**2 / (2.0 * square))
     while larger - smaller > 4.0 * float_info.epsilon:
-        larger, smaller = 0.5 * (larger + smaller), sqrt(larger * smaller)
+        mean = 0.5 * (larger + smaller)
+        smaller = sqrt(larger * smaller)
+        larger = mean
     period = 2.0 * pi / (larger * sqrt(square))
     parameters: dict[str, Value] = {
         "mass": 1.0,

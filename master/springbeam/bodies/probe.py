@@ -20,19 +20,27 @@ from ..scene.partners import ForeignFmu
 from .foreign import Findings, ForeignBody, moments
 from .protocol import NO_FORCE, FmuError, Force, StepRefused
 
-#: Sizes tried, over H; steps of a record.
-_SIZES, _RECORD = (1.0, 0.1, 1e-2, 1e-3, 1e-4), 64
+#: Sizes tried, over H.
+_SIZES = (1.0, 0.1, 1e-2, 1e-3, 1e-4)
+#: Steps of a record.
+_RECORD = 64
 #: How far, relatively, an output may be from what it should be: of integrators of order 1 less is left of 64 steps.
-_TOLERANCE, _ROUNDING = 0.04, 1e-9
-#: How far a response may be from that of a mass; what it is must be seen in so many digits.
-_RESPONSE, _AGREE = 0.1, 0.01
-#: Forces tried [N]; a change is seen if it is so large a part of the value.
-_FORCES, _SEEN = (1.0, 1e3, 1e6, 1e9, 1e12, 1e15), 1e-6
+_TOLERANCE = 0.04
+_ROUNDING = 1e-9
+#: Largest relative difference of a response from that of a mass.
+_RESPONSE = 0.1
+#: Largest relative difference of two measurements of a response.
+_AGREE = 0.01
+#: Forces tried [N].
+_FORCES = (1.0, 1e3, 1e6, 1e9, 1e12, 1e15)
+#: Smallest relative change of a value that counts.
+_SEEN = 1e-6
 _T = TypeVar("_T")
 
 
 class _TriedBody(ForeignBody):
-    PATIENCE, OCCASION = 20.0, " of the check before the run"
+    PATIENCE = 20.0
+    OCCASION = " of the check before the run"
 
 
 class Bench:

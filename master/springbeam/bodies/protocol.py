@@ -223,7 +223,8 @@ class Body:
         """
         if not (self.abilities.state and self.abilities.any_size and self.abilities.velocity):
             return None
-        h, (w, v, _, _) = _TRIAL * size, self.motion()
+        h = _TRIAL * size
+        w, v, _, _ = self.motion()
         end = self._trial(time, h)
         return None if end is None else 6.0 * (end.displacement - w - h * v) / (h * h) - 2.0 * (end.velocity - v) / h
 

@@ -90,7 +90,8 @@ def no_dip(start: Sample, end: Sample, size: float, fastest: float) -> bool:
 
     Not even if both ends move against each other as fast as the ``fastest`` so far [m/s], nor by the cubic.
     """
-    (f0, d0), (f1, d1) = start, end
+    f0, d0 = start
+    f1, d1 = end
     low = f0 if f0 < f1 else f1
     return f0 + f1 > 2.0 * fastest * size and low > abs(f1 - f0) + size / 3.0 * (abs(d0) + abs(d1))
 

@@ -21,10 +21,12 @@ from .interface import Interface, common_velocity
 
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only); slower than the
 #: second, if it would also rise no higher than positions can be told apart.
-_SEATING_SPEED, _SEATING_SPEED_UNSEEN = 1e-8, 1e-4
+_SEATING_SPEED = 1e-8
+_SEATING_SPEED_UNSEEN = 1e-4
 #: Rounding of a velocity, relative to the largest so far.
 VELOCITY_ROUNDING = 16.0 * 2.0**-52
-_TIP, _LOW = 0, 1
+_TIP = 0
+_LOW = 1
 
 #: A force that can only push: C between the ends, or N of the foundation.
 PushingForce = Literal["contact", "foundation"]
@@ -281,7 +283,9 @@ class Transition(NamedTuple):
     effect: Callable[[Automaton, Instant], Outcome]
 
 
-_OFF, _ON, _EITHER = (False,), (True,), (False, True)
+_OFF = (False,)
+_ON = (True,)
+_EITHER = (False, True)
 #: What ends each phase. Where two guards become zero at once, the first one counts.
 TRANSITIONS = (
     Transition("rigid", Joint.FREE, _EITHER, gap_above_zero, EventKind.IMPACT, Automaton.meet),

@@ -33,8 +33,10 @@ _Path = tuple[float, float, float, float]
 #: Points s of a quadrature on [−1, 1], and their weights.
 _Rule = Sequence[tuple[float, float]]
 
-#: p̃ keeps its size, or keeps off zero, if the least of its Bézier points is above this share of the largest.
-_STEADY, _OFF_ZERO = 0.9, 0.3
+#: p̃ keeps its size if the least of its Bézier points is above this share of the largest.
+_STEADY = 0.9
+#: p̃ keeps away from zero if the least of its Bézier points is above this share of the largest.
+_OFF_ZERO = 0.3
 #: Relative change of p over a step up to which the quotient ΔΦ/Δp would lose more than two digits.
 _SMALL_CHANGE = 0.01
 
@@ -46,8 +48,10 @@ def _gauss(points: int) -> list[tuple[float, float]]:
 
 #: Rule for a p̃ of degree 1 that changes so little that ΔΦ/Δp would lose digits: exact to rounding.
 _OF_LITTLE = _gauss(3)
-#: Rules for a p̃ of degree 1, 2, 3 that keeps its size, and for one that keeps off zero.
-_FEW, _MANY = [_gauss(4), _gauss(5), _gauss(6)], _gauss(8)
+#: Rules for a p̃ of degree 1, 2, 3 that keeps its size.
+_FEW = [_gauss(4), _gauss(5), _gauss(6)]
+#: The rule for a p̃ that keeps away from zero.
+_MANY = _gauss(8)
 #: The rule for a piece between zeros, from 0 to 1. It is graded towards both ends, 3t² − 2t³ of the length: a power of
 #: p beside p = 0 becomes smooth.
 _GRADED = [
@@ -172,7 +176,8 @@ class Projection:
         _, b1, b2, b3 = path
         second = start + (b1 - 2.0 * b2 + 3.0 * b3) / 1.5
         third = end - (b1 + 2.0 * b2 + 3.0 * b3) / 1.5
-        low, high = min(start, second, third, end), max(start, second, third, end)  # of the Bézier points
+        low = min(start, second, third, end)
+        high = max(start, second, third, end)  # of the Bézier points
         if high <= 0.0:
             return ()
         if low > _OFF_ZERO * high:

@@ -24,7 +24,8 @@ from .protocol import NotConverged
 from .small import Matrix, Vector, inverse, less, times
 from .solver import Aim, Responses, StepSolver
 
-_MAX_NEWTON, _MAX_DAMPING = 60, 8
+_MAX_NEWTON = 60
+_MAX_DAMPING = 8
 #: A correction smaller than this share of the penetration's numbers changes nothing.
 _SETTLED = 4.0 * 2.0**-52
 #: A correction that leaves more than this share of itself asks for the law's slope anew.
@@ -68,7 +69,8 @@ class SoftSolver(Booked, StepSolver):
         return not any(self._projection.force(low.displacement - tip.displacement, size, list(map(neg, gap))))
 
     def aim(self, gap: Vector, a: Vector, descent: Matrix, size: float, start: Ends) -> Aim:
-        (tip, low), x = start, list(map(neg, gap))
+        tip, low = start
+        x = list(map(neg, gap))
         step = (low.displacement - tip.displacement, size, x, a, descent)
         last_size, flexibility = self.state.last_crossing
         found = None

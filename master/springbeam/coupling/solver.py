@@ -38,8 +38,10 @@ _log = logging.getLogger(__name__)
 _MAX_ITERATIONS = 20
 #: Rounding of a sum of modes, relative to the largest it has been.
 _ROUNDING = 16.0 * float(np.finfo(float).eps)
-#: An iteration that takes so long has met the bodies' own rounding: so many tolerances, or that of the tip's modes.
-_LATE, _NOISE = 8, 1e3
+#: An iteration that takes so long has met the bodies' own rounding.
+_LATE = 8
+#: That rounding, over the tolerance.
+_NOISE = 1e3
 
 
 def _end(m: Motion, size: float) -> tuple[float, ...]:
@@ -238,7 +240,8 @@ class StepSolver(Coupling):
 
     def _absolute_tolerance(self, start: Motion, end: Motion, size: float, by_force: Vector) -> float:
         """Return the tolerance [m]; ``start`` is the upper body's motion, ``end`` the lower one's."""
-        (u, v, _, _), (y, z, _, _) = start, end
+        u, v, _, _ = start
+        y, z, _, _ = end
         change = max(size * max(v, -v, z, -z), abs(y - u))
         # The end is a sum of modes as large as it has ever been, and of what the force does; both are rounded.
         rounding = _ROUNDING * max(self.state.reach, u, -u, y, -y, *map(abs, by_force))

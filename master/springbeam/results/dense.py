@@ -264,7 +264,8 @@ def _between(
     def linear(name: str, end: np.ndarray) -> np.ndarray:
         return np.asarray((1.0 - share) * before[name] + share * end)
 
-    found["time"], found["size"] = times, share * after["size"]
+    found["time"] = times
+    found["size"] = share * after["size"]
     for name, series in forces(scene, before, after).items():
         found[f"{name}_after"] = legval(2.0 * share - 1.0, series, tensor=False)
         if name == "contact_force" and scene.contact.opens:

@@ -19,11 +19,14 @@ from ..bodies.protocol import NO_FORCE, Body, Force
 from ..scene.loads import LINES_IN_STEP, ConstantLoad, Load, StepLoad, TableLoad
 from .setup import SAME
 
-#: Which loads act on which body.
-ON_BEAM, ON_SPRING = ("beam", "tip", "base"), ("spring", "base")
-#: Points of the quadrature of a table, whose pieces are cubic at most, and of another signal, which has one more for
-#: each radian that it turns.
-_OF_TABLE, _POINTS = 3, 8
+#: Where loads act that move the upper body.
+ON_BEAM = ("beam", "tip", "base")
+#: Where loads act that move the lower body.
+ON_SPRING = ("spring", "base")
+#: Points of the quadrature of a table, whose pieces are cubic at most.
+_OF_TABLE = 3
+#: Points of the quadrature of another signal, which has one more for each radian that it turns.
+_POINTS = 8
 #: (2k + 1)/2, by which a moment against P_k on [−1, 1] becomes the coefficient of P_k.
 _NORMS = np.array([0.5, 1.5, 2.5])
 _gauss = lru_cache(maxsize=64)(np.polynomial.legendre.leggauss)

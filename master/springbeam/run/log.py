@@ -14,8 +14,10 @@ from ..results.steps import STEP
 from ..results.trajectory import SHAPE_COLUMNS
 from .outcome import RunStopped
 
-#: Most records that are checked and handed on together, and the longest that one waits for it [s].
-TOGETHER, _WAITS = 1024, 1.0
+#: Most records that are checked and recorded together.
+TOGETHER = 1024
+#: Longest time that a record waits for it [s].
+_WAITS = 1.0
 #: Judges the next records of a run, shape (n,), beside its first one, shape (1,): returns whether each is wrong, and
 #: what says by its number why the run stops there.
 Check = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, Callable[[int], str]]]

@@ -24,10 +24,15 @@ _SHORT_REMAINDER = 0.25
 _AFTER_IMPACT = 0.125
 #: Sizes are the run's length times 2^(−k/4): few enough for the coupling to remember its response to each.
 _PER_OCTAVE = 4
-#: k/4 of the first step, of the longest and of the shortest.
-_FIRST, _LONGEST, _SHORTEST = 14, 2, 40
-#: A step is changed by at most these factors at once, and aims below the tolerance by the safety factor.
-_SHRINK, _GROW, _SAFETY = 0.125, 2.0, 0.9
+#: k/4 of the first step; below, of the longest and of the shortest.
+_FIRST = 14
+_LONGEST = 2
+_SHORTEST = 40
+#: Smallest and largest factor by which a step is changed at once.
+_SHRINK = 0.125
+_GROW = 2.0
+#: A step aims below the tolerance by this factor.
+_SAFETY = 0.9
 #: Displacements are rounded to so many ulp.
 _ROUNDING = 64.0 * 2.0**-52
 #: Order of the cubic.

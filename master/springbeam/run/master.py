@@ -32,8 +32,10 @@ from .stepping import Pair, Present, State
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
 _NO_INNER_FORCES = (0.0, 0.0, 0.0, 0.0)
-#: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
-_SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
+#: Steps after first contact whose beam shape is kept.
+_SHAPES_AFTER_CONTACT = 20
+#: Shapes kept evenly over the run.
+_SHAPES_OVER_RUN = 400
 
 
 class Master:

@@ -20,8 +20,10 @@ _NOT_SHOWN = (
     f"compliance_force is larger than {MOST_SHOWN:g} N at times and is written as that, tie_reaction with it; "
     "the motion does not depend on either. A smaller contact.stiffness or contact.exponent keeps them in range"
 )
-#: Radians of a mode, and lines of a table, to a point of the quadrature over a step; its points at least, at most.
-_DENSE, _POINTS = 1.0, (8, 96)
+#: Points of the quadrature over a step for each radian of a mode and each line of a table.
+_DENSE = 1.0
+#: Fewest and most points of that quadrature.
+_POINTS = (8, 96)
 #: Steps that are looked at together: what is held of them is small.
 _TOGETHER = 1024
 #: Share of an end's way that is not worth computing.

@@ -286,7 +286,8 @@ class Pair:
 
     def mean_of(self, name: PushingForce, phase: Phase, step: Step) -> float:
         """Return the mean of C or N over ``step`` [N] without what turns a mismatch of velocities round."""
-        (tip, low), (tip_after, low_after) = step.start, step.end
+        tip, low = step.start
+        tip_after, low_after = step.end
         turned = tip_after.velocity - low_after.velocity - tip.velocity + low.velocity
         joined = phase.joint is not Joint.FREE and self.law is None
         applied = force.mean(step.foundation if name == "foundation" else step.contact, step.size)
