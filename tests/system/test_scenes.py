@@ -1,6 +1,5 @@
 """Scenes beside what they are compared with: a case of tests/scenes.toml each."""
 
-import bodies
 import numpy as np
 import pytest
 import scenes
@@ -12,9 +11,9 @@ from springbeam.results.contact_times import contact_changes
 CASES = scenes.TABLE["cases"]
 
 
-def beside_reference(scene, run_of, bounds, _):
+def beside_reference(scene, bounds, _):
     """Compare events, motion and energy with those of the event-driven reference."""
-    run = run_of(scene)
+    run = simulate(scene)
     rows = np.searchsorted(run.time, np.unique(run.time)[:: len(run) // 100 + 1], side="right") - 1
     exact = reference(scene, sample_times=run.time[rows])
     starts, among = bounds.get("starts", []), bounds.get("among", [])
@@ -61,15 +60,15 @@ def overlap(run):
     return max(below, 0.0 if soft else apart.max())
 
 
-def within_limits(scene, run_of, _, __):
+def within_limits(scene, _, __):
     """Bodies neither overlap nor part, by 1e-9 m; energy is kept, to 1e-8."""
-    run = run_of(scene)
+    run = simulate(scene)
     assert run.time[-1] == scene.time.t_end
     assert overlap(run) < 1e-9
     assert run.summary["max_energy_residual"] < 1e-8
 
 
-def beside_scipy(scene, _, bounds, monkeypatch):
+def beside_scipy(scene, bounds, monkeypatch):
     """The first and the longest step of each phase of the reference are what scipy makes of them."""
     run = integrated_anew(scene, monkeypatch, bounds.get("until", 0.3))
     assert run.summary["largest_relative_energy_residual"] < 1e-11
@@ -84,9 +83,8 @@ def test_a_scene_is_that_of_its_oracle(name, monkeypatch):
     case = CASES[name]
     left_out = dict.fromkeys(case.get("without", []))
     scene = with_changes(scenes.named(case["of"]), **case.get("change", {}), **left_out)
-    run_of = bodies.simulate if case.get("bodies") == "exact" else simulate
     bounds = {**scenes.TABLE["bounds"].get(case.get("within"), {}), **case.get("bounds", {})}
-    ORACLES[case["oracle"]](scene, run_of, bounds, monkeypatch)
+    ORACLES[case["oracle"]](scene, bounds, monkeypatch)
 
 
 # -- what a run does where nothing is to be compared with -------------------------------------------------------------
