@@ -73,3 +73,5 @@ def test_a_command_loads_what_it_uses_and_nothing_else(tmp_path):
     assert loaded_by(tmp_path, "run soft --no-plots --set time.t_end=0.01") == ["numpy", "fmpy"]
     assert loaded_by(tmp_path, "report results/soft") == ["numpy", "plotly"]
     assert loaded_by(tmp_path, "export results/soft") == ["numpy"]
+    compared = "crosscheck soft --no-plots --set time.t_end=0.01"
+    assert loaded_by(tmp_path, compared) == ["numpy", "scipy", "fmpy", "pyarrow"]

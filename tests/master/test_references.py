@@ -35,6 +35,22 @@ def test_soft_agrees_with_extended_precision():
         assert (event.z, event.v_tip) == pytest.approx((velocity, velocity), abs=2e-13)
 
 
+@pytest.mark.parametrize("changes", [{}, {"beam": {"alpha_b": 1e-3}, "spring": {"damping": 0.1}}])
+def test_rows_cost_no_steps_and_lie_on_the_motion_of_a_run_that_ends_there(changes):
+    """Steps are as long as the motion allows, and rows lie inside them."""
+    scene = soft(50, **changes)
+    times = np.linspace(0.0, 0.2, 401)
+    few, many = (event_driven.integrate(scene, sample_times=some, t_end=0.2) for some in (times[[0, -1]], times))
+    assert many.summary["counts"] == few.summary["counts"]
+    assert many.summary["counts"]["steps"] < 0.7 * len(times)
+    for row in (37, 211, 383):  # before, between and after the events
+        last = event_driven.integrate(scene, sample_times=[0.0, times[row]], t_end=times[row])
+        for name, column in last.columns.items():
+            if name not in ("phase", "time"):
+                scale = max(np.max(np.abs(many[name])), np.max(many.e_total) * (name == "energy_residual"))
+                assert abs(column[-1] - many[name][row]) <= 1e-11 * scale, name
+
+
 LAWS = [exact.compliant_impact, exact.hunt_crossley, exact.link, exact.damped_link, exact.tie]
 
 

@@ -17,6 +17,8 @@ from typing import Annotated, Any
 
 # Typer uses pydantic, which would search all installed packages for plugins.
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+# On matrices as small as ours, several threads of BLAS mostly wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import typer
 

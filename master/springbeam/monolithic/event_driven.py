@@ -14,14 +14,12 @@ from operator import itemgetter
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.optimize import brentq, newton
 
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError
-from .exponential import ExponentialPropagator, LinearForm, Segment
+from .exponential import TO_LEGENDRE, ExponentialPropagator, LinearForm, Segment
 from .hybrid_system import NOISE, HybridSystem, QuasiStaticSystem, ReferenceFailure
 from .laws import ReferencePhase, Watch
-from .oscillators import GAUSS, STAGES
 from .rows import Rows
 from .transitions import HybridState
 
@@ -35,8 +33,8 @@ _MOST_EVENTS = 100_000
 _SAMPLES = 1000
 #: A turn whose value is a smaller share of how much the nodes vary is looked at exactly.
 _CLOSE = 1e-6
-#: Takes values at the nodes of a segment to the Legendre coefficients of the polynomial through them.
-_TO_LEGENDRE = np.linalg.inv(legendre.legvander(2.0 * np.r_[0.0, GAUSS.nodes, 1.0] - 1.0, STAGES + 1))
+#: A zero of the polynomial through the nodes is corrected by so small a share of the segment at most.
+_CORRECTION = 1e-9
 
 
 def integrate(
@@ -147,19 +145,35 @@ class _Run:
         while state.time < end:
             if self._limit is not None and clock.process_time() - self._began > self._limit:
                 raise ReferenceFailure(f"takes more than {self._limit:g} s; it is at t = {state.time:.6g} s")
-            target = min(self._due[0], end) if self._due else end
-            segment = propagator.advance(max(target - state.time, 1e-16 * self.t_end))
+            segment = propagator.advance(max(end - state.time, 1e-16 * self.t_end))
             self._counts["steps"] += 1
-            event, reach = first_event(s, state.phase, watched, segment) or (None, segment.nodes[-1])
-            state.time = begin + propagator.elapsed if event is None else state.time + reach
-            if event is None and abs(state.time - target) <= 1e-14 * self.t_end:
-                state.time = target  # the sum is off by rounding
-            state.X = segment.states[-1].copy() if event is None else segment.inside(reach)
+            found = first_event(s, state.phase, watched, segment)
+            if found is None:
+                to = begin + propagator.elapsed
+                self._move(segment, end if abs(end - to) <= 1e-14 * self.t_end else to)  # but for rounding of the sum
+                continue
+            event, reach = found
+            start = state.time
+            for piece in segment.pieces(reach):
+                self._move(piece, state.time + piece.nodes[-1])
+            state.time = start + reach
             state.X[s.T] = state.time
-            self._record_due()
-            if event is not None:
-                return event
+            return event
         return None
+
+    def _move(self, segment: Segment, to: float) -> None:
+        """Move the state to the end of a segment at time ``to`` [s]; record the rows that are due on it."""
+        state = self.state
+        due = []
+        while self._due and self._due[0] <= to:
+            due.append(self._due.popleft())
+        if due:
+            for time, X in zip(due, segment.at(np.array(due) - state.time), strict=True):
+                X[self.system.T] = time
+                self.rows.record(time, X)
+        state.time = to
+        state.X = segment.states[-1].copy()
+        state.X[self.system.T] = to
 
     def _samples(self, sample_times: Sequence[float] | np.ndarray | None) -> deque[float]:
         """Return the times of the rows [s] but for those of events."""
@@ -177,12 +191,12 @@ class _Run:
 
     def _record_event(self) -> None:
         if self._every_event:
-            self.rows.record()
+            self.rows.record(self.state.time, self.state.X)
 
     def _record_due(self) -> None:
         while self._due and self._due[0] <= self.state.time:
             self._due.popleft()
-            self.rows.record()
+            self.rows.record(self.state.time, self.state.X)
 
 
 def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
@@ -216,6 +230,8 @@ def _at_rest(s: HybridSystem) -> np.ndarray:
 
     Raises ReferenceFailure where the spring rests nowhere near Ψ.
     """
+    from scipy.optimize import brentq, newton  # only for who is at rest
+
     X = np.zeros(s.size)
     p = s.spring
     force = s.load + s.loads.values(np.zeros(())) @ s.patterns
@@ -275,7 +291,11 @@ def _crossing(
     def g(tau: float) -> float:
         return float(watch.function(s.motion(phase, segment.inside(tau))))
 
-    turns, there = _turns(segment.nodes[-1], values)
+    series = TO_LEGENDRE @ values
+    size = float(segment.nodes[-1])
+    turns, there = _turns(size, values, series)
+    if not len(turns) and np.min(values) >= 0.0:
+        return None
     close = np.abs(there) <= _CLOSE * np.ptp(values)
     there[close] = [g(tau) for tau in turns[close]]
     order = np.argsort(np.r_[segment.nodes, turns])
@@ -286,20 +306,33 @@ def _crossing(
         return None
     low = float(times[max(below[0] - 1, 0)])
     high = float(times[below[0]])
+    for tau in _zeros(size, series):
+        slope = 2.0 / size * float(legendre.legval(2.0 * tau / size - 1.0, legendre.legder(series)))
+        if low < tau < high and slope != 0.0:
+            correction = g(tau) / slope
+            if abs(correction) <= _CORRECTION * size:
+                return float(tau - correction)
     if g(low) <= 0.0 or g(high) >= 0.0:  # what the nodes have and the exact state differ by less than either's error
         return low if g(low) <= 0.0 else high
+    from scipy.optimize import brentq  # only where the polynomial does not tell where it is
+
     # A root at a segment's very start needs no more than the rounding of the segment.
     return float(brentq(g, low, high, xtol=1e-16 * high, rtol=8.9e-16, maxiter=200))
 
 
-def _turns(size: float, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _turns(size: float, values: np.ndarray, series: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return where in a segment of ``size`` [s] the polynomial through ``values`` turns, and its values there.
 
     Nothing where these are far above zero: a smooth minimum lies below the nodes by less than they vary.
     """
     if np.min(values) > np.ptp(values):
         return np.empty(0), np.empty(0)
-    series = _TO_LEGENDRE @ values
-    turns = legendre.legroots(legendre.legder(legendre.legtrim(series, 0.1 * NOISE * np.max(np.abs(series)))))
-    x = turns.real[(turns.imag == 0.0) & (np.abs(turns.real) < 1.0)]
-    return 0.5 * size * (1.0 + x), np.asarray(legendre.legval(x, series))
+    turns = _zeros(size, legendre.legder(series))
+    return turns, np.asarray(legendre.legval(2.0 * turns / size - 1.0, series))
+
+
+def _zeros(size: float, series: np.ndarray) -> np.ndarray:
+    """Return where in a segment of ``size`` [s] a Legendre ``series`` is zero, ascending."""
+    roots = legendre.legroots(legendre.legtrim(series, 0.1 * NOISE * np.max(np.abs(series))))
+    x = roots.real[(roots.imag == 0.0) & (np.abs(roots.real) < 1.0)]
+    return np.sort(0.5 * size * (1.0 + x))

@@ -12,15 +12,16 @@ event slips through between two nodes. Beams whose fast modes stay silent, or ar
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import legendre
 
 from .hybrid_system import NOISE, HybridSystem, ReferenceFailure
 from .laws import ReferencePhase
-from .oscillators import GAUSS, STAGES, TARGETS, Oscillators
+from .oscillators import GAUSS, STAGES, TARGETS, Oscillators, StepWeights
 from .semi_discrete import singular_modes
 
 _MAX_ITERATIONS = 60
@@ -33,14 +34,44 @@ _SMALLEST_SHARE = 2.0**-60
 _CACHED_SIZES = 64
 #: Where states of a segment are kept, as fractions of it.
 _NODES = np.append(0.0, TARGETS)
+#: Takes values at the nodes of a segment to the Legendre coefficients of the polynomial through them.
+TO_LEGENDRE = np.linalg.inv(legendre.legvander(2.0 * _NODES - 1.0, STAGES + 1))
 
 
-class Segment(NamedTuple):
-    """One accepted step: its states at ``nodes`` [s], from 0 to its size, and what finds those between them."""
+@dataclass(frozen=True)
+class Segment:
+    """One accepted step from X = ``states[0]``: its states at ``nodes`` [s], from 0 to its size."""
 
+    form: LinearForm
     nodes: np.ndarray  #: (k,)
     states: np.ndarray  #: (k, 2n + 3)
-    inside: Callable[[float], np.ndarray]  #: τ [s] → X
+    speed: float  #: the largest of the ends so far [m/s]
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Return the states at ``times`` [s], (m, 2n + 3), by the polynomial through those at the nodes.
+
+        What is dissipated and the work of the loads are integrated up to there.
+        """
+        s = self.form.system
+        states = self._through(times)
+        before = self._through(times[:, None] * GAUSS.nodes)
+        for part, rate in ((s.D, s.dissipation_rate(self.form.phase, before)), (s.W, s.load_power(before))):
+            states[:, part] = self.states[0, part] + times * (rate @ GAUSS.weights)
+        return states
+
+    def _through(self, times: np.ndarray) -> np.ndarray:
+        values = legendre.legvander(2.0 * times / self.nodes[-1] - 1.0, STAGES + 1)
+        return np.asarray(values @ (TO_LEGENDRE @ self.states))
+
+    def pieces(self, tau: float) -> Iterator[Segment]:
+        """Step anew up to τ [s]: the forces of the whole segment may hold a kink that lies after τ."""
+        inner = ExponentialPropagator(self.form, self.states[0], self.speed)
+        while tau - inner.elapsed > 1e-15 * tau:
+            yield inner.advance(tau - inner.elapsed)
+
+    def inside(self, tau: float) -> np.ndarray:
+        """Return X at τ [s], stepped anew."""
+        return np.asarray([self.states[0], *(piece.states[-1] for piece in self.pieces(tau))][-1])
 
 
 class LinearForm:
@@ -54,7 +85,7 @@ class LinearForm:
         P: the forces r. First, on the top, what is left of the spring's damping, and −k2 (y − y₀)³; then
         the law's force C;
         each if the phase has it.
-    ends, at : (2, p) array, (2, 1) array
+    ends, at : (2, p) array, (2,) array
         u and y are ends @ ξ + at.
     """
 
@@ -72,47 +103,62 @@ class LinearForm:
             self.c = s.alpha_b * self.omega2
             #: Damping of the spring that ``c`` does not hold [N·s/m].
             self.damping = s.spring.damping - s.alpha_b * s.spring.linear_stiffness
-        self.constant = (load - omega2 * self.offset) @ self.basis
-        self.loads = s.patterns @ self.basis
+        #: What is known beforehand acts on the modes: a constant, and a unit of each load, (1 + loads, p).
+        self.known = np.vstack([load - omega2 * self.offset, s.patterns]) @ self.basis
         ends = np.array([s.tip, s.top])
         self.ends = ends @ self.basis
-        self.at = (ends @ self.offset)[:, None] + [[0.0], [s.floor]]
+        self.at = ends @ self.offset + [0.0, s.floor]
+        #: What a unit of each mode moves an end by at most, of its slow and its fast root, (2p,).
+        self.reach = np.tile(np.max(np.abs(self.ends), axis=0), 2)
         nonlinear = bool(self.damping or s.spring.cubic_stiffness)
         self.of_spring = nonlinear and s.has_spring and bool(np.any(self.ends[1]))
         self.of_law = s.law.acts(phase.contact)
         inputs = [s.top] * self.of_spring + [s.between] * self.of_law
         self.inputs = np.reshape(inputs, (len(inputs), s.n)) @ self.basis
         self.oscillators = Oscillators(self.omega2, self.c)
-        self.weights = lru_cache(_CACHED_SIZES)(self.oscillators.weights)
+        self.weights = lru_cache(_CACHED_SIZES)(self._weights)
 
     def modal(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (ξ, ξ̇) of a state."""
         return (X[self.system.A] - self.offset) @ self.inverse, X[self.system.V] @ self.inverse
 
-    def load_at(self, times: np.ndarray) -> np.ndarray:
-        """Return all loads on the modes, (..., p), at ``times`` [s] of shape (...)."""
-        return np.asarray(self.constant + self.system.loads.values(times) @ self.loads)
+    def loads_at(self, times: np.ndarray) -> np.ndarray:
+        """Return how much of each of ``known`` acts at ``times`` [s] of shape (...), (..., 1 + loads)."""
+        values = self.system.loads.values(times)
+        return np.concatenate([np.ones((*values.shape[:-1], 1)), values], axis=-1)
 
-    def forces(self, xi: np.ndarray, xi_dot: np.ndarray) -> np.ndarray:
-        """Return R: forces (k, inputs) at modes (k, p)."""
-        u, y = self.ends @ xi.T + self.at
-        v, z = self.ends @ xi_dot.T
+    def ends_at(self, moved: np.ndarray) -> np.ndarray:
+        """Return u and y, v and z at modes (2, k, p): (2, k, 2)."""
+        found = moved @ self.ends.T
+        found[0] += self.at
+        return np.asarray(found)
+
+    def forces(self, ends: np.ndarray) -> np.ndarray:
+        """Return R: forces (k, inputs) of ends that move as `ends_at` says."""
+        (u, y), (v, z) = np.swapaxes(ends, 1, 2)
         found = []
         spring = self.system.spring
         if self.of_spring:
             found.append(-self.damping * z - spring.cubic_stiffness * (y - spring.unloaded) ** 3)
         if self.of_law:
             found.append(self.system.law.force(y - u, z - v))
-        return np.asarray(np.reshape(found, (len(found), len(xi))).T)
+        return np.asarray(np.reshape(found, (len(found), len(u))).T)
+
+    def _weights(self, size: float) -> tuple[StepWeights, np.ndarray]:
+        """Return the weights of a step, and what they make of the forces r at the ends: r.ravel() → `ends_at`."""
+        weights = self.oscillators.weights(size)
+        onto = (self.ends[:, None] * self.inputs).reshape(-1, len(self.omega2))
+        of_ends = np.reshape(weights.force[:, :-1] @ onto.T, (2, STAGES, STAGES, 2, len(self.inputs)))
+        return weights, np.moveaxis(of_ends, 3, 2).reshape(2 * STAGES * 2, STAGES * len(self.inputs))
 
     def longest_step(self, X: np.ndarray) -> float:
         """Return the step [s] that resolves the free motion from X, but for amplitudes as small as rounding."""
         xi, xi_dot = self.modal(X)
-        force = self.forces(xi[None], xi_dot[None])[0] @ self.inputs + self.load_at(X[self.system.T])
-        rates, amplitudes = self.oscillators.components(xi, xi_dot, force)
-        reach = np.max(np.abs(self.ends), axis=0, initial=0.0)  # of the ends, by a unit of each mode
-        silent = NOISE * np.max(reach, initial=0.0) * max(float(np.linalg.norm(xi)), np.max(amplitudes, initial=0.0))
-        fastest = np.max(rates[np.tile(reach, 2) * amplitudes > silent], initial=0.0)
+        r = self.forces(self.ends_at(np.array([[xi], [xi_dot]])))[0]
+        force = r @ self.inputs + self.loads_at(X[self.system.T]) @ self.known
+        amplitudes = self.oscillators.amplitudes(xi, xi_dot, force)
+        silent = NOISE * self.reach.max(initial=0.0) * max(np.linalg.norm(xi), amplitudes.max(initial=0.0))
+        fastest = self.oscillators.rates[self.reach * amplitudes > silent].max(initial=0.0)
         return min(_STEP_PHASE / fastest if fastest > 0.0 else np.inf, self.system.loads.longest_step)
 
     def step(self, X: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
@@ -122,28 +168,36 @@ class LinearForm:
         ReferenceFailure if the step is too long to find these.
         """
         s = self.system
-        weights = self.weights(float(f"{size:.12e}"))  # sizes recur but for rounding
+        weights, of_ends = self.weights(float(f"{size:.12e}"))  # sizes recur but for rounding
         times = X[s.T] + size * TARGETS
         xi, xi_dot = self.modal(X)
-        load = self.load_at(times[:-1])
-        r = np.repeat(self.forces(xi[None], xi_dot[None]), STAGES, axis=0)
-        for iteration in range(_MAX_ITERATIONS):
-            with np.errstate(over="ignore", invalid="ignore"):  # an escaping spring; found below
-                moved = weights.motion(xi, xi_dot, load + r @ self.inputs)
-                new = self.forces(*(at_targets[:-1] for at_targets in moved))
-                change = np.max(np.abs(new - r), initial=0.0)
-                scale = np.max(np.abs(new), initial=0.0)
-            r = new
-            if change <= (4e-16 if iteration < 9 else 1e-14) * scale:
-                break
-        else:
-            raise ReferenceFailure(self.unresolved)
+        moved = weights.free(xi, xi_dot) + weights.forced(self.loads_at(times[:-1]), self.known)
+        without = self.ends_at(moved[:, :-1])
+        r = self._resolved(without, of_ends, self.forces(self.ends_at(np.array([[xi], [xi_dot]]))))
+        moved += weights.forced(r, self.inputs)
         states = np.repeat(X[None], len(times), axis=0)
         states[:, s.A], states[:, s.V] = moved[0] @ self.basis.T + self.offset, moved[1] @ self.basis.T
         states[:, s.T] = times
         states[-1, s.D] += size * float(GAUSS.weights @ s.dissipation_rate(self.phase, states[:-1]))
         states[-1, s.W] += size * float(GAUSS.weights @ s.load_power(states[:-1]))
         return states, r @ self.inputs @ self.ends.T
+
+    def _resolved(self, without: np.ndarray, of_ends: np.ndarray, first: np.ndarray) -> np.ndarray:
+        """Return the forces r at the Gauss points, (stages, inputs), of ends that move ``without`` them as given.
+
+        ``first`` is r at the start, (1, inputs). Raises ReferenceFailure where no r is found.
+        """
+        r = np.repeat(first, STAGES, axis=0)
+        if not len(self.inputs):
+            return r
+        with np.errstate(over="ignore", invalid="ignore"):  # an escaping spring; found by the caller
+            for iteration in range(_MAX_ITERATIONS):
+                new = self.forces(without + (of_ends @ r.ravel()).reshape(without.shape))
+                change = np.abs(new - r).max()
+                r = new
+                if change <= (4e-16 if iteration < 9 else 1e-14) * np.abs(new).max():
+                    return r
+        raise ReferenceFailure(self.unresolved)
 
 
 def _modes(omega2: np.ndarray, space: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -197,16 +251,19 @@ class ExponentialPropagator:
         tail = size * np.sum(np.abs(GAUSS.transform[-2:] @ pulled), axis=0)
         # A place that rounding would change as much is no reason for a shorter step.
         unresolved = (tail > _TAIL * self._speed) & (tail * size > NOISE * np.max([u, y]))
-        if np.any(unresolved) or not np.all(np.isfinite(states)):
+        if np.any(unresolved) or not np.all(np.isfinite(states)) or not self._power_resolved(size, states):
             raise ReferenceFailure(form.unresolved)
 
-        speed = self._speed
+        return Segment(form, size * _NODES, np.vstack([X, states]), self._speed)
 
-        def inside(tau: float) -> np.ndarray:
-            # Stepped anew, because the forces of the whole segment may hold a kink that lies after τ.
-            inner = ExponentialPropagator(form, X, speed)
-            while tau - inner.elapsed > 1e-15 * tau:
-                inner.advance(tau - inner.elapsed)
-            return inner.X
-
-        return Segment(size * _NODES, np.vstack([X, states]), inside)
+    def _power_resolved(self, size: float, states: np.ndarray) -> bool:
+        """Whether the power that a slack contact takes without a force r is resolved, as r is."""
+        s = self.form.system
+        phase = self.form.phase
+        if phase.contact != "slack":
+            return True
+        u, v, y, z = s.ends(phase, states[:-1])
+        power = s.law.dissipation(phase.contact, y - u, z - v)
+        tail = size * float(np.sum(np.abs(GAUSS.transform[-2:] @ power)))
+        energy = 0.5 * float(np.max(np.sum(states[:, s.V] ** 2, axis=1)))
+        return tail <= max(_TAIL * energy, NOISE * size * float(np.max(np.abs(power))))

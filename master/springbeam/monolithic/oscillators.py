@@ -12,8 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BarycentricInterpolator
-from scipy.special import ive
 
 #: Gauss points of a step, at which forces are given.
 STAGES = 12
@@ -36,35 +34,36 @@ class GaussRule:
         #: (stages, stages): values at the nodes → Legendre coefficients.
         self.transform = np.polynomial.legendre.legvander(x, stages - 1).T * w * (np.arange(stages)[:, None] + 0.5)
 
+    def lagrange(self, x: np.ndarray) -> np.ndarray:
+        """Return ℓ_k, which is 1 at node k and 0 at the others, at ``x`` in [0, 1]: (..., stages)."""
+        return np.asarray(np.polynomial.legendre.legvander(2.0 * x - 1.0, len(self.nodes) - 1) @ self.transform)
+
 
 GAUSS = GaussRule(STAGES)
 _INNER = GaussRule(_QUADRATURE)
 #: Where a step is evaluated: the Gauss points and the end, as fractions of it.
 TARGETS = np.append(GAUSS.nodes, 1.0)
-#: ℓ_k at points of the step, shape (..., stages): the Lagrange basis on its Gauss points.
-_LAGRANGE = BarycentricInterpolator(GAUSS.nodes, np.eye(STAGES))
 #: Quadrature points on [0, c] for each target c, (targets, Q), and weight × ℓ_k there, (targets, stages, Q).
 _ELAPSED = TARGETS[:, None] * _INNER.nodes
-_WEIGHTED = np.swapaxes(_LAGRANGE(_ELAPSED) * (TARGETS[:, None] * _INNER.weights)[..., None], 1, 2).copy()
+_WEIGHTED = np.swapaxes(GAUSS.lagrange(_ELAPSED) * (TARGETS[:, None] * _INNER.weights)[..., None], 1, 2).copy()
 #: c × the Legendre coefficients on [0, c] of ℓ_k for each target c, (targets, legendre, stages).
-_ON_PARTS = TARGETS[:, None, None] * (GAUSS.transform @ _LAGRANGE(TARGETS[:, None] * GAUSS.nodes))
+_ON_PARTS = TARGETS[:, None, None] * (GAUSS.transform @ GAUSS.lagrange(TARGETS[:, None] * GAUSS.nodes))
 
 
 @dataclass(frozen=True)
 class StepWeights:
     """Maps from the start of a step, and from forces at its Gauss points, to the targets; p oscillators."""
 
-    C: np.ndarray  #: (targets, p): ξ₀ → ξ
-    S: np.ndarray  #: ξ̇₀ → ξ
-    C_dot: np.ndarray  #: ξ₀ → ξ̇
-    S_dot: np.ndarray  #: ξ̇₀ → ξ̇
-    force: np.ndarray  #: (targets, stages, p): ∫₀^τ S(τ − ν) ℓ_k(ν) dν
-    force_dot: np.ndarray  #: … with Ṡ in place of S
+    start: np.ndarray  #: (2, 2, targets, p): C, S take ξ₀, ξ̇₀ to ξ; Ċ, Ṡ to ξ̇
+    force: np.ndarray  #: (2, targets, stages, p): ∫₀^τ S(τ − ν) ℓ_k(ν) dν; … with Ṡ in place of S
 
-    def motion(self, xi: np.ndarray, xi_dot: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return ξ and ξ̇ at the targets, (targets, p), from those at the start and forces ``load`` (stages, p)."""
-        moved = self.C * xi + self.S * xi_dot + np.einsum("ijp,jp->ip", self.force, load)
-        return moved, self.C_dot * xi + self.S_dot * xi_dot + np.einsum("ijp,jp->ip", self.force_dot, load)
+    def free(self, xi: np.ndarray, xi_dot: np.ndarray) -> np.ndarray:
+        """Return ξ and ξ̇ at the targets, (2, targets, p), from those at the start without forces."""
+        return np.asarray(self.start[:, 0] * xi + self.start[:, 1] * xi_dot)
+
+    def forced(self, forces: np.ndarray, patterns: np.ndarray) -> np.ndarray:
+        """Return ξ and ξ̇ at the targets, (2, targets, p), from rest under k ``forces``, (stages, k), (k, p)."""
+        return np.asarray(np.sum((forces.T @ self.force) * patterns, axis=2))
 
 
 class Oscillators:
@@ -84,6 +83,12 @@ class Oscillators:
         self.sigma = 0.5 * c
         #: s₁, s₂ with |s₁| ≤ |s₂|, (p,) complex; apart, so that one can divide by their difference.
         self.slow, self.fast = self._roots(_CRITICAL)
+        #: |s₁| and |s₂| [1/s], (2p,).
+        self.rates = np.abs(np.concatenate([self.slow, self.fast]))
+        apart = self.slow - self.fast
+        #: 1/(s₁ − s₂), and 1/ω²; 0 of a mode that nothing holds.
+        self._between = np.divide(1.0, apart, out=np.zeros_like(apart), where=apart != 0.0)
+        self._compliance = np.divide(1.0, omega2, out=np.zeros_like(omega2), where=omega2 != 0.0)
 
     def _roots(self, apart: float) -> tuple[np.ndarray, np.ndarray]:
         """Return s₁ and s₂, nearer ones moved ``apart`` by this share of σ on either side."""
@@ -111,34 +116,28 @@ class Oscillators:
     def weights(self, size: float, at: slice = slice(None)) -> StepWeights:
         """Return the weights of a step of ``size`` [s], of those targets that ``at`` picks."""
         S, S_dot = self.kernels(TARGETS[at] * size)
-        shape = (len(S), STAGES, len(self.omega2))
-        force = np.empty(shape)
-        force_dot = np.empty(shape)
+        force = np.empty((2, len(S), STAGES, len(self.omega2)))
         near = np.abs(self.fast) * size <= _SLOW
         if np.any(near):
             oscillators = Oscillators(self.omega2[near], self.c[near])
-            kernel, kernel_dot = oscillators.kernels((TARGETS[:, None] - _ELAPSED)[at] * size)
-            force[..., near] = np.matmul(_WEIGHTED[at] * size, kernel)
-            force_dot[..., near] = np.matmul(_WEIGHTED[at] * size, kernel_dot)
+            kernels = oscillators.kernels((TARGETS[:, None] - _ELAPSED)[at] * size)
+            force[..., near] = np.matmul(_WEIGHTED[at] * size, kernels)
         if not np.all(near):
             far = ~near
             slow = self.slow[far]
             fast = self.fast[far]
             with_slow = _convolve(slow, size, at)
             with_fast = _convolve(fast, size, at)
-            force[..., far] = ((with_slow - with_fast) / (slow - fast)).real
-            force_dot[..., far] = ((slow * with_slow - fast * with_fast) / (slow - fast)).real
-        return StepWeights(S_dot + self.c * S, S, -self.omega2 * S, S_dot, force, force_dot)
+            force[0][..., far] = ((with_slow - with_fast) / (slow - fast)).real
+            force[1][..., far] = ((slow * with_slow - fast * with_fast) / (slow - fast)).real
+        start = np.array([[S_dot + self.c * S, S], [-self.omega2 * S, S_dot]])
+        return StepWeights(start, force)
 
-    def components(self, xi: np.ndarray, xi_dot: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return rates |s| [1/s] and amplitudes of the free motion about equilibrium under ``force``, both (2p,)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            xi = xi - np.where(self.omega2 != 0.0, force / self.omega2, 0.0)
-            of_slow = np.abs((xi_dot - self.fast * xi) / (self.slow - self.fast))
-            of_fast = np.abs((self.slow * xi - xi_dot) / (self.slow - self.fast))
-        rates = np.abs(np.concatenate([self.slow, self.fast]))
-        amplitudes = np.concatenate([of_slow, of_fast])
-        return rates, np.where(rates > 0.0, np.nan_to_num(amplitudes), 0.0)
+    def amplitudes(self, xi: np.ndarray, xi_dot: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Return the amplitudes at ``rates`` of the free motion about equilibrium under ``force``, (2p,)."""
+        off = xi - force * self._compliance
+        both = np.concatenate([xi_dot - self.fast * off, self.slow * off - xi_dot])
+        return np.where(self.rates > 0.0, np.abs(both * np.tile(self._between, 2)), 0.0)
 
 
 def _convolve(s: np.ndarray, size: float, at: slice) -> np.ndarray:
@@ -147,6 +146,8 @@ def _convolve(s: np.ndarray, size: float, at: slice) -> np.ndarray:
     On [0, 1], ∫ e^{z(1 − x)} P_m(2x − 1) dx = e^{−w} i_m(w) with w = −z/2 and i_m the modified spherical Bessel
     functions (Abramowitz & Stegun, 10.1.14 and 10.2.2).
     """
+    from scipy.special import ive  # only for who has fast oscillators
+
     w = -0.5 * size * TARGETS[at][:, None] * s
     m = np.arange(STAGES)[:, None, None]
     with np.errstate(over="ignore", invalid="ignore"):

@@ -24,9 +24,9 @@ class Rows:
         self._state = state
         self._rows: list[tuple[float, np.ndarray, ReferencePhase, float]] = []
 
-    def record(self) -> None:
-        """Keep the state in which the run is."""
-        self._rows.append((self._state.time, self._state.X.copy(), self._state.phase, self._state.loss))
+    def record(self, time: float, X: np.ndarray) -> None:
+        """Keep a state X in the phase in which the run is."""
+        self._rows.append((time, X.copy(), self._state.phase, self._state.loss))
 
     def trajectory(self, summary: dict[str, Any]) -> Trajectory:
         """Return the result of the run, with its ledger added to ``summary``."""

@@ -12,13 +12,13 @@ singular values of B, since eigenvalues of K carry an absolute error ε·ω_max�
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 from numpy.polynomial import legendre
-from scipy.special import roots_jacobi
 
 from ..scene import Beam, Load, Scene
 from ..scene.statics import SHAPE_POINTS
@@ -111,7 +111,7 @@ def _lagrange(degree: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _lobatto(degree: int) -> np.ndarray:
     """Return the p + 1 Gauss–Lobatto nodes in [0, 1]."""
-    inner = roots_jacobi(degree - 1, 1, 1)[0] if degree > 1 else np.zeros(0)  # of P_p'
+    inner = legendre.legroots(legendre.legder(np.eye(degree + 1)[degree]))  # of P_p'
     return np.concatenate([[0.0], 0.5 + 0.5 * inner, [1.0]])
 
 
@@ -230,6 +230,7 @@ class ModalBeam:
         return float(self.tip @ self.tip)
 
 
+@lru_cache(maxsize=2)
 def modal_beam(beam: Beam) -> ModalBeam:
     """Diagonalise the scene's beam: all modes, or the lowest ``n_modes`` with modal truncation augmentation.
 

@@ -232,7 +232,7 @@ def impulse_integrals(omega2: np.ndarray, c: np.ndarray, h: float) -> np.ndarray
 
     at_end = Oscillators(omega2, c).weights(h, slice(-1, None))
     forces = [(h * GAUSS.nodes) ** j / math.factorial(j) for j in range(5)]
-    return np.vstack([at_end.S_dot, at_end.S, forces @ at_end.force[0]])
+    return np.vstack([at_end.start[1, 1], at_end.start[0, 1], forces @ at_end.force[0, 0]])
 
 
 @dataclass(frozen=True)
