@@ -10,9 +10,9 @@ from bodies import DuffingBody, beam_body, simulate
 from springbeam.monolithic import event_driven
 from springbeam.monolithic import laws as references
 from springbeam.run import runner
+from springbeam.run.resolution import WINDOW
 from springbeam.scene import Scene, laws, load_scene, with_changes
 from springbeam.scene.linearised import contact_energy
-from springbeam.scene.resolution import WINDOW
 from springbeam.scene.statics import tip_inertia
 from springbeam.studies.stability.predict import predict
 

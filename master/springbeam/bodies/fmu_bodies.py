@@ -7,21 +7,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from math import isfinite, sqrt
+from math import isfinite
 from struct import Struct
 from typing import Any, ClassVar, NamedTuple, NoReturn
 
 import numpy as np
 
 from ..scene import Beam, Load, Spring
+from ..scene.frequencies import (
+    fastest_frequency,
+    impact_frequency,
+    lasting_frequency,
+    shear_frequency,
+    slowest_frequency,
+)
 from ..scene.modes import tip_modes
-from ..scene.statics import SHAPE_POINTS, locking, lowest_frequency, tip_compliance, tip_inertia, tip_reach
+from ..scene.statics import SHAPE_POINTS, tip_compliance, tip_inertia, tip_reach
 from .elements import EndLoaded
 from .fmu import Fmu, Value
 from .force import combined
 from .functions import DISCARD, OK, WARNING, Failure
 from .protocol import (
     NO_FORCE,
+    Abilities,
     Body,
     BodyFailed,
     Energies,
@@ -38,6 +46,8 @@ from .protocol import (
 _INSTANT = 1e-8
 #: ∫ φ over length and tip value of the lowest mode of a slender beam; one that shears alone has 0.64.
 _MEAN = 0.4
+#: Waves that a smooth motion excites, over the lowest frequency of the beam.
+_SMOOTH_WAVES = 5.0
 #: The numbers by which the beam FMU knows its alternatives.
 _INTEGRATORS = {"modal": 1, "midpoint": 2}
 _MASS_MATRICES = {"consistent": 1, "averaged": 2}
@@ -364,6 +374,8 @@ class FmuBeam(OwnBody):
         ``loads`` say where point forces may act; it rests under them and a tip force ``held_by`` [N] if that is given.
         """
         self._beam = beam
+        if beam.integrator != "modal":  # it sees the mean of a force
+            self.abilities = Abilities(slopes=0)
         self.damping = beam.alpha_b / tip_compliance(beam)
         self.reach = tip_reach(beam)
         self._points = sorted({load.at for load in loads if load.at is not None})
@@ -402,12 +414,24 @@ class FmuBeam(OwnBody):
         return 1.0 / tip_compliance(self._beam)
 
     def oscillation(self, displacement: Any = 0.0) -> tuple[float, float]:
-        omega = lowest_frequency(self._beam) * sqrt(locking(self._beam))
+        omega = slowest_frequency(self._beam)
         return omega, 0.5 * self._beam.alpha_b * omega
 
     def modes(self, displacement: Any = 0.0) -> Modes:
         omega, tip = tip_modes(self._beam)
         return omega**2, self._beam.alpha_b * omega**2, tip
+
+    @property
+    def ringing(self) -> float:  # type: ignore[override]
+        return min(shear_frequency(self._beam), fastest_frequency(self._beam))
+
+    def late_waves(self, rate: float, *, struck: bool) -> float:
+        beam = self._beam
+        if beam.integrator == "modal":
+            return 0.0
+        if struck:
+            return impact_frequency(beam)
+        return min(max(_SMOOTH_WAVES * slowest_frequency(beam), rate), lasting_frequency(beam))
 
     def moved_by(self, load: Load) -> float:
         beam = self._beam

@@ -110,6 +110,9 @@ class Body:
     #: Relative tolerance of the solver of its motion.
     tolerance = 0.0
 
+    #: The fastest wave that an impact excites and that its mesh decides [rad/s], 0 where there is none.
+    ringing = 0.0
+
     @property
     def inertia(self) -> float:
         """Mass [kg] that a force moves which acts for long compared with the waves inside the body."""
@@ -150,6 +153,13 @@ class Body:
         """Return the largest force of a unit ``load`` on a mode, over the mode's displacement of the end.
 
         0 if unknown.
+        """
+        return 0.0
+
+    def late_waves(self, rate: float, *, struck: bool) -> float:
+        """Return the frequency up to which waves count that the body's own steps make late [rad/s], 0 if none are.
+
+        ``rate`` [rad/s] is that of a load on it; ``struck`` says whether something excites its fastest waves.
         """
         return 0.0
 

@@ -11,8 +11,9 @@ from ..monolithic.rows import finished
 from ..motion.events import Event
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError
+from ..scene.frequencies import slowest_frequency
 from ..scene.laws import TransmissionContact
-from ..scene.resolution import not_resolved
+from ..scene.linearised import spring_frequency
 
 #: z at t_c: ``"rest"``, as it is, which is 0 of a spring at rest (section 6); ``"tip"``, the tip's velocity (line 5).
 #: The tip of the semi-discrete beam does not jump, so that this is also the average of eq. (11).
@@ -56,6 +57,19 @@ def steps(scene: Scene) -> Iterator[tuple[float, float]]:
         yield scene.time.t_end, rest
 
 
+def _not_resolved(scene: Scene) -> str | None:
+    """Return in words by how much the slowest oscillation turns in a step; ``None`` if it is at most 1 rad."""
+    assert scene.beam is not None
+    H = scene.coupling.H
+    turn = H * max(slowest_frequency(scene.beam), spring_frequency(scene))
+    if turn <= 1.0:
+        return None
+    return (
+        f"not resolved: the slowest oscillation of a body turns {turn:.3g} rad in a macro step. Velocities, forces and "
+        f"times of events are samples of a faster motion; coupling.macro_step <= {0.95 * H / turn:.1e} s resolves it"
+    )
+
+
 def result(
     scene: Scene,
     columns: dict[str, np.ndarray],
@@ -77,7 +91,7 @@ def result(
         What only one of the two programs can say.
     """
     columns |= {name: np.zeros(len(columns["time"])) for name in ("e_contact", "e_impact_loss")}
-    unresolved = not_resolved(scene)
+    unresolved = _not_resolved(scene)
     warnings = ["Algorithm 1 overwrites the tip's position, which changes the energy by energy_residual"]
     found = finished(scene, columns, shapes, events, {}, EXTRA)
     found.summary = {

@@ -198,7 +198,7 @@ def event_marks(trajectory: Trajectory) -> list[EventMark]:
     return found
 
 
-#: The mark of pictures of a run that is `springbeam.scene.resolution.not_resolved`.
+#: The mark of pictures of a run that is not resolved (`springbeam.run.resolution`).
 NOT_RESOLVED = "NOT RESOLVED by the macro step: see the warnings"
 
 

@@ -8,7 +8,7 @@ What is compared, and what two runs that agree cannot know, is in ``docs/choose.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,13 +21,12 @@ from ..results.dense import at
 from ..results.distance import distance
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, as_scene, with_changes
-from ..scene.frequencies import joined_frequency, lasting_frequency
+from ..scene.frequencies import DIES_OUT
 from ..scene.laws import stiffest
-from ..scene.linearised import contact_energy
-from ..scene.resolution import TURN, slow_oscillations
 from . import runner
 from .ledger import CHANGED
 from .outcome import Progress, RunStopped
+from .resolution import LAW_MISSED, NOT_RESOLVED
 
 #: Fewest and most macro steps of a run.
 _FEWEST, _MOST = 8.0, 50_000
@@ -118,8 +117,8 @@ def pick(scene: Scene) -> Trajectory:
             # Runs that share a step, as from an event to a macro point, agree on its curve whether it is right or not.
             errors["motion"] = max(errors["motion"], fine.summary.get("misplaced_ends", 0.0))
             agrees = _SAFETY * max(errors.values()) <= asked
-            # Where a body turns too far in a step, one more halving shows whether the runs agreed by chance.
-            if agrees and (agreed or fine.summary["resolved"]):
+            # A run with doubts that are not in the estimate needs one more halving: the runs may agree by chance.
+            if agrees and (agreed or not _doubts(fine)):
                 return _with_errors(fine, asked, errors, pilots)
             agreed = agrees
         pilots.append(fine)
@@ -183,35 +182,45 @@ def _peak_beside_law(run: Trajectory) -> float:
 def _first(scene: Scene) -> float:
     """Return the number of macro steps of the first run.
 
-    It is half as many as a run needs that calls itself resolved; of joined ends fewer for a loose accuracy, by the
+    It is half as many as a run needs that calls itself resolved; with joined ends fewer for a loose accuracy, by the
     order of their error: else the first run would have steps far smaller than it needs.
     """
-    rates = [omega / TURN for _, omega, _ in slow_oscillations(scene)]
-    if scene.beam is not None and not scene.partners:
-        if scene.massless:
-            rates.append(joined_frequency(scene) / _CONTACT_TURN)
-        elif scene.coupled and not scene.contact.rigid:
-            rates.append(_contact_frequency(scene) / _CONTACT_TURN)
-        elif scene.coupled or scene.stop is not None:
-            rates.append(lasting_frequency(scene.beam) / _WAVE_TURN)
-    steps = 0.5 * max(rates, default=0.0) * scene.duration
+    bodies = [body for body in load_bodies(scene, scene.contact_time or 0.0, scene.degree) if body is not None]
+    try:
+        fastest = max([*_rates(scene, bodies), *(load.rate for load in scene.loads)], default=0.0)
+    finally:
+        for body in bodies:
+            body.close()
+    steps = 0.5 * fastest * scene.duration
     assert scene.accuracy is not None
     if scene.coupled:
         steps *= float(_SHARP / max(scene.accuracy, _SHARP)) ** (1.0 / _ORDER)
     return max(_FEWEST, math.ceil(steps))
 
 
-def _contact_frequency(scene: Scene) -> float:
-    """Return √(k (1/m_tip + 1/m)) of beam and spring on a soft law [rad/s], where it is stiffest."""
-    law = scene.soft_law
-    assert law is not None
-    stiffness = stiffest(law, contact_energy(scene))
-    bodies = [body for body in load_bodies(scene, scene.contact_time or 0.0, scene.degree) if body is not None]
-    try:
-        return math.sqrt(stiffness * sum(1.0 / body.mass for body in bodies))
-    finally:
-        for body in bodies:
-            body.close()
+def _rates(scene: Scene, bodies: Sequence[Body]) -> Iterator[float]:
+    """Yield the frequencies that macro steps follow [rad/s], each over the angle that it may turn in one."""
+    for body in bodies:
+        omega, ratio = body.oscillation() or (0.0, 0.0)
+        if ratio < 1.0:
+            yield omega
+    known = [body.stiffness(body.motion().displacement) for body in bodies]
+    if None in known:
+        return
+    if (law := scene.soft_law) is not None:
+        stored = [sum(body.energies()[:2]) for body in bodies]
+        yield math.sqrt(stiffest(law, sum(stored)) * sum(1.0 / body.inertia for body in bodies)) / _CONTACT_TURN
+    elif bodies[0].massless:
+        yield math.sqrt(sum(known) / bodies[-1].mass) / _CONTACT_TURN if len(bodies) > 1 else 0.0
+    elif scene.coupled or scene.stop is not None:
+        yield _lasting(bodies[0]) / _WAVE_TURN
+
+
+def _lasting(body: Body) -> float:
+    """Return the highest frequency of a body whose waves do not die out at once [rad/s]."""
+    stiffness, damping, _ = body.modes() or (np.zeros(1), np.zeros(1), None)
+    omega = np.sqrt(np.maximum(stiffness, 0.0))
+    return float(np.max(omega[damping <= DIES_OUT * omega], initial=0.0))
 
 
 def _prepared(scene: Scene, macro_step: float) -> Scene:
@@ -243,6 +252,21 @@ def _with_errors(run: Trajectory, asked: float, errors: dict[str, float], pilots
         "pilot_steps": sum(pilot.do_steps for pilot in pilots),
         "pilot_time": sum(float(pilot.summary["wall_time"]) for pilot in pilots),
     }
-    warnings = [warning for warning in run.summary["warnings"] if CHANGED not in warning]
-    resolved = not any(warning.startswith("not resolved") for warning in warnings)
-    return replace(run, summary={**run.summary, "accuracy": accuracy, "warnings": warnings, "resolved": resolved})
+    warnings = [warning for warning in run.summary["warnings"] if not _settled(warning)]
+    return replace(
+        run, summary={**run.summary, "accuracy": accuracy, "warnings": warnings, "resolved": not _doubts(run)}
+    )
+
+
+def _doubts(run: Trajectory) -> list[str]:
+    """Return why ``run`` is not resolved, without what runs that agree settle."""
+    unresolved = (warning for warning in run.summary["warnings"] if warning.startswith(NOT_RESOLVED))
+    return [warning for warning in unresolved if not _settled(warning)]
+
+
+def _settled(warning: str) -> bool:
+    """Return whether runs that agree settle ``warning``: of changed energy, and of forces that differ from the law.
+
+    How far these misplace an end is part of the estimate of the error.
+    """
+    return CHANGED in warning or LAW_MISSED in warning

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 from ..results.contradictions import contradictions
+from ..results.dense import between_rows
 from ..results.recording import Recorder
 from ..results.totals import totals
 from ..scene import Scene
-from ..scene.resolution import peak_force_doubt
 from .master import Master
 from .misplaced import misplaced
-from .observed import coarse_force, force_window, not_shown, unknown, why_not_resolved
+from .observed import coarse_force, force_window, not_shown, unknown
+from .resolution import peak_force_doubt, why_not_resolved
 
 _SHORTER = "take a shorter macro step that is not a whole period of a body"
 
@@ -27,10 +28,10 @@ def summary(scene: Scene, master: Master, recorder: Recorder) -> dict[str, Any]:
     made = int(np.count_nonzero(np.diff(steps["time"])))
     energies, warnings, changed = master.balance.report(steps)
     off = misplaced(pair, steps, events)
-    unresolved = why_not_resolved(scene, pair, steps, off)
-    warnings += filter(None, [unresolved or peak_force_doubt(scene), not_shown(scene, pair, steps)])
-    warnings += filter(None, [unknown(scene, pair), coarse_force(pair)])
+    unresolved = why_not_resolved(pair, steps, off or 0.0, between_rows(scene, steps))
     window = force_window(scene, pair, steps)
+    warnings += filter(None, [unresolved or peak_force_doubt(pair, window), not_shown(scene, pair, steps)])
+    warnings += filter(None, [unknown(scene, pair), coarse_force(pair)])
     amounts = totals(scene, steps, events, window) if len(steps) else {}
     ruled_out = contradictions(scene, steps, events, amounts.get("contact_duration_total", 0.0))
     warnings += [f"not resolved: {what}: an event was missed; {_SHORTER}" for what in ruled_out]

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from math import pi, sqrt
 
-from .linearised import spring_stiffness
-from .scene import Scene
-from .statics import bending_stiffness, locking, lowest_frequency, tip_compliance
+from .statics import bending_stiffness, locking, lowest_frequency
 from .tables import Beam
 
 #: ω α_b above which waves die out within two periods and need no resolution.
@@ -19,15 +17,6 @@ DIES_OUT = 0.15
 def slowest_frequency(beam: Beam) -> float:
     """Return the lowest frequency of the beam, with its tip free [rad/s]."""
     return lowest_frequency(beam) * sqrt(locking(beam))
-
-
-def joined_frequency(scene: Scene) -> float:
-    """Return the frequency of the spring and a beam without inertia together [rad/s]; 0 if none holds the mass."""
-    beam = scene.beam
-    spring = scene.spring
-    if beam is None or spring is None:
-        return 0.0
-    return sqrt(max(spring_stiffness(scene) + 1.0 / tip_compliance(beam), 0.0) / spring.mass)
 
 
 def impact_frequency(beam: Beam) -> float:

@@ -15,9 +15,9 @@ from ...results.trajectory import Trajectory
 from ...run.accuracy import pick
 from ...run.ledger import EXACT, bounds
 from ...run.outcome import RunStopped
+from ...run.resolution import MESH_DECIDES
 from ...run.runner import Simulation
 from ...scene import Scene, SceneError
-from ...scene.resolution import peak_force_doubt
 from ...scene.suspicions import suspicions
 from ..comparison import perturbed
 from ..tables import Row
@@ -160,8 +160,8 @@ def judged(run: Trajectory, cause: str = "", reference: Reference | None = None)
 
 def warns(run: Trajectory) -> bool:
     """Return whether ``run`` is not resolved, or has a warning that its computation gave."""
-    of_scene = {*suspicions(run.scene), peak_force_doubt(run.scene)}
-    return not run.summary["resolved"] or not of_scene.issuperset(run.summary["warnings"])
+    others = set(run.summary["warnings"]).difference(suspicions(run.scene))
+    return not run.summary["resolved"] or any(not text.startswith(MESH_DECIDES) for text in others)
 
 
 def _errors(run: Trajectory, reference: Reference, warned: bool) -> Row:
