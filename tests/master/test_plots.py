@@ -45,10 +45,9 @@ def test_a_run_that_stopped_at_once_is_drawn_from_its_second_row_on(tmp_path, un
     assert [path.name for path in plot_run(short, tmp_path, PICTURES)] == drawn
 
 
-@pytest.mark.parametrize("columns", ODD_COLUMNS.values(), ids=ODD_COLUMNS)
-def test_odd_columns_are_drawn_without_a_warning(tmp_path, recwarn, monkeypatch, columns):
+def test_odd_columns_are_drawn_without_a_warning(tmp_path, recwarn, monkeypatch):
     monkeypatch.setattr(plots, "DPI", 40)
-    for path in plot_run(a_trajectory(events=EVERY_EVENT, **columns), tmp_path, PICTURES):
+    for path in plot_run(a_trajectory(events=EVERY_EVENT, **ODD_COLUMNS), tmp_path, PICTURES):
         assert imread(path)[..., :3].std() > 0.02  # not blank
     assert [str(warning.message) for warning in recwarn] == []
 
