@@ -35,7 +35,7 @@ def scene_from_dict(tables):
 
 def table(name):
     """Return a table of this folder."""
-    return tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+    return tomllib.loads((Path(__file__).parent / name).read_text(encoding="utf-8"))
 
 
 TABLE = table("scenes.toml")

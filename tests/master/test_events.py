@@ -6,6 +6,7 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 from bodies import DuffingBody, Upper, interface_of
+from scenes import table
 
 from springbeam.bodies.protocol import NO_FORCE, Motion, StepRefused
 from springbeam.contact.events import locate, no_dip, position_tolerance
@@ -71,53 +72,20 @@ def test_locate_does_not_take_a_zero_that_the_function_rises_from(below):
     assert located(f, math.pi, 1e-14, 0.0) == pytest.approx(0.5 * math.pi, abs=1e-14)
 
 
-#: A tip of 10 g rises by 1 m/s above a lower end of 1 kg that rises by 0.5 m/s: together they rise by TOGETHER.
-RISING, TOGETHER = (Motion(0.3, 1.0, 0.0, 0.0), Motion(0.2, 0.5, 0.0, 0.0)), 0.51 / 1.01
-SOFTLY = {"contact": {"law": "compliance", "stiffness": 1e4, "exponent": 1.5}}
-MEETS, STRIKES = {"impact": (0.1, 0.5)}, {"stop_impact": (0.215, 0.5)}
-STRIKE_TOGETHER, RETIED = {"stop_impact": (0.215, TOGETHER)}, {"retie": (0.1, TOGETHER)}
+RISING = (Motion(0.3, 1.0, 0.0, 0.0), Motion(0.2, 0.5, 0.0, 0.0))
+HAPPENS = table("master/cases.toml")["happens"]
 
 
-@pytest.mark.parametrize(("scene", "tables", "phase", "expected"), [
-    ("soft", {}, Phase(), MEETS | STRIKES),
-    ("soft", {}, Phase(Joint.TIED), {"release": (-0.1, -TOGETHER)} | STRIKE_TOGETHER),
-    ("soft", {}, Phase(Joint.TOUCH), RETIED | STRIKE_TOGETHER),
-    ("soft", {}, Phase(seated=True), MEETS),
-    ("soft", {}, Phase(Joint.TIED, seated=True), {}),
-    ("soft", {}, Phase(Joint.TOUCH, seated=True), RETIED),
-    ("soft", {"beam": {"fidelity": "quasi_static"}}, Phase(Joint.TOUCH, seated=True), RETIED),
-    ("soft", {"contact": {"law": "tie"}}, Phase(Joint.TIED), STRIKE_TOGETHER),
-    ("soft", SOFTLY, Phase(Joint.TOUCH), STRIKES),
-    ("beam-on-stop", {}, Phase(), {"stop_impact": (0.315, 1.0)}),
-    ("beam-on-stop", {}, Phase(Joint.TIED, seated=True), {}),
-    ("beam-on-stop", SOFTLY | {"stop": {"restitution": 1.0}}, Phase(), {}),
-])  # fmt: skip
-def test_what_may_happen_in_a_phase_is_as_far_away_as_it_is_and_comes_as_fast_as_the_ends(
-    scene, tables, phase, expected
-):
+@pytest.mark.parametrize("name", HAPPENS)
+def test_what_may_happen_in_a_phase_is_as_far_away_as_it_is_and_comes_as_fast_as_the_ends(name):
     """Ψ is at 0.1 m, the stop at −15 mm; joined ends move with the velocity of their momentum."""
-    scene = with_changes(load_scene(scene), **tables)
-    automaton = Automaton(interface_of(scene, equilibrium=0.1))
+    changes = dict(HAPPENS[name])
+    scene, expected = load_scene(changes.pop("of")), changes.pop("expected")
+    phase = Phase(Joint(changes.pop("joint")), changes.pop("seated", False))
+    automaton = Automaton(interface_of(with_changes(scene, **changes), equilibrium=0.1))
     samples = automaton.samples(phase, RISING)
     found = dict(zip((kind for kind, _ in automaton.guards(phase).functions), samples, strict=True))
-    assert found == {kind: pytest.approx(sample, rel=1e-14) for kind, sample in expected.items()}
-
-
-@pytest.mark.parametrize(("scene", "tables", "phase", "expected"), [
-    ("soft", {}, Phase(), None),
-    ("soft", {}, Phase(Joint.TIED), None),
-    ("soft", {}, Phase(Joint.TOUCH), ("separation", "contact")),
-    ("soft", {"contact": {"law": "tie"}}, Phase(Joint.TIED), None),
-    ("soft", SOFTLY, Phase(Joint.TOUCH), None),
-    *(("soft", {}, Phase(joint, seated=True), ("unseated", "foundation")) for joint in Joint),
-    ("soft", SOFTLY, Phase(Joint.TOUCH, seated=True), ("unseated", "foundation")),
-    ("beam-on-stop", {}, Phase(), None),
-    ("beam-on-stop", {}, Phase(Joint.TIED, seated=True), ("separation", "contact")),
-])  # fmt: skip
-def test_a_phase_that_lasts_while_a_force_pushes(scene, tables, phase, expected):
-    """A seated top is left first: while the foundation holds it, a tip that touches it is not looked at."""
-    interface = interface_of(with_changes(load_scene(scene), **tables), equilibrium=0.1)
-    assert Automaton(interface).guards(phase).force == expected
+    assert found == {kind: pytest.approx(tuple(sample), rel=1e-14) for kind, sample in expected.items()}
 
 
 @pytest.mark.parametrize(("rate", "fastest", "stays"), [(0.0, 0.9, True), (0.0, 1.1, False), (5.0, 0.9, False)])

@@ -7,34 +7,14 @@ import numpy as np
 import pytest
 from bodies import simulate
 from references import integrated_anew
-from scenes import load_of, scene_from_dict
+from scenes import load_of, scene_from_dict, table
 
 from springbeam.bodies import force
 from springbeam.run.loads import Signal
 from springbeam.scene import SceneError, load_scene, with_changes
 
 RECORD = np.column_stack([np.linspace(0.0, 0.05, 26), 3.0 * np.sin(200.0 * np.linspace(0.0, 0.05, 26))])
-#: One of each signal, on all places.
-SIGNALS = {
-    "constant": {"on": "spring", "amplitude": -2.0},
-    "harmonic": {"on": "base", "signal": "harmonic", "frequency": 12.0, "amplitude": 5.0, "phase": 0.3},
-    "burst": {"on": "tip", "signal": "harmonic", "frequency": 50.0, "start": 0.0127, "duration": 0.031},
-    "pulse": {"on": "tip", "signal": "half_sine", "start": 0.0103, "duration": 0.02, "amplitude": 3.0},
-    "step": {"on": "beam", "at": 0.37, "signal": "step", "start": 0.02, "duration": 0.0123, "amplitude": -2.0},
-    "ramp": {"on": "beam", "shape": [1.0, -2.0, 0.5, 0.3], "signal": "ramp", "start": 0.004, "duration": 0.01},
-    "chirp": {
-        "on": "tip",
-        "signal": "chirp",
-        "frequency": 70.0,
-        "frequency_end": 20.0,
-        "start": 0.01,
-        "duration": 0.04,
-    },
-    "sawtooth": {"on": "spring", "signal": "sawtooth", "start": 0.0103, "duration": 0.02, "amplitude": 3.0},
-    "trapezoid": {"on": "tip", "signal": "trapezoid", "start": 0.01, "duration": 0.02, "rise": 0.003, "amplitude": 3.0},
-    "linear": {"on": "spring", "signal": "table", "file": "record.csv", "start": 0.002},
-    "cubic": {"on": "tip", "signal": "table", "file": "record.csv", "interpolation": "cubic"},
-}
+SIGNALS = table("master/cases.toml")["signals"]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
 
 

@@ -45,26 +45,14 @@ def test_accepted_and_unchanged_by_a_round_trip(data):
     assert scene_from_dict(scene.model_dump(exclude_none=True)) == scene
 
 
-@pytest.mark.parametrize(
-    ("changes", "expected"),
-    [
-        ({}, 0.0),
-        ({"beam": {"initial_deflection_slope": 0.5}}, 0.5),
-        ({"beam": {"initial_deflection_slope": 0.5, "initial_velocity_slope": -2.0, "length": 3.0}}, 0.25),
-        ({"spring": None}, 0.015),
-        ({"beam": {"approach": "elastic"}}, None),
-        ({"beam": None}, None),
-        ({"spring": None, "stop": None}, None),
-        # 0.1·0.7 < 0.07 in doubles: only rounding parts tip and spring.
-        ({"beam": {"initial_deflection_slope": 0.1, "length": 0.7}, "spring": {"equilibrium": 0.07}}, 0.0),
-        ({"beam": {"initial_velocity_slope": 0.0}}, 0.0),
-        # Joined from the start, wherever the ends are and move.
-        ({"contact": {"law": "link"}, "beam": {"initial_deflection_slope": 0.5}}, None),
-        ({"contact": {"law": "tie"}, "beam": {"initial_velocity_slope": 1.0}}, None),
-    ],
-)
-def test_contact_time_of_the_undeformed_approach(changes, expected):
+ARRIVALS = scenes.table("master/cases.toml")["arrivals"]
+
+
+@pytest.mark.parametrize("name", ARRIVALS)
+def test_contact_time_of_the_undeformed_approach(name):
     """t_c = (Ψ/L − s₀)/s₁ of u = (s₀ + s₁ t) x; Ψ is φ without a spring."""
+    changes = without_false(ARRIVALS[name])
+    expected = changes.pop("at", None)
     t_c = scene_from_dict(changed(**changes)).contact_time
     assert t_c == (None if expected is None else pytest.approx(expected, rel=1e-14))
 
