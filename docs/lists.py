@@ -68,8 +68,9 @@ def words() -> list[str]:
 
 def phases() -> list[str]:
     rows = []
+    seats: dict[tuple[bool, ...], list[str]] = {(True,): ["*seated*"], (False,): ["not *seated*"]}
     for row in TRANSITIONS:
-        seat = {(True,): ["*seated*"], (False,): ["not *seated*"]}.get(row.seated, [])
+        seat = seats.get(row.seated, [])
         phase = ", ".join([*([] if row.joint is None else [f"*{row.joint}*"]), *seat])
         said = [" ".join((part.__doc__ or "").split()).rstrip(".") for part in (row.guard, row.effect)]
         rows.append((WHERE[row.where], phase, said[0], f"`{row.kind}`", said[1]))

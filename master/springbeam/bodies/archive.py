@@ -1,6 +1,6 @@
-"""FMU files: where they are, and how archives that others made are unpacked so that nothing leaves their folder.
+"""FMU files: find them, and unpack archives of others safely inside their folder.
 
-What is unpacked is kept for later processes in ``$XDG_CACHE_HOME/springbeam/fmus`` (default: ``~/.cache``), by the hash
+Unpacked files are kept for later processes in ``$XDG_CACHE_HOME/springbeam/fmus`` (default: ``~/.cache``), by the hash
 of the archive. An entry appears there whole or not at all, and is never changed.
 """
 
@@ -26,12 +26,12 @@ MOST_BYTES = 1 << 31
 MOST_MEMBERS = 10_000
 #: Parts that mean no other folder on any system, between slashes.
 _PLAIN = re.compile(r"(?:(?!\.{1,2}(?:/|$))[^/\\:\x00-\x1f]+(?:/|$))+")
-#: What a running FMU may use beside the binaries of this platform. The sources of the beam, with Eigen's, are 300
-#: files: they would take most of the time.
+#: Folders that a running FMU may use in addition to the binaries of this platform. The sources of the beam, with
+#: Eigen's, are 300 files, which would take most of the time.
 _USED = ("modelDescription.xml", "resources/")
 _BINARIES = "binaries/"
 _EXECUTABLE = 0o111
-#: What the names of our FMUs end with, by version of FMI.
+#: Endings of the names of our FMUs, by version of FMI.
 ENDINGS = {"2.0": "", "3.0": "3"}
 #: Entries of the cache that nobody has used for so long go [s].
 _KEPT_FOR = 30 * 24 * 3600.0
@@ -39,7 +39,7 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def fmu_directory() -> Path:
-    """Return where our FMUs are: $SPRINGBEAM_FMUS, the installed package, or the checkout."""
+    """Return the folder of our FMUs: $SPRINGBEAM_FMUS, the installed package, or the checkout."""
     chosen = os.environ.get("SPRINGBEAM_FMUS")
     if chosen:
         return Path(chosen)
@@ -65,10 +65,10 @@ class UnsafeArchive(ValueError):
 
 
 def unpacked(path: Path, platforms: tuple[str, ...], check: Callable[[Path], object], *, alone: bool = False) -> Path:
-    """Return a folder with what a run needs of the FMU ``path``: that of the cache, or a temporary one.
+    """Return a folder with the files of the FMU ``path`` that a run needs: that of the cache, or a temporary one.
 
-    The temporary one is for where the cache cannot be used, and if the folder must be this process's ``alone``.
-    ``check`` gets what has just been unpacked, and raises what is wrong with it. Raises what `unpack` and ``check`` do.
+    It is temporary if the cache cannot be used, or if only this process may use it (``alone``). ``check`` gets the
+    folder just unpacked, and raises if it is wrong. Raises the errors of `unpack` and ``check``.
     """
     if not alone:
         with suppress(OSError):
@@ -81,7 +81,7 @@ def unpacked(path: Path, platforms: tuple[str, ...], check: Callable[[Path], obj
 
 
 def _kept(path: Path, platforms: tuple[str, ...], check: Callable[[Path], object]) -> Path:
-    """Return the folder of the cache, made if it is not there. Raises OSError if the cache cannot be used."""
+    """Return the folder of the cache, made if missing. Raises OSError if the cache cannot be used."""
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser(), "springbeam", "fmus")
     entry = cache / sha256(path.read_bytes()).hexdigest()
     if not entry.exists():
@@ -106,15 +106,15 @@ def _kept(path: Path, platforms: tuple[str, ...], check: Callable[[Path], object
 
 
 def unpack(path: Path, folder: Path, platforms: tuple[str, ...]) -> None:
-    """Unpack what a run needs of the FMU ``path`` into ``folder``; links and devices become plain files.
+    """Unpack the files of the FMU ``path`` that a run needs into ``folder``; links and devices become plain files.
 
     ``platforms`` are the names of this platform's folders of binaries.
 
     Raises
     ------
     UnsafeArchive
-        If a member's name leads elsewhere than into ``folder`` on some system, or if what a run needs is too large;
-        nothing is unpacked then.
+        If a member's name leads out of ``folder`` on some system, or if the needed files are too large; nothing is
+        unpacked then.
     ValueError
         If there are binaries, but none for this platform.
     zipfile.BadZipFile, RuntimeError
@@ -131,7 +131,7 @@ def unpack(path: Path, folder: Path, platforms: tuple[str, ...]) -> None:
 
 
 def _used(archive: zipfile.ZipFile, platforms: tuple[str, ...]) -> list[zipfile.ZipInfo]:
-    """Return the members that a run needs. Raises what `unpack` says."""
+    """Return the members that a run needs. Raises as `unpack`."""
     members = archive.infolist()
     if len(members) > MOST_MEMBERS:
         raise UnsafeArchive(f"{len(members)} members, at most {MOST_MEMBERS} are allowed; pack fewer files")

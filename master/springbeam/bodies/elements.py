@@ -1,8 +1,8 @@
 """Simple partners that need no FMU: a free mass, a mass on a linear spring and damper, an end that moves as prescribed.
 
 They fit in either place. Each step of a mass is exact: the state with the polynomial force and the integrals is one
-linear system, s = (x, ẋ, F, Ḟ, F̈, ∫x, ∫∫x), ṡ = A s, stepped by exp(A H). Damping takes what the forces do and the
-body does not store.
+linear system, s = (x, ẋ, F, Ḟ, F̈, ∫x, ∫∫x), ṡ = A s, stepped by exp(A H). Dissipation is the work of the forces
+minus the stored energy.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class EndLoaded(Body):
 
 
 class MassState(NamedTuple):
-    """What changes of a mass."""
+    """State of a mass."""
 
     motion: Motion
     dissipated: float = 0.0  #: so far [J]
@@ -60,7 +60,7 @@ class SpringDamper(EndLoaded):
     external_force
         f, constant, upward [N].
 
-    Raises ValueError for a mass or a damping that cannot be.
+    Raises ValueError for an impossible mass or damping.
     """
 
     state: MassState
@@ -107,7 +107,7 @@ class SpringDamper(EndLoaded):
 
     def _map(self, size: float) -> np.ndarray:
         """Return the rows of exp(A H) of x, ẋ, ∫x, ∫∫x, shape (4, 7)."""
-        from scipy.linalg import expm  # takes a tenth of a second to load: only for who has such a body
+        from scipy.linalg import expm  # takes a tenth of a second to load: only for such a body
 
         A = np.zeros((7, 7))
         A[0, 1] = A[2, 3] = A[3, 4] = A[5, 0] = A[6, 5] = 1.0
@@ -152,7 +152,7 @@ class PointMass(SpringDamper):
 
 
 class Prescribed(Body):
-    """An end that moves as told, whatever acts on it: a driving body, seen from the driven one."""
+    """An end with a prescribed motion under any force: a driving body."""
 
     mass = float("inf")
     damping = 0.0

@@ -12,7 +12,7 @@ from .factory import load_bodies, top_at_rest
 
 
 def contact_at_rest(scene: Scene, degree: int, law: Callable[[float], float] | None) -> float:
-    """Return the contact force C [N] under which the bodies of ``scene`` start at rest; 0 where they do not touch.
+    """Return the contact force C [N] under which the bodies of ``scene`` start at rest; 0 if they do not touch.
 
     The upper end is linear, u = u₀ + c C with the c of its mesh; C satisfies the law, or closes the gap of a rigid one.
 
@@ -23,17 +23,17 @@ def contact_at_rest(scene: Scene, degree: int, law: Callable[[float], float] | N
     law
         C [N] of a soft law at a penetration [m].
 
-    Raises SceneError where the spring rests nowhere, FmuError.
+    Raises SceneError if the spring has no equilibrium, FmuError.
     """
     if not scene.static or scene.upper is None or (scene.lower is None and scene.stop is None):
         return 0.0
-    from scipy.optimize import brentq  # takes a tenth of a second to load: only for who starts at rest
+    from scipy.optimize import brentq  # takes a tenth of a second to load: only for a start at rest
 
     free = _tip(scene, degree, 0.0)
     deep = top_at_rest(scene, 0.0) - free
     if deep == 0.0 or (deep < 0.0 and not scene.contact.lasting):
         return 0.0
-    # What would close the gap, were the lower end rigid; a wall above does not move, and any force will do.
+    # The force that closes the gap to a rigid lower end; for a wall above any force will do.
     scale = deep
     if scene.beam is not None:
         scale /= tip_compliance(scene.beam)

@@ -29,7 +29,7 @@ def load_bodies(scene: Scene, start_time: float, degree: int, contact: float = 0
     Raises
     ------
     FmuError
-        If an FMU cannot be found or loaded, or a foreign one does not do what it or the scene says.
+        If an FMU cannot be found or loaded, or a foreign one contradicts its declarations or the scene.
     """
     found = findings(scene)
     faults = [fault for finding in found.values() for fault in finding.faults]
@@ -85,9 +85,9 @@ def _massless_beam(scene: Scene, spec: Beam, start_time: float, degree: int, con
 
 
 def top_at_rest(scene: Scene, contact: float) -> float:
-    """Return where what lies below the upper end rests under ``contact`` [N]: a spring, a wall or a stop [m].
+    """Return the equilibrium [m] of the lower end under ``contact`` [N]: of a spring, a wall or a stop.
 
-    A spring that would rest below the stop rests on it. Raises SceneError where the spring rests nowhere.
+    A spring that would rest below the stop rests on it. Raises SceneError if the spring has no equilibrium.
     """
     floor = -inf if scene.stop is None else scene.stop.position
     if isinstance(scene.lower, SpringDamperElement):
@@ -101,26 +101,26 @@ def top_at_rest(scene: Scene, contact: float) -> float:
         return floor
     if height is None:
         raise SceneError(
-            f'[time] initial_state = "static": under {force:.6g} N the spring rests nowhere; use a stiffer one, or a '
-            "smaller load"
+            f'[time] initial_state = "static": no equilibrium of the spring under {force:.6g} N; use a stiffer one, '
+            "or a smaller load"
         )
     return height
 
 
 def _element_at_rest(scene: Scene, body: SpringDamperElement, force: float) -> float:
-    """Return where a mass on a linear spring rests under its loads and an upward ``force`` [N] on its end [m]."""
+    """Return the equilibrium [m] of a mass on a linear spring under its loads and an upward ``force`` [N]."""
     force += body.external_force + _load_at_start(scene, "tip" if body is scene.upper else "spring", body.mass)
     return body.rest + force / body.stiffness
 
 
 def _load_at_start(scene: Scene, end: str, mass: float) -> float:
-    """Return what the loads at t = 0 are on an ``end`` with a mass, upward [N]."""
+    """Return the upward force [N] of the loads at t = 0 on an ``end`` with a mass."""
     shares = {end: 1.0, "base": -mass}
     return sum(shares.get(load.on, 0.0) * float(load.value(0.0)) for load in scene.loads)
 
 
 def findings(scene: Scene) -> dict[str, Findings]:
-    """Examine the foreign FMUs of ``scene`` (`springbeam.bodies.probe`), by table. Raises FmuError."""
+    """Check the foreign FMUs of ``scene`` (`springbeam.bodies.probe`), by table. Raises FmuError."""
     H = scene.coupling.macro_step or 1e-3 * scene.time.t_end
     times = 0.0, scene.time.t_end
     return {table: examined(spec, table == "beam", times, H) for table, spec in scene.foreign.items()}

@@ -1,7 +1,7 @@
 """One instance of a co-simulation FMU and its state.
 
-FMPy does what is done once. It looks at each argument of each call, which takes as long as the call: what a step calls
-is bound to its arguments here, and `advance.cpp` makes the calls of one advance together.
+FMPy makes the calls outside of steps. It checks each argument of each call, which takes as long as the call: the calls
+of a step are bound to their arguments here, and `advance.cpp` makes those of one advance together.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from .units import Unit, unit_of
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 
 
-#: How many instances of a file have returned fmi2Fatal in this process.
+#: Number of instances of a file that have returned fmi2Fatal in this process.
 _fatal: Counter[Path] = Counter()
 
 
 @lru_cache(maxsize=8)
 def _opened(path: Path, modified: int, fatal: int) -> tuple[ModelDescription, FMU2 | FMU3]:
-    """Return what the FMU at ``path`` says of itself, and its library. Raises FmuError.
+    """Return the description of the FMU at ``path``, and its library. Raises FmuError.
 
-    Where there are ``fatal`` instances, the library is another copy, for none of theirs may be called again.
+    After ``fatal`` instances the library is another copy, because theirs must not be called again.
     """
     try:
         folder = unpacked(path, PLATFORMS, _check_description, alone=fatal > 0)
@@ -59,7 +59,7 @@ def _opened(path: Path, modified: int, fatal: int) -> tuple[ModelDescription, FM
 
 
 def _check_description(folder: Path) -> None:
-    """Raise what is wrong with the modelDescription.xml in ``folder``.
+    """Raise an error if the modelDescription.xml in ``folder`` is invalid.
 
     UnsafeArchive if it has a document type: its entities may name files; FMI's schema has none.
     """
@@ -185,7 +185,7 @@ class Fmu:
             raise FmuError(f"{self.path}: {what}: {error}") from None
 
     def _give(self, name: str, value: Value) -> None:
-        """Take the value of a parameter or a start value. Raises FmuError for one that cannot be set."""
+        """Note the value of a parameter or a start value. Raises FmuError if it cannot be set."""
         variable = self.variable(name)
         if variable.variability == "constant":
             raise FmuError(f"{self.path}: variable {name!r} is constant, not a parameter")
@@ -214,7 +214,7 @@ class Fmu:
         return self._asked("cannot be used", self._slave.dll.__getitem__, self._slave.PREFIX + name)
 
     def bound(self, name: str, *arguments: Any) -> Call:
-        """Return a function with its arguments, which are converted once; what is given by `byref` stays where it is.
+        """Return a function with its arguments, which are converted once; those by `byref` keep their address.
 
         Raises FmuError if the library lacks it.
         """
@@ -223,13 +223,13 @@ class Fmu:
         return partial(function, c_void_p.from_param(self._slave.component), *arguments)
 
     def of_state(self, *, of_trial: bool = False) -> tuple[Call, Call]:
-        """Return what saves the state and what restores it: that of the mark, or that before a trial step."""
+        """Return the functions that save and restore the state: that of the mark, or that before a trial step."""
         name = self._slave.STATE
         state = self._before_trial if of_trial else self._state
         return self.bound(f"Get{name}", byref(state)), self.bound(f"Set{name}", state)
 
     def reading(self, names: Sequence[str], size: int = 1) -> Callable[[], tuple[float, ...]]:
-        """Return what reads variables of ``size`` real numbers each; it has read them once.
+        """Return a function that reads variables of ``size`` real numbers each; it has read them once.
 
         The arguments are converted to C once. Raises FmuError for a variable that cannot be read.
         """
@@ -251,10 +251,10 @@ class Fmu:
     def advancing(
         self, inputs: Sequence[str], impulse: Sequence[str], slopes: int, outputs: Sequence[str], always: bool
     ) -> tuple[Call, Any, Any]:
-        """Return what makes an advance, and the arrays of C from which it takes what is given, and where it tells.
+        """Return a function that makes an advance, and the C arrays of its arguments and of its results.
 
-        Given are time, size, the inputs, the ``impulse`` if it has one, and derivatives 1 … ``slopes`` of each input,
-        those of one after another. An advance returns 0, or what `Failure` says.
+        Arguments are time, size, the inputs, the ``impulse`` if it has one, and derivatives 1 … ``slopes`` of each
+        input, one input after another. An advance returns 0 or a `Failure`.
         """
         slave = self._slave
         each = [(name, order) for name in inputs for order in range(1, slopes + 1)]
@@ -278,7 +278,7 @@ class Fmu:
 
     @property
     def variables(self) -> list[Any]:
-        """What the FMU says of its variables."""
+        """Descriptions of the variables of the FMU."""
         return list(self._variables.values())
 
     def unit(self, name: str, key: str) -> Unit:
@@ -291,7 +291,7 @@ class Fmu:
             raise FmuError(f"{self.path}: variable {name!r} {error}; it is the scene's {key}") from None
 
     def variable(self, name: str) -> Any:
-        """Return what the FMU says of a variable. Raises FmuError if it has none of this name."""
+        """Return the description of a variable. Raises FmuError if there is none of this name."""
         try:
             return self._variables[name]
         except KeyError:
@@ -300,7 +300,7 @@ class Fmu:
             raise FmuError(f"{self.path}: has no variable {name!r}{meant}") from None
 
     def real(self, name: str) -> Any:
-        """Return what the FMU says of a real variable. Raises FmuError if it is none."""
+        """Return the description of a real variable. Raises FmuError if it is of another type."""
         self._references([name], self._slave.REAL)
         return self.variable(name)
 
@@ -313,7 +313,7 @@ class Fmu:
                 raise FmuError(f"{self.path}: variable {name!r} is an array; only single numbers can be used")
         return (c_uint * len(names))(*[int(self.variable(name).valueReference) for name in names])
 
-    # -- what went wrong -----------------------------------------------------------------------------------------------
+    # -- errors --------------------------------------------------------------------------------------------------------
 
     def refuse(self, status: int, time: float, otherwise: str = "") -> NoReturn:
         """Raise StepRefused, or FmuError, for a step from ``time`` [s] that has returned ``status``."""
@@ -359,7 +359,7 @@ class Fmu:
 
     @property
     def faultless(self) -> bool:
-        """Whether every call so far did what it was asked for."""
+        """Whether every call so far has succeeded."""
         return not self._closed and self._worst <= WARNING
 
     def give_back(self) -> None:
@@ -389,7 +389,7 @@ class Fmu:
 
 #: Most instances that are kept: those of two scenes.
 MOST_KEPT = 4
-#: Instances that were given back, by what they were made of; the last one was given back last.
+#: Returned instances, by their name and parameters; the last one was returned last.
 _kept: dict[Hashable, Fmu] = {}
 
 

@@ -1,7 +1,4 @@
-"""The port through which a run uses an FMU, and our two FMUs as bodies.
-
-One module, though longer than others: every step of a run passes through all of it.
-"""
+"""The port through which a run uses an FMU, and our two FMUs as bodies: all that each step of a run calls."""
 
 from __future__ import annotations
 
@@ -42,7 +39,7 @@ from .protocol import (
     made_of,
 )
 
-#: Length of a trial step of our own bodies over a macro step: what they tell after it is what they would tell before.
+#: Length of a trial step of our own bodies over a macro step; it changes their outputs by no more than rounding.
 _INSTANT = 1e-8
 #: ∫ φ over length and tip value of the lowest mode of a slender beam; one that shears alone has 0.64.
 _MEAN = 0.4
@@ -52,7 +49,7 @@ _SMOOTH_WAVES = 5.0
 _INTEGRATORS = {"modal": 1, "midpoint": 2}
 _MASS_MATRICES = {"consistent": 1, "averaged": 2}
 _AT_REST = 2
-#: What tells `InnerForces`, and `Body.shape`: variables, and how many numbers each has.
+#: Variables of `InnerForces` and of `Body.shape`, and their sizes.
 _INNER_FORCES = ("tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
 _ALONG = ("deflection", "bending_moment", "shear_force")
 _POINTS = len(SHAPE_POINTS)
@@ -60,11 +57,11 @@ _SHAPE_3 = (_ALONG, _POINTS)
 _SHAPE_2 = (tuple(f"{name}[{i}]" for name in _ALONG for i in range(1, _POINTS + 1)), 1)
 
 
-#: What FMI 3.0 lets an FMU ask for after a step, and is not given.
+#: Requests of an FMU for FMI 3.0 after a step that are not supported.
 _ASKED = {
-    Failure.ENDS: "fmi3DoStep asks that the simulation end (terminateSimulation)",
+    Failure.ENDS: "fmi3DoStep requests the end of the simulation (terminateSimulation)",
     Failure.EARLY: "fmi3DoStep returned early, which it was not allowed to (earlyReturn)",
-    Failure.EVENT: "fmi3DoStep asks for event mode, which it was told is not used (eventHandlingNeeded)",
+    Failure.EVENT: "fmi3DoStep requests event mode, which is not used (eventHandlingNeeded)",
 }
 
 
@@ -75,13 +72,13 @@ CANNOT = {"get_state": "cannot save the state", "set_state": "cannot restore the
 
 
 class Port:
-    """What a run does with an FMU: its calls, and nothing of what they mean.
+    """The calls of a run to an FMU, without their meaning.
 
     Parameters
     ----------
     inputs, impulse, outputs
         Names of variables. A step sets the inputs and the impulse, if the FMU takes one, which acts at its start; it
-        tells the outputs.
+        returns the outputs.
     slopes
         Highest derivative of the inputs that a step sets; those that are all 0 only ``always``.
     repeats
@@ -123,14 +120,14 @@ class Port:
         return told
 
     def step(self, *given: float) -> tuple[float, ...]:
-        """Step by what is ``given``: time [s], size [s], inputs, impulse, derivatives; return the outputs."""
+        """Step under ``given``: time [s], size [s], inputs, impulse, derivatives; return the outputs."""
         self._write(*given)
         if code := self._advance():
             self._stop(*divmod(code, 16))
         return self._told()
 
     def trial(self, given: Sequence[float], read: Reading | None = None) -> tuple[float, ...]:
-        """Step by what is ``given``, return the outputs or what ``read`` reads, and undo the step."""
+        """Step under ``given``, return the outputs or the result of ``read``, and undo the step."""
         if (status := self._before_trial()) > WARNING:
             raise self.failed(status, CANNOT["get_state"])
         try:
@@ -141,7 +138,7 @@ class Port:
                 raise self.failed(status, CANNOT["set_state"])
 
     def _stop(self, failure: int, status: int) -> NoReturn:
-        """Say why a step was not made."""
+        """Raise the error of a step that was not made."""
         time, _, *inputs = self._given
         failed = {
             Failure.SET: f"cannot set {', '.join(self._inputs)}",
@@ -170,7 +167,7 @@ class Port:
 
 
 class Names(NamedTuple):
-    """What an FMU of ours calls its variables."""
+    """Names of the variables of our FMUs."""
 
     fmu: str
     mass: str
@@ -182,7 +179,7 @@ class Names(NamedTuple):
 
 
 class FmuState(NamedTuple):
-    """What changes of a body beside the state inside the FMU."""
+    """State of a body outside of the FMU."""
 
     motion: Motion = Motion(0.0, 0.0, 0.0, 0.0)
     told: tuple[float, ...] = ()  #: motion and energies as the FMU has told them, with the work of impulses since
@@ -190,7 +187,7 @@ class FmuState(NamedTuple):
 
 
 class FmuBody(Body):
-    """A body of an FMU: what the numbers mean that go through its port."""
+    """A body of an FMU: the meaning of the numbers of its port."""
 
     state: Any
     _port: Port
@@ -202,7 +199,7 @@ class FmuBody(Body):
     rewinds: int = 0
 
     def _begin(self, mass: float) -> None:
-        """Start from the motion that the FMU was initialised to; a force at the end meets ``mass`` [kg]."""
+        """Start from the motion of the initialised FMU; an impulse at the end moves ``mass`` [kg]."""
         if not isfinite(mass):
             raise FmuError(f"{self._port.path}: the mass of its end is {mass}")
         self.mass = mass
@@ -245,7 +242,7 @@ class FmuBody(Body):
         )
 
     def _take(self, told: tuple[float, ...]) -> Motion:
-        """Take what the FMU has told as the present motion and energies, with no impulse pending; return the motion."""
+        """Set motion and energies to the outputs of the FMU, with no impulse pending; return the motion."""
         raise NotImplementedError
 
     def close(self) -> None:
@@ -276,7 +273,7 @@ class OwnBody(FmuBody):
             raise
 
     def _connect(self) -> None:
-        """Prepare what a step sets and tells: under loads, also these and their work."""
+        """Prepare inputs and outputs of a step; with loads, also these and their work."""
         names = self.NAMES
         loads = self._shares
         energies = (*names.energies[:3], "load_work") if loads else names.energies
@@ -291,7 +288,7 @@ class OwnBody(FmuBody):
         self._take(self._port.read())
 
     def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
-        """Return the inputs of the FMU that ``load`` acts by, and how much of it each takes."""
+        """Return the inputs of the FMU through which ``load`` acts, and their factors."""
         raise NotImplementedError
 
     def set_loads(self, forces: Sequence[Force]) -> None:

@@ -1,9 +1,9 @@
-"""An FMU that others made as a body: what it lacks is made up for where that is possible, elsewhere refused by name.
+"""An FMU of others as a body. Missing abilities are replaced where possible, otherwise rejected by name.
 
 * No velocity: the mean over the last step.
 * No integrals: those of the cubic through the ends of the step (of the line without velocities). Only degree 0, where
-  no condition needs them, is offered then.
-* No energies: the body is booked with the work that it has received, W = ∫ F ẇ dτ. The ledger is then that of the
+  no condition needs them, is then possible.
+* No energies: the energy of the body is the work that it has received, W = ∫ F ẇ dτ. The ledger is then that of the
   interface: the work of C on both ends and the energy of the law.
 """
 
@@ -33,7 +33,7 @@ _STAYS = 1e-6
 
 @dataclass(frozen=True)
 class Findings:
-    """What `springbeam.bodies.probe` has found out about an FMU."""
+    """Findings of `springbeam.bodies.probe` about an FMU."""
 
     abilities: Abilities
     mass: float = 1.0  #: that a force meets at first [kg]
@@ -45,7 +45,7 @@ class Findings:
 
 
 def _promised(spec: ForeignFmu, says: Any) -> Abilities:
-    """Return what an FMU can do if all is true that it ``says`` and that its table names."""
+    """Return the abilities of an FMU by its description and its table."""
     state = bool(says.canGetAndSetFMUstate)
     return Abilities(
         state=state,
@@ -59,7 +59,7 @@ def _promised(spec: ForeignFmu, says: Any) -> Abilities:
 
 
 def opened(spec: ForeignFmu, times: tuple[float, float], found: Findings | None) -> tuple[Port, Findings]:
-    """Return an FMU at the start of ``times``, and what was ``found`` out: by default, what it says. Raises FmuError.
+    """Return an FMU at the start of ``times``, and the findings ``found``, by default its description. Raises FmuError.
 
     ``times`` are when its first step begins and when its last one ends [s].
     """
@@ -77,7 +77,7 @@ def opened(spec: ForeignFmu, times: tuple[float, float], found: Findings | None)
 
 
 class ForeignPort(Port):
-    """A `Port` of a foreign FMU, through which all goes in SI units."""
+    """A `Port` of a foreign FMU that converts to SI units."""
 
     def __init__(self, fmu: Fmu, spec: ForeignFmu, found: Findings) -> None:
         told = _outputs(spec, found)
@@ -115,7 +115,7 @@ def _check(fmu: Fmu, name: str, key: str, wanted: str) -> None:
 
 
 def _acceleration(spec: ForeignFmu, fmu: Fmu, units: dict[str, Unit]) -> dict[str, Any]:
-    """Return the variable that tells the acceleration of the end, that of the scene or the velocity's derivative.
+    """Return the variable of the acceleration of the end: that of the scene or the velocity's derivative.
 
     Its unit is added to ``units``.
     """
@@ -131,14 +131,14 @@ def _acceleration(spec: ForeignFmu, fmu: Fmu, units: dict[str, Unit]) -> dict[st
 
 
 def _outputs(spec: ForeignFmu, found: Findings) -> dict[str, str]:
-    """Return the names of what an FMU tells after a step by their keys: first of its motion, then of its energies."""
+    """Return the names of the outputs after a step by their keys: first of the motion, then of the energies."""
     keys = (*spec.MOTION, *(spec.ENERGIES if found.abilities.energies else ()))
     names = {key: name for key, name in spec.named.items() if key in keys}
     return names if found.acceleration is None else names | {"acceleration": found.acceleration}
 
 
 class ForeignState(NamedTuple):
-    """What changes of a foreign body beside the state inside the FMU."""
+    """State of a foreign body outside of the FMU."""
 
     motion: Motion
     told: tuple[float, ...] = ()  #: motion and energies as far as the FMU has told them
@@ -160,7 +160,7 @@ class ForeignBody(FmuBody, EndLoaded):
     times
         When its first step begins and when its last one ends [s].
     found
-        What was found out about it; by default that it can do what it says.
+        Findings about it; by default those of its description.
     """
 
     #: Longest time that a call may take [s], and what is said of when it was made.
@@ -190,7 +190,7 @@ class ForeignBody(FmuBody, EndLoaded):
         return self.state.received
 
     def join(self, velocity: float) -> None:
-        """Let the end have the ``velocity`` [m/s] of what it is tied to, where its own is not told but measured."""
+        """Set the ``velocity`` [m/s] of the end to that of the end it is tied to, if the FMU does not output it."""
         if not self.abilities.velocity:
             self.state = self.state._replace(motion=self.state.motion._replace(velocity=velocity))
 
@@ -227,7 +227,7 @@ class ForeignBody(FmuBody, EndLoaded):
         return end
 
     def _followed(self, given: Force, size: float) -> Force:
-        """Return what of a force over a step the FMU can follow: its mean, or its slope too."""
+        """Return the part of a force over a step that the FMU can follow: its mean, or also its slope."""
         slopes = self.abilities.slopes
         if not any(given[slopes + 1 :]):
             return given
@@ -243,7 +243,7 @@ class ForeignBody(FmuBody, EndLoaded):
         self.state = self.state._replace(received=received)
 
     def _take(self, told: tuple[float, ...], size: float = 0.0) -> Motion:
-        """See `FmuBody._take`; what the FMU does not tell of its motion over ``size`` [s] is made up for."""
+        """See `FmuBody._take`; missing outputs of the motion over ``size`` [s] are replaced."""
         by_key = dict(zip(self._keys, told, strict=True))
         w0, v0, *_ = self.state.motion
         w = by_key["displacement"]
@@ -262,13 +262,13 @@ class ForeignBody(FmuBody, EndLoaded):
         return energies._replace(load_potential=energies.load_potential - self.state.load_work)
 
     def holding_force(self, displacement: float, velocity: float) -> float:
-        """Return the force that holds the end where it now rests, found by trial steps.
+        """Return the force that holds the end in its present position, found by trial steps.
 
         Raises BodyFailed if no constant force does, as where a body moves inside.
         """
         if self.state.held is not None and self.state.held[0] == displacement:
             return self.state.held[1]
-        from scipy.optimize import newton  # takes a tenth of a second to load: only for who rests on a foundation
+        from scipy.optimize import newton  # takes a tenth of a second to load: only for a rest on a foundation
 
         size = self.state.size or self.found.H
         load = self._on_end
@@ -291,7 +291,7 @@ class ForeignBody(FmuBody, EndLoaded):
         if abs(end.displacement - displacement) > _STAYS * fallen and abs(end.velocity) > _STAYS * abs(let_go.velocity):
             raise BodyFailed(
                 f"{self._port.path}: no constant force holds its end at rest on the foundation; use a [stop] "
-                "restitution of 1, which lets nothing come to rest, or leave [stop] out"
+                "restitution of 1, with which nothing comes to rest, or leave [stop] out"
             )
         self.state = self._marked = self.state._replace(held=(displacement, found))
         return found

@@ -1,4 +1,4 @@
-"""The libraries of FMUs of FMI 2.0 and 3.0, loaded by FMPy, and in what the versions differ.
+"""The libraries of FMUs of FMI 2.0 and 3.0, loaded by FMPy, and the differences of the versions.
 
 Only this module and `fmu` import FMPy.
 """
@@ -31,8 +31,8 @@ Log = Callable[[int, bytes | None], None]
 PLATFORMS = (platform, platform_tuple)
 
 
-#: What went wrong in an advance: `advance.cpp` returns 16 of these + the status of the call that did. The last three
-#: are what fmi3DoStep has told beside its status.
+#: Errors of an advance: `advance.cpp` returns 16 times these + the status of the call. The last three are requests of
+#: fmi3DoStep.
 Failure = IntEnum("Failure", "INPUTS_NOT_FINITE SET SET_DERIVATIVES STEP GET OUTPUTS_NOT_FINITE ENDS EARLY EVENT")
 
 
@@ -54,7 +54,7 @@ class Advance(Structure):
 
 @cache
 def advances() -> CDLL:
-    """Load what `advance.cpp` is compiled to. Raises OSError."""
+    """Load the library of `advance.cpp`. Raises OSError."""
     suffix = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
     path = Path(__file__).with_name(f"advance.{suffix}")
     if not path.is_file():
@@ -63,7 +63,7 @@ def advances() -> CDLL:
 
 
 class Library(CDLL):
-    """The library of an FMU; a function that it lacks is missed when it is called, for many lack what no run needs."""
+    """The library of an FMU. A missing function is an error only when it is called; no run needs all of them."""
 
     def __getitem__(self, name: str) -> Any:
         try:
@@ -79,7 +79,7 @@ class Library(CDLL):
 
 
 class Slave:
-    """An FMU whose library is loaded, once in a process, beside FMPy's class of its version; `instance` makes one."""
+    """An FMU with its library, loaded once in a process, and FMPy's class of its version; `instance` makes one."""
 
     TYPES: ClassVar[Any]  #: FMPy's module with the types of C
     VERSION: ClassVar[str]

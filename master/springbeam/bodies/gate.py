@@ -1,7 +1,7 @@
-"""Refuse bodies that a scene cannot be run with, whoever made them: our FMUs, FMUs of others, bodies of the caller's.
+"""Reject bodies with which a scene cannot be run: our FMUs, FMUs of others, bodies of the caller.
 
-The rules of the scene see what its keys tell. This gate asks the bodies themselves, once, before the first step: what
-they can do, and where and with which velocities they start.
+The rules of the scene check its keys. This gate checks the bodies, once, before the first step: their abilities,
+initial positions and velocities.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from ..scene import SAME, Scene, SceneError
 from ..scene.messages import Rule, texts_of
 from .protocol import NO_FORCE, Abilities, Body, BodyFailed, Force, StepRefused
 
-# -- what bodies can do ------------------------------------------------------------------------------------------------
+# -- abilities ---------------------------------------------------------------------------------------------------------
 
-#: What is said of a body that lacks a capability.
+#: Texts about missing abilities.
 _LACKS = {
     "state": "its state cannot be saved (canGetAndSetFMUstate = false)",
     "any_size": "its steps have one size (canHandleVariableCommunicationStepSize = false)",
@@ -50,7 +50,7 @@ def _followed(scene: Scene, body: Abilities, table: str) -> dict[str, Any]:
 
 
 def _needs(asked: str, when: Callable[[Scene], bool], instead: str, *abilities: str) -> list[Rule]:
-    """Return a rule for each of the ``abilities`` that a body must have for what is ``asked``."""
+    """Return a rule for each of the ``abilities`` that a body must have for the key ``asked``."""
     most = Abilities()
     return [
         Rule(
@@ -62,7 +62,7 @@ def _needs(asked: str, when: Callable[[Scene], bool], instead: str, *abilities: 
     ]
 
 
-#: What a scene asks of a body that it cannot do; a rule is asked of the scene, what the body can do, and its table.
+#: Rules for abilities; arguments are the scene, the abilities of the body, and its table.
 LACKING: tuple[Rule, ...] = (
     *_needs(
         "{coupling.scheme}",
@@ -113,7 +113,7 @@ def refusals(scene: Scene, abilities: Mapping[str, Abilities]) -> list[str]:
     return [line for table, body in abilities.items() for line in texts_of(scene, LACKING, body, table)]
 
 
-#: What a capability allows, for people: (capability, how a body shows it, what is offered with it, what without it).
+#: Abilities in words: (ability, how a body shows it, possible couplings with it, and without it).
 OFFERED = (
     ("state", "canGetAndSetFMUstate", 'scheme "energy", tie, transmission, foundation', '"jacobi", "gauss_seidel"'),
     ("any_size", "canHandleVariableCommunicationStepSize", "events, adaptive steps", "equal macro steps only"),
@@ -125,18 +125,18 @@ OFFERED = (
 )
 
 
-#: Length of a trial step over a macro step; how far a force moves a body in it, over its displacement or 1 m.
+#: Length of a trial step over a macro step; displacement by a force in it, over that of the body or 1 m.
 _TRIAL, _MOVED = 2.0**-8, 1e-6
 
 
-# -- how they start ----------------------------------------------------------------------------------------------------
+# -- starts ------------------------------------------------------------------------------------------------------------
 
-#: Velocities closer than this share are one where an end takes no impulse: told, and measured from displacements.
+#: Velocities closer than this share are equal for an end without impulses: given, and measured from displacements.
 _SAME_SPEED, _SAME_SPEED_MEASURED = 1e-13, 1e-6
-#: Heights closer than this share are one.
+#: Heights closer than this share are equal.
 _SAME_PLACE = 1e-12
 _ENDS = "the upper end starts at {u:.9g} m and the lower one at {y:.9g} m"
-#: How ends cannot start; a rule is asked of the scene, and of where they start as `admit` says.
+#: Rules for the start of the ends; arguments are the scene and the positions and velocities of `admit`.
 FORBIDDEN_STARTS = (
     Rule(
         lambda s, start: s.contact.lasting and s.contact.rigid and start["apart"],
@@ -170,10 +170,10 @@ FORBIDDEN_STARTS = (
 
 
 def tried(body: Body, time: float, macro_step: float) -> Abilities:
-    """Return what a ``body`` of the caller's can do, by four short steps from ``time`` [s] that are undone.
+    """Return the abilities of a ``body`` of the caller, by four short steps from ``time`` [s] that are undone.
 
-    They show whether it follows a force that grows over a step, and tells the integrals of its motion. A body that
-    refuses them is taken at its word.
+    They show whether it follows a force that grows over a step, and returns the integrals of its motion. If it refuses
+    them, its declared abilities count.
     """
     able = body.can()
     if not able.state or not 0.0 < body.mass < inf:
@@ -215,9 +215,8 @@ def admit(
 ) -> None:
     """Raise SceneError if ``scene`` cannot be run with these bodies as they are at ``start_time`` [s].
 
-    That is where it needs what a body cannot do, or where the bodies start in places or with velocities from which the
-    contact law, the foundation or an undeformed approach cannot begin. What was ``found`` out about a body's abilities,
-    by table, counts instead of what it says.
+    That is if a body lacks a needed ability, or if the contact law, the foundation or an undeformed approach cannot
+    begin from the initial positions and velocities. Abilities ``found``, by table, replace the declared ones.
     """
     bodies = {name: body for name, body in (("beam", upper), ("spring", lower)) if body is not None}
     able = {table: body.can() for table, body in bodies.items()}
@@ -250,7 +249,7 @@ def admit(
 
 
 def _joined(scene: Scene, upper: Body, lower: Body) -> list[str]:
-    """Join ends that are to be tied, where one takes no impulse; return why, if their velocities forbid it."""
+    """Join ends that are to be tied, if one takes no impulse; return an error if their velocities differ."""
     v = upper.motion().velocity
     z = lower.motion().velocity
     lines = []

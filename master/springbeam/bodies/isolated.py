@@ -1,4 +1,4 @@
-"""A foreign FMU in a process of its own, which may crash or hang: the run then ends by name and keeps what it has.
+"""A foreign FMU in a process of its own, which may crash or hang: the run then stops and keeps its results.
 
 The process holds the `Port` of the FMU and runs `answer`. A request is a list of calls, of which the last is answered.
 Those that need no answer, as `get_state` and `set_state`, wait for the next that does, so that a step costs one
@@ -25,7 +25,7 @@ from .fmu_bodies import CANNOT, Port
 from .functions import OK, WARNING
 from .protocol import BodyFailed, FmuError, StepRefused
 
-#: From when on Ctrl-C means the FMU, not the run [s].
+#: Time after which Ctrl-C names the FMU as the cause [s].
 LONG = 5.0
 #: Longest time that the last call may take [s].
 _FAREWELL = 2.0
@@ -56,9 +56,9 @@ class FmuProcess:
             self._process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=printed, stderr=printed, pass_fds=ends
             )
-        #: Whether it has answered all that it was asked.
+        #: Whether it has answered all requests.
         self.idle = True
-        #: How much of what its FMUs print belongs to bodies before the present one [bytes].
+        #: Size of the output of FMUs before the present one [bytes].
         self._read = 0
         self.ask([], "its start", None)  # which is not the FMU's time
 
@@ -134,7 +134,7 @@ class FmuProcess:
 
 
 def answer() -> None:
-    """Do in the process of an FMU what `FmuProcess.ask` asks for, until nobody is there to ask."""
+    """Answer requests of `FmuProcess.ask` in the process of an FMU, until the master is gone."""
     tempfile.tempdir, *ends = sys.argv[1:]
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the master's
     try:
@@ -163,7 +163,7 @@ def answer() -> None:
 
 
 def _end_with_the_master() -> None:
-    """End when the master does, which keeps standard input open; also while the FMU does not return."""
+    """End when the master, which keeps standard input open, ends; also while the FMU does not return."""
     sys.stdin.read()
     os._exit(1)
 
@@ -176,9 +176,9 @@ class RemotePort(Port):
     path
         Of the FMU.
     patience, occasion
-        Longest time that a call may take [s], and what is said of when it was made.
+        Longest time that a call may take [s], and its occasion in words.
     make, arguments
-        ``make(*arguments)`` returns the port, and what it has ``found`` out.
+        ``make(*arguments)`` returns the port and its findings.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Ask our FMUs what is known exactly; `springbeam doctor` shows how far the answers are off.
+"""Compare our FMUs with exact solutions; `springbeam doctor` shows the errors.
 
 * The beam, of 10 linear elements with EI = KAG = L = 1, comes to rest under a tip force of 1 N. Each element locks:
   the deflection is (1/3EI + 1/KAG)/(1 + KAG h²/12EI), h = L/10. Kelvin-Voigt damping makes the slowest motion decay
@@ -23,7 +23,7 @@ from .fmu_bodies import Port
 
 @dataclass(frozen=True)
 class Question:
-    """One doStep of an FMU of which an output is known exactly."""
+    """One doStep of an FMU with an output that is known exactly."""
 
     words: str
     parameters: Mapping[str, Value]
@@ -32,7 +32,7 @@ class Question:
     output: str
     size: float  #: of the step [s]
     exact: float  #: [m]
-    bound: float  #: largest error that the method leaves [m]
+    bound: float  #: largest error of the method [m]
 
     def ask(self, name: str, version: str) -> float:
         """Return the error [m] of our FMU ``name``. Raises FmuError, or StepRefused."""

@@ -1,8 +1,7 @@
-"""A short check of a foreign FMU before the run: is it what it and the scene say?
+"""A short check of a foreign FMU before the run, against its description and the scene.
 
-Each check is tried on steps of H, H/10, … and holds if it does for one of them: an FMU may need short steps, or have
-steps of its own that are not shorter than some. Each starts from the FMU's initial state, by a restored state or a new
-instance.
+Each check is tried with steps of H, H/10, … and passes if it does for one of them: an FMU may need short steps, or have
+internal steps of a least size. Each starts from the FMU's initial state, by a restored state or a new instance.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from .protocol import NO_FORCE, FmuError, Force, StepRefused
 _SIZES = (1.0, 0.1, 1e-2, 1e-3, 1e-4)
 #: Steps of a record.
 _RECORD = 64
-#: How far, relatively, an output may be from what it should be: of integrators of order 1 less is left of 64 steps.
+#: Largest relative error of an output; integrators of order 1 have less after 64 steps.
 _TOLERANCE = 0.04
 _ROUNDING = 1e-9
 #: Largest relative difference of a response from that of a mass.
@@ -44,7 +43,7 @@ class _TriedBody(ForeignBody):
 
 
 class Bench:
-    """Makes steps of the FMU from its initial state, and notes what is wrong.
+    """Make steps of the FMU from its initial state, and note faults.
 
     Parameters
     ----------
@@ -62,20 +61,20 @@ class Bench:
         self._start = start
         self.faults = list[str]()
         self._made = partial(_TriedBody, spec, upper, (start, max(end, start + _RECORD * H)))
-        #: The present instance; its ``abilities`` are those that are known.
+        #: The present instance; its ``abilities`` are the known ones.
         self.body = self._made(None)
         self.sizes = [H * share for share in _SIZES] if self.body.abilities.any_size else [H]
 
     def renew(self, **abilities: Any) -> None:
-        """Take a new instance, which is taken to have other ``abilities``."""
+        """Make a new instance, with other assumed ``abilities``."""
         self.body.close()
         self.body = self._made(Findings(replace(self.body.abilities, **abilities)))
 
     def run(self, size: float, forces: Sequence[Force], impulse: float = 0.0) -> np.ndarray:
         """Make a step of ``size`` [s] under each force C, after an ``impulse``.
 
-        Return rows before the first step and after each, shape (n + 1, 6): the motion, the sum of the energies that are
-        told, and the work done on the end.
+        Return rows before the first step and after each, shape (n + 1, 6): the motion, the sum of the known energies,
+        and the work done on the end.
         """
         if self.body.steps > 0 and not self.body.abilities.state:
             self.renew()
@@ -90,13 +89,13 @@ class Bench:
         return np.array(rows)
 
     def change(self, size: float, force: Force, impulse: float = 0.0) -> float:
-        """Return what ``force`` or ``impulse`` changes over a step: the velocity, without one the displacement."""
+        """Return the change of the velocity, or without one of the displacement, by ``force`` or ``impulse``."""
         column = 1 if self.spec.velocity else 0
         moved, free = (self.run(size, [given], kick)[1, column] for given, kick in ((force, impulse), (NO_FORCE, 0.0)))
         return float(moved - free) if abs(moved - free) > _SEEN * abs(free) else 0.0
 
     def extrapolated(self, inertia: Callable[[float], float | None]) -> float | None:
-        """Return ``inertia`` of a step's size [s] as that goes to 0, from the shortest steps that tell it."""
+        """Return the limit of ``inertia`` as the step's size [s] goes to 0, from the shortest steps that show it."""
         shares = (1.0, 0.5, 0.25) if self.body.abilities.any_size else (1.0,)
 
         def column_of(size: float) -> list[float | None]:
@@ -115,7 +114,7 @@ class Bench:
         return found
 
     def wrong(self, check: Callable[[float], set[str]]) -> set[str]:
-        """Return what ``check`` of a step's size [s] finds wrong at every size that the FMU takes."""
+        """Return the faults that ``check`` of a step's size [s] finds at every size that the FMU takes."""
         found: set[str] | None = None
         for wrong in self.taken(check, self.sizes):
             found = wrong if found is None else found & wrong
@@ -124,7 +123,7 @@ class Bench:
         return found or set()
 
     def taken(self, tried: Callable[[float], _T], sizes: Iterable[float]) -> Iterator[_T]:
-        """Yield what is ``tried`` of a step's size [s] for the ``sizes`` at which the FMU steps.
+        """Yield the result of ``tried`` for the ``sizes`` [s] at which the FMU steps.
 
         Raises the StepRefused of the longest if it steps at none.
         """
@@ -144,12 +143,12 @@ class Bench:
 
 
 def examined(spec: ForeignFmu, upper: bool, times: tuple[float, float], H: float) -> Findings:
-    """Examine an FMU, once; parameters as of `Bench`.
+    """Check an FMU, once; parameters as of `Bench`.
 
     Raises
     ------
     FmuError
-        If the FMU cannot be used as the scene says, crashes, or does not return.
+        If the FMU cannot be used in the scene, crashes, or does not return.
     """
     path = Path(spec.fmu)
     changed = path.stat().st_mtime_ns if path.is_file() else None
@@ -168,7 +167,7 @@ def _examined(_changed: int | None, spec: str, upper: bool, times: tuple[float, 
 
 
 def _examine(bench: Bench, upward: float) -> Findings:
-    """Examine the FMU of ``bench``; a positive C acts upward (1) or downward (-1) on its end."""
+    """Check the FMU of ``bench``; a positive C acts upward (1) or downward (-1) on its end."""
     spec = bench.spec
     H = bench.sizes[0]
     promised = bench.body.abilities.slopes
@@ -213,7 +212,7 @@ def _check_state(bench: Bench) -> None:
 
 
 def _inertia(bench: Bench, size: float) -> float | None:
-    """Return what a force C meets over a step of ``size`` [kg], below 0 if the end goes down; ``None`` if it stays."""
+    """Return the mass [kg] that a force C moves over a step of ``size``, negative if downward; ``None`` if it stays."""
     for force in _FORCES:
         if change := bench.change(size, (force, 0.0, 0.0)):
             return force * size / change * (1.0 if bench.spec.velocity else 0.5 * size)
@@ -221,7 +220,7 @@ def _inertia(bench: Bench, size: float) -> float | None:
 
 
 def _wrong_outputs(bench: Bench, impetus: float, h: float) -> set[str]:
-    """Return which outputs do not fit the displacement over steps of ``h`` [s].
+    """Return the outputs that contradict the displacement over steps of ``h`` [s].
 
     ``impetus`` is a mass times a length to move it by [kg·m].
     """
@@ -284,7 +283,7 @@ def _try_slopes(bench: Bench, impetus: float) -> None:
 
 
 def _struck_mass(bench: Bench, mass: float, speed: float) -> float:
-    """Return the mass that an impulse meets [kg]; the one expected is ``mass``, ``speed`` what it is to have [m/s]."""
+    """Return the mass that an impulse moves [kg]; ``mass`` is the expected one, ``speed`` the expected change [m/s]."""
     impulse = mass * speed
 
     def inertia(size: float) -> float | None:

@@ -29,9 +29,9 @@ def check(text: str, columns: Iterable[str]) -> None:
 
 
 def signal(run: Trajectory, text: str) -> np.ndarray:
-    """Return a column of ``run``, or what a function makes of it, row by row.
+    """Return a column of ``run``, or the result of a function of it, row by row.
 
-    Raises SceneError for what is neither, or gives no number a row.
+    Raises SceneError if it is neither, or does not give a number per row.
     """
     check(text, run.columns)
     function = function_of(text)
@@ -45,10 +45,10 @@ def signal(run: Trajectory, text: str) -> np.ndarray:
 
 
 def function_of(text: str) -> Callable[[Trajectory], Any] | None:
-    """Return the Python function that ``module:name`` means, ``None`` if ``text`` is nothing of the kind.
+    """Return the Python function ``module:name``, ``None`` if ``text`` has another form.
 
-    The directory of the command counts as a place of modules. Raises SceneError if there is none; so does the
-    function where it fails.
+    Modules are also searched in the current directory. Raises SceneError if there is none; so does the function if it
+    fails.
     """
     if _FUNCTION.fullmatch(text) is None:
         return None

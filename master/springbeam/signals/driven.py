@@ -1,6 +1,6 @@
 """Driven motion: whether it has settled, since when and with which period, and its response to a chirp.
 
-A scene with two chirps, one after the other, up and down, goes on from the state that the first has left: where the
+In a scene with two chirps, up and then down, the second starts from the state at the end of the first: where the
 responses to both differ, motions coexist.
 """
 
@@ -56,7 +56,7 @@ def poincare(run: Trajectory, period: float, start: float = 0.0) -> tuple[np.nda
 
 
 def _point(run: Trajectory) -> tuple[str, str]:
-    """Return the columns of the point that is looked at, position and velocity."""
+    """Return the columns of the observed point, position and velocity."""
     return ("u_tip", "v_tip") if "u_tip" in run.columns else ("y", "z")
 
 
@@ -65,7 +65,7 @@ def settled(run: Trajectory) -> Settled | None:
 
     It has settled where its points once a period of the drive repeat themselves and do not drift (`repeating`), in
     shares of the range of position and velocity. Those of a chaotic motion never do. A beat that is longer than the
-    run cannot be told from a settled motion.
+    run looks like a settled motion.
     """
     drive = drive_of(run)
     if drive is None or drive.frequency is None or run.steps is None:
@@ -78,7 +78,7 @@ def settled(run: Trajectory) -> Settled | None:
 
 
 def repeating(points: np.ndarray) -> tuple[int, int] | None:
-    """Return from which of the ``points`` (n, 2) on they repeat themselves, and after how many; ``None`` if not.
+    """Return the first of the ``points`` (n, 2) from which they repeat, and the number after which; ``None`` if not.
 
     They are points once a period of the drive, over the range of the motion. They repeat themselves if, for at least
     8 periods of the motion, each lies within 1 % of its last image, and the drift that is left is below 1 % as well.
@@ -95,11 +95,11 @@ def repeating(points: np.ndarray) -> tuple[int, int] | None:
 
 
 def _drift(images: np.ndarray, periods: float) -> float:
-    """Return how far the ``images`` (n, m) of a motion, one a period, will still drift.
+    """Return the expected further drift of the ``images`` (n, m) of a motion, one per period.
 
     A band alone does not show it: a motion that grows linearly stays within any band for long enough. The means over
-    thirds of the images tell how fast they drift. They go on as a transient that decays by the same ratio from third
-    to third, or at the same rate for as many ``periods`` as the run has had; the smaller of both counts.
+    thirds of the images show the drift. It is extrapolated as a transient that decays by the same ratio from third to
+    third, or at the same rate for as many ``periods`` as the run has had; the smaller of both counts.
     """
     third = len(images) // 3
     means = images[len(images) - 3 * third :].reshape(3, third, -1).mean(axis=1)

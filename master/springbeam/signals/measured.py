@@ -1,4 +1,4 @@
-"""Measured data (`springbeam.scene.recorded`) in the units of a run, and laid beside it."""
+"""Measured data (`springbeam.scene.recorded`) in the units of a run, and their comparison with it."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Measured(NamedTuple):
 
 
 class Residual(NamedTuple):
-    """How far a run is from a measured curve, where both are known."""
+    """Difference of a run to a measured curve, where both are known."""
 
     signal: str
     points: int
@@ -74,14 +74,14 @@ def read_measured(
     path
         Of the file, whose first line names the columns.
     scene
-        Says which columns a run has, and their units.
+        Has the columns of a run, and their units.
     names
         The column of a run, or ``module:function`` of it, by the column of the file, e.g. ``{"CH1": "a_tip"}``.
         Without any, columns that are called as those of a run belong to these. Others are left out.
     reading
-        How the file is read.
+        Format of the file.
 
-    Raises SceneError, which names file, line and column, and what would be allowed.
+    Raises SceneError, which names file, line, column and remedy.
     """
     path = Path(path)
     units = columns_of(scene)
@@ -116,7 +116,7 @@ def _read(file: Recorded, units: Mapping[str, str], names: Mapping[str, str]) ->
 
 
 def reading_of(texts: Sequence[str]) -> Reading:
-    """Return how a file is read by what ``KEY=VALUE`` say, with the keys of a load. Raises SceneError."""
+    """Return the format of a file from ``KEY=VALUE`` strings, with the keys of a load. Raises SceneError."""
     given = dict(text.partition("=")[::2] for text in texts)
     try:
         return Reading.model_validate(given, strict=False)
@@ -129,7 +129,7 @@ def reading_of(texts: Sequence[str]) -> Reading:
 
 
 class Aligned(NamedTuple):
-    """A run beside a measurement whose clock is moved to where they fit best."""
+    """A run and a measurement whose clock is shifted for the best fit."""
 
     shift: float  #: [s]
     off: dict[str, np.ndarray]  #: run less measurement, NaN outside of the run, shapes (n,)
@@ -138,21 +138,21 @@ class Aligned(NamedTuple):
 
 
 def time_shift(run: Trajectory, measured: Measured) -> float:
-    """Return by how much [s] the clock of the measurement is to be moved onward, so that its curves fit the run."""
+    """Return the shift [s] of the clock of the measurement with which its curves fit the run best."""
     return aligned(run, measured).shift
 
 
 def aligned(run: Trajectory, measured: Measured, lowest: float = -math.inf, highest: float = math.inf) -> Aligned:
-    """Return ``run`` beside the measurement, its clock moved to where the mean square between them is least.
+    """Return ``run`` and the measurement, its clock shifted to the least mean square of the difference.
 
-    Curves are weighed by the spread of what was measured. Periods of an oscillation are nearly alike, so the `_PEAKS`
-    best shifts of a correlation are refined, and the best of these is taken. Half of the points that the run can
-    cover take part at least.
+    Curves are weighed by the spread of the measurement. Periods of an oscillation are similar, so the `_PEAKS` best
+    shifts of a correlation are refined, and the best of these is taken. At least half of the points that the run can
+    cover are used.
 
     Parameters
     ----------
     run, measured
-        What is compared.
+        The run and the measurement.
     lowest, highest
         Limits of the shift [s].
     """
@@ -174,12 +174,12 @@ def aligned(run: Trajectory, measured: Measured, lowest: float = -math.inf, high
 
 
 def weighed(curves: Mapping[str, np.ndarray], measured: Measured) -> np.ndarray:
-    """Return curves over the spread of what was measured, one after the other, 0 where they are NaN."""
+    """Return curves over the spread of the measurement, one after the other, 0 where they are NaN."""
     return np.concatenate([np.nan_to_num(curve) / measured.spread(what) for what, curve in curves.items()])
 
 
 def at_shift(run: Trajectory, measured: Measured, shift: float) -> Aligned:
-    """Return ``run`` beside the measurement whose clock is moved by ``shift`` [s]."""
+    """Return ``run`` and the measurement with its clock shifted by ``shift`` [s]."""
     begin = float(run.time[0])
     end = float(run.time[-1])
     covered = measured.covered(run, shift)
@@ -277,7 +277,7 @@ def model(run: Trajectory, measured: Measured, shift: float = 0.0) -> tuple[np.n
 
 
 def residuals(run: Trajectory, measured: Measured, shift: float = 0.0) -> list[Residual]:
-    """Return how far the run is from each measured curve; the clock of the measurement is moved by ``shift`` [s]."""
+    """Return the difference of the run to each measured curve, with the clock of the measurement shifted [s]."""
     covered, curves = model(run, measured, shift)
     times = measured.time[covered] + shift
     found = []

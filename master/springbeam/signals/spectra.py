@@ -1,4 +1,4 @@
-"""Spectra of a run: power of its curves by Welch's method, shock response of its ends, and all that a run shows.
+"""Spectra of a run: power of its curves by Welch's method, shock response of its ends.
 
 Shock: an oscillator of frequency f = ω/2π and quality Q = 1/2ζ answers the acceleration a of its base with its own,
 
@@ -24,13 +24,13 @@ from ..scene import SceneError
 from .curves import signal
 from .driven import Response, Settled, drive_of, poincare, responses, settled
 
-#: Most samples that are taken of a run.
+#: Largest number of samples of a run.
 MOST = 4_000_000
 #: Samples in a period of the fastest oscillator: a peak between two of them is missed by 1 − cos(π/64), 0.12 %.
 _PER_PERIOD = 64
-#: A jump of velocity below this share of the largest speed is none to speak of.
+#: A jump of velocity below this share of the largest speed is negligible.
 _JUMP = 1e-3
-#: The velocities whose shock is asked for, and the accelerations that they are the integrals of.
+#: Velocities for shock spectra, and their accelerations.
 VELOCITIES = {"tip": "v_tip", "spring": "z"}
 _ACCELERATIONS = {"a_tip": "v_tip", "a_y": "z"}
 #: Oscillators of a shock spectrum in an octave.
@@ -87,7 +87,7 @@ def power_spectrum(run: Trajectory, what: str, since: float | None = None, segme
 
     Raises SceneError where there is nothing to sample.
     """
-    from scipy.signal import welch  # takes half a second to load: only for who asks for a spectrum
+    from scipy.signal import welch  # takes half a second to load: only for spectra
 
     times, values = sampled(run, what, since=since)
     length = max(2, 2 * len(values) // (segments + 1))
@@ -161,7 +161,7 @@ def ends_of(run: Trajectory) -> dict[str, str]:
 
 
 def without_peak(run: Trajectory, columns: Iterable[str]) -> str:
-    """Return which of ``columns`` are accelerations that rigid impacts leave without a peak; "" if none is."""
+    """Return which of ``columns`` are accelerations without a peak because of rigid impacts; "" if none is."""
     jumps = {name: largest_jump(run, _ACCELERATIONS[name]) for name in columns if name in _ACCELERATIONS}
     return "; ".join(
         f"{name} has no peak: a rigid impact changes {_ACCELERATIONS[name]} by {jump:.3g} m/s at once. "
@@ -172,7 +172,7 @@ def without_peak(run: Trajectory, columns: Iterable[str]) -> str:
 
 
 def largest_jump(run: Trajectory, column: str) -> float:
-    """Return the largest jump of a velocity at an event [m/s], 0 if there is none to speak of."""
+    """Return the largest jump of a velocity at an event [m/s], 0 if it is negligible."""
     if (steps := run.steps) is None:
         return 0.0
     before = steps[column]
@@ -185,7 +185,7 @@ def largest_jump(run: Trajectory, column: str) -> float:
 
 @dataclass(frozen=True)
 class Spectra:
-    """Spectra of a run by what they are of."""
+    """Spectra of a run by signal."""
 
     shock: Mapping[str, ShockSpectrum]  #: by the end, "tip" or "spring"
     jumps: Mapping[str, float]  #: largest jump of each end's velocity [m/s]
@@ -236,7 +236,7 @@ def spectra(
     Parameters
     ----------
     of
-        Columns, or functions of the run, whose power is asked for; without any, tip and spring top.
+        Columns, or functions of the run, for power spectra; by default tip and spring top.
     low, high
         Frequencies of the shock spectra [Hz]; from one period in the run to a period of 20 mean steps.
     quality
@@ -246,7 +246,7 @@ def spectra(
     segments
         As of `power_spectrum`.
 
-    Raises SceneError for what the run does not have.
+    Raises SceneError for signals that the run does not have.
     """
     if run.steps is None:
         raise SceneError("the run left no steps: it is by a reference, and has no curve to sample")
