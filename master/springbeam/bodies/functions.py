@@ -155,7 +155,7 @@ class FMU2(Slave, fmi2.FMU2Slave):  # type: ignore[misc]
     ENUMERATION = "Integer"
     STATE = "FMUstate"
     #: The function that sets derivatives of inputs, what it calls those of order 1 and 2, and whether the functions
-    #: that get and set are told the number of values as well.
+    #: that get and set also receive the number of values.
     SET_DERIVATIVES = "SetRealInputDerivatives"
     DERIVATIVES = ("{}", "{}")
     COUNTED = False

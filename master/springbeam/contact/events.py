@@ -101,7 +101,7 @@ def locate(evaluate: Callable[[float], Sample], guess: float, size: float, toler
 
     ``evaluate(h)`` repeats the step with size h and returns f, ḟ at its end; the last size evaluated is the one
     returned, so the bodies are left there. ``guess`` is the first one. f(0) ≥ 0 > f(size); ``time`` is the step's start
-    (its rounding bounds what can be told apart). A zero that f rises from, as it may at the start, is none of these. ḟ
+    (its rounding bounds the resolution). A zero that f rises from, as it may at the start, is none of these. ḟ
     is only the first guess of df/dh: where both ends differ in velocity, the force of a step, and with it the motion,
     changes with h.
     """

@@ -20,7 +20,7 @@ from .impacts import NO_IMPACT, Impact, foundation_impact, meeting, rebound
 from .interface import Interface, common_velocity
 
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only); slower than the
-#: second, if it would also rise no higher than positions can be told apart.
+#: second, if it would also rise no higher than the resolution of positions.
 _SEATING_SPEED = 1e-8
 _SEATING_SPEED_UNSEEN = 1e-4
 #: Rounding of a velocity, relative to the largest so far.
@@ -96,7 +96,7 @@ class Automaton:
         self._hardest = 0.0  #: speed of the fastest impact on the foundation so far [m/s]
         self._phase: Phase | None = None
         self._guards = Guards([], None)
-        #: The ends last asked for, and the samples there: a step starts where the one before has ended.
+        #: The ends of the last call, and the samples there: a step starts where the one before has ended.
         self._ends: Ends | None = None
         self._samples: list[Sample] = []
 
@@ -202,7 +202,7 @@ class Automaton:
         return phase.joint is not Joint.FREE and self._interface.soft is None
 
     def _is_at_equilibrium(self, at: Instant) -> bool:
-        """Whether the lower end is at Ψ, as far as events are told apart."""
+        """Whether the lower end is at Ψ, within the resolution of events."""
         _, low = at.ends
         psi = self._interface.equilibrium
         return abs(low.displacement - psi) <= 4.0 * at.together + 1e-12 * abs(psi)

@@ -63,7 +63,7 @@ _GRADED = [
 class Projection:
     """Projects ``law`` onto polynomials of ``degree`` over a step.
 
-    A step is told by the penetration at its start [m] and the penetration's numbers x [m]: its value at the end of the
+    Data of a step are the penetration at its start [m] and the penetration's numbers x [m]: its value at the end of the
     step, its mean, and the mean of s p, the first d + 1 of them: minus the conditions of a tie.
     """
 

@@ -141,7 +141,7 @@ class StepSolver(Coupling):
         goal, step, better = self.aim(gap, a, descent, size, start)
         residual = gap if goal is None else list(map(sub, gap, goal))
         norm = max(map(abs, residual))
-        # Rounding is always enough. What is asked follows from the motion, and is looked at where that is not reached.
+        # Rounding is always enough; the tolerance follows from the motion, and counts if rounding is not reached.
         enough = rounding = _ROUNDING * max(self.state.reach, abs(start[0].displacement))
         # S is measured once, when a size comes again: it then saves a step of the lower body in most.
         due = not measured and remembered[1] is not None and lower.mass < inf

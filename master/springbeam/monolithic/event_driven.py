@@ -230,7 +230,7 @@ def _at_rest(s: HybridSystem) -> np.ndarray:
 
     Raises ReferenceFailure where the spring rests nowhere near Ψ.
     """
-    from scipy.optimize import brentq, newton  # only for who is at rest
+    from scipy.optimize import brentq, newton  # only for a start at rest
 
     X = np.zeros(s.size)
     p = s.spring

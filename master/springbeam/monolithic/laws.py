@@ -50,7 +50,7 @@ class Watch(NamedTuple):
 
     name: str  #: of what happens where it becomes negative
     function: Callable[[EndsMotion], np.ndarray]
-    unit: Literal["m", "m/s", "N"]  #: of its values; tells what rounding leaves of a zero
+    unit: Literal["m", "m/s", "N"]  #: of its values; it determines the rounding of a zero
     level: float | None = None  #: where the spring's top is when it happens [m]
 
 

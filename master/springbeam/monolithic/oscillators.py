@@ -146,7 +146,7 @@ def _convolve(s: np.ndarray, size: float, at: slice) -> np.ndarray:
     On [0, 1], ∫ e^{z(1 − x)} P_m(2x − 1) dx = e^{−w} i_m(w) with w = −z/2 and i_m the modified spherical Bessel
     functions (Abramowitz & Stegun, 10.1.14 and 10.2.2).
     """
-    from scipy.special import ive  # only for who has fast oscillators
+    from scipy.special import ive  # only for fast oscillators
 
     w = -0.5 * size * TARGETS[at][:, None] * s
     m = np.arange(STAGES)[:, None, None]

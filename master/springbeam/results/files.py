@@ -175,7 +175,7 @@ def _read_table(path: Path, columns: Sequence[str] = ()) -> np.ndarray:
     try:
         table = np.loadtxt(rows, kinds, delimiter=",", comments=None, ndmin=1) if rows else np.empty(0, kinds)
     except ValueError as error:
-        why, _, _ = str(error).partition(";")  # what follows is for who calls numpy
+        why, _, _ = str(error).partition(";")  # the rest is for callers of numpy
         raise ResultsUnreadable(f"{path}: after the header: {why}") from None
     for name in kinds.names or ():
         good = np.isin(table[name], PHASES) if name == "phase" else np.isfinite(table[name])

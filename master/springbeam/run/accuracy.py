@@ -38,7 +38,7 @@ _CONTACT_TURN = 2.0
 _WAVE_TURN = 3.0
 #: An estimate of the error is to be so many times smaller than the accuracy.
 _SAFETY = 1.5
-#: Places along the path of the ends where the law is asked for its peak force: in a window, and in a macro step.
+#: Number of samples of the law for its peak force along the path of the ends: in a window, and in a macro step.
 _IN_A_WINDOW, _IN_A_STEP = 100, 8
 #: The coupling's and IDA's relative tolerance over the accuracy.
 _TOLERANCE = 1e-3
@@ -60,7 +60,7 @@ def simulate(
     progress
         Called with time [s], phase and number of macro steps once per accepted step; not while settings are searched.
     upper, lower
-        Bodies of one's own at the start of the run, in place of the beam and of the spring: `springbeam.Body`.
+        Bodies of the caller at the start of the run, in place of the beam and of the spring: `springbeam.Body`.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def simulate(
 def pick(scene: Scene) -> Trajectory:
     """Return a run of ``scene`` that keeps its ``accuracy``; its scene has the settings that were picked.
 
-    ``accuracy`` of its summary says what was asked and picked, with an estimate of each part of the `distance`; that of
+    ``accuracy`` of its summary has the settings, with an estimate of each part of the `distance`; that of
     the motion is at least how far the run misplaces its ends (`springbeam.run.misplaced`).
 
     Raises

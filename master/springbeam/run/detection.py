@@ -1,6 +1,6 @@
 """Which event comes first inside a step: the step is repeated until it ends on it.
 
-Positions tell of meeting, release and the foundation (`springbeam.contact.events`). Ends part, and a seat is left,
+Positions show meeting, release and the foundation (`springbeam.contact.events`). Ends part, and a seat is left,
 where a force that can only push would pull: C or N at the end of a trial step (`Pair.present`).
 """
 
@@ -97,7 +97,7 @@ class Detector:
         return self._pair.repeated(state, cut) if cut.size > 0.0 else cut, kind
 
     def _first_by_position(self, state: State, step: Step) -> tuple[Step, EventKind | None]:
-        """The step, cut to the first event that positions tell of, and its kind; of size 0 if it is at the start."""
+        """The step, cut to the first event that positions show, and its kind; of size 0 if it is at the start."""
         found: EventKind | None = None
         functions = self._automaton.guards(state.phase).functions
         if not functions:
@@ -200,7 +200,7 @@ class Detector:
         """Return ``step`` if ``function`` ends below ``floor``, a shorter one if it dips below it before, or None."""
         whole_step = step if end[0] < floor else None
         if abs(start[1]) <= self._rest(state, step.start):
-            # Ends that have just parted may close a little first, by the error of the time at which they were let go.
+            # Ends that have just parted may close a little first, by the error of the time at which they were released.
             return whole_step
         stretches = [(Place(0.0, start, (0.0, 0.0)), Place(step.size, end, function.means(step.end, step.size)))]
         trials = 0

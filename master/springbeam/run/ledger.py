@@ -109,7 +109,7 @@ class Balance:
             warnings.append(self._cause(of_judged, steps))
         elif of_own > self._warns:
             warnings.append(
-                f"the energies that the FMUs tell are off by {100.0 * of_own:.2g} %, by their own "
+                f"the energies that the FMUs report have an error of {100.0 * of_own:.2g} %, by their own "
                 f"solvers: the coupling has kept those of the interface to {of_judged:.1e}"
             )
         return summary, warnings, of_judged > self._warns

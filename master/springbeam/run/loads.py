@@ -89,7 +89,7 @@ def _wave(amplitude: float, omega: float, elapsed: float, phase: float, size: fl
 
 @lru_cache(maxsize=256)
 def _bessel(theta: float) -> tuple[float, float, float]:
-    from scipy.special import spherical_jn  # takes a tenth of a second to load: only for who has a sine
+    from scipy.special import spherical_jn  # takes a tenth of a second to load: only for a sine
 
     return tuple(spherical_jn([0, 1, 2], theta).tolist())
 

@@ -117,7 +117,7 @@ class AdaptiveSteps:
     def next(self, time: float, kink: float = inf, *, struck: bool = False) -> tuple[float, float]:
         """The time at which the step from ``time`` should end, and its size; ``kink`` as of `MacroGrid`.
 
-        Error estimates tell how long steps may be, also where ends have ``struck`` each other.
+        Error estimates limit the steps, also where ends have ``struck`` each other.
         """
         size = self.size
         left = self._end - time
@@ -144,7 +144,7 @@ class AdaptiveSteps:
         size = step.size
         factor = _SAFETY * error ** (-1.0 / order) if error > 0.0 else _GROW
         if error <= 1.0:
-            # A step that ended on a kink tells of whole ones by the order, unless it was much shorter.
+            # The size of whole steps follows from one that ended on a kink, unless it was much shorter.
             wanted = min(size * factor, self.size * (1.0 if own.just_rejected else _GROW))
             if not (to_kink and (wanted < self.size or size < _SHORT_REMAINDER * self.size)):
                 own.number = self._rung_below(wanted)

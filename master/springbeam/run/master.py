@@ -3,7 +3,7 @@
 One step is *mark* (the bodies remember their state), *attempt* (advance under the phase's law; may be repeated with
 any size, each time from the mark; `springbeam.run.stepping`), *detect* (which event comes first inside the step?
 `springbeam.run.detection`) and *accept*. An event shortens the step to itself, acts (`springbeam.contact.phases`), and
-the run goes on from there. The records are checked a thousand at a time, or each second.
+the run continues from there. The records are checked a thousand at a time, or each second.
 """
 
 from __future__ import annotations

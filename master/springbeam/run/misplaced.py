@@ -1,9 +1,9 @@
-"""How far the ends are from where the law of their contact would have them.
+"""Distance of the ends from their positions under the contact law.
 
-A soft law asks for a force along the path of the ends, the step applies a polynomial of degree d. A tie asks for no gap
-along the path, the step leaves none at its end. Both bodies and the law, linearised about the run, tell how far the
-difference moves the ends (``docs/coupling.md``, "How far ends are misplaced"). The beam is the sum of the modes of its
-mesh.
+A soft law demands a force along the path of the ends; the step applies a polynomial of degree d. A tie demands no gap
+along the path; the step leaves none at its end. Both bodies and the law, linearised about the run, give the
+displacement of the ends by the difference (``docs/coupling.md``, "How far ends are misplaced"). The beam is the sum of
+the modes of its mesh.
 """
 
 from __future__ import annotations

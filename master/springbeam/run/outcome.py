@@ -1,4 +1,4 @@
-"""How a run tells of its progress, and how it ends early."""
+"""Progress of a run, and its early end."""
 
 from __future__ import annotations
 

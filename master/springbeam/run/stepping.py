@@ -141,7 +141,7 @@ class Pair:
         self.law = self.interface.soft
         #: μ of ends that a rigid law joins, whose mismatch of velocities a step turns round [kg]; else 0.
         self.turned_mass = self.interface.reduced_mass() if self.law is None else 0.0
-        #: The bodies that could not say an acceleration, or how damping changes it, when it was asked for.
+        #: The bodies whose acceleration, or its change by damping, is unknown.
         self.without_acceleration: list[Body] = []
         self._decays: dict[int, float] = {}  #: `Body.decay` of those that have been asked, by `id`
         #: Whether they are joined for good.

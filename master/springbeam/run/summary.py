@@ -1,4 +1,4 @@
-"""What a run amounts to: counts, residuals, warnings and results, as they go into ``summary.json``."""
+"""The summary of a run: counts, residuals, warnings and results, as they go into ``summary.json``."""
 
 from __future__ import annotations
 

@@ -135,7 +135,7 @@ def _well(scene: Scene) -> dict[str, Any]:
 
 
 def _pull(scene: Scene) -> float:
-    """Return the force on the spring's top at the start [N], 0 where it is next to nothing."""
+    """Return the force on the spring's top at the start [N], 0 if it is negligible."""
     spring = scene.spring
     assert spring is not None
     pull = -spring.force(spring.equilibrium)

@@ -40,7 +40,7 @@ _LOOKS = (2, 4)
 #: Runs of a first look by a search, beside its first derivatives, and of the search that goes on.
 _FIRST_LOOK = 5
 _MOST = 40
-#: A search that ends at a cost so many times that of the best one goes on as well.
+#: Searches that end at less than so many times the cost of the best one are continued as well.
 _RIVAL = 4.0
 _CONFIDENCE = 0.95
 #: Chance that what is called no noise is noise.
@@ -70,7 +70,7 @@ class Left(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The values found, and what tells whether the data determines them."""
+    """The values found, and the evidence that the data determines them."""
 
     keys: list[Row]  #: ``key``, ``value``, ``low`` and ``high`` of its interval
     ranges: Mapping[str, tuple[float, float]]  #: in which keys were sought
@@ -117,7 +117,7 @@ def no_noise(left: Left) -> str:
     if left.share > _APART:
         return f"what is left is {left.share:.0%} of its spread; the curves do not agree"
     if len(left.off) < _FEWEST:
-        return f"{len(left.off)} points are too few to tell whether what is left is noise; --repeat a measurement"
+        return f"{len(left.off)} points are too few to decide whether the residual is noise; --repeat a measurement"
     if not is_white(left.off):
         return (
             f"what is left ({left.share:.2g} of its spread) is no noise: it remembers its past; something else in the "
@@ -250,7 +250,7 @@ class Fit(Study):
         return len(self.cases()) + _LOOKS[0] * (_FIRST_LOOK + keys) + 2 * keys + 2
 
     def settings(self) -> dict[str, Any]:
-        """Return what tells one fit from another, the measurements by what they hold."""
+        """Return the identity of a fit; measurements count by their content."""
         several = [data for data in (self.data, self.repeated) if data is not None]
         held = [hashlib.sha256(part.tobytes()) for data in several for part in (data.time, *data.values.values())]
         return super().settings() | {"measured": [part.hexdigest() for part in held]}
@@ -375,7 +375,7 @@ class Fit(Study):
         return self._begun(trial, last.at, {"lowest": shift - 0.1 * period, "highest": shift + 0.1 * period})
 
     def _judged(self, trial: Callable[[Row], Row], looked: Sequence[Search]) -> Found:
-        """Go on with the best of searches and with those that may end as well; return what tells how good the best is.
+        """Go on with the best of searches and with those that may end as well; return the evidence for the best.
 
         ``looked`` are sorted by their costs.
         """

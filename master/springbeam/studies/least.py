@@ -34,7 +34,7 @@ _STEP = 1e-7
 _ROUNDS = 5
 _SHARE = 0.1
 _LEAST = 1e-9
-#: A combination of unknowns that changes the curves less than this, beside the others, is not determined by them.
+#: A combination of unknowns that changes the curves by less than this share of the others is not determined.
 _UNDETERMINED = 1e-5
 
 

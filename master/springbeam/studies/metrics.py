@@ -40,7 +40,7 @@ class Metric:
         return None if self.lacking(run) else self.of(run)
 
     def lacking(self, run: Trajectory) -> str:
-        """Return why the run has no such number, in words if that is not plain to see, else nothing."""
+        """Return why the run has no such number, in words if that is not obvious, else nothing."""
         absent = [name for name in self.takes if name not in run.columns]
         return f"the run has no column {', '.join(absent)}" if absent else without_peak(run, self.takes)
 

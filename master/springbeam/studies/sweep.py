@@ -57,7 +57,7 @@ class Sweep(Study):
 
     @property
     def metrics(self) -> dict[str, Metric]:
-        """Those asked for."""
+        """The given metrics."""
         asked = metrics_of(self.metric or USUAL, several=True)
         limited = self._limit[0] if self.boundary else ""
         return asked if not limited or limited in asked else asked | metrics_of([limited])
