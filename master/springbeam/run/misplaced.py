@@ -235,7 +235,7 @@ def _reals(values: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(values).view(float)
 
 
-#: Returns, of penetrations and their rates at one place in each step, the force that is asked for [N] and how it grows
+#: Returns, of penetrations and their rates at one place in each step, the demanded force [N] and how it grows
 #: with both [N/m], [N·s/m], (3, n).
 _Asked = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -272,7 +272,7 @@ def _along_soft_law(
 def _defect(asked_at: _Asked, path: Any, step: np.ndarray, parts: int) -> np.ndarray:
     """Return four means over equal parts of each step, (4, parts), one part after the other.
 
-    They are the force that is asked for beyond that of the step, once evenly weighted and once by 2 (1 − s), s the
+    They are the demanded force beyond that of the step, once evenly weighted and once by 2 (1 − s), s the
     share of the part [N], and how it grows with the penetration [N/m] and with its rate [N·s/m].
     """
     size = step["size"]
