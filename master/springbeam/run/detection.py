@@ -52,8 +52,8 @@ class Detector:
     def _rest(self, state: State, ends: Ends) -> float:
         """Speed below which ends do not move against each other [m/s].
 
-        Velocities are sums of modes that have been as fast as the ends: one that is left of 0, as of a tip that is let
-        go, is rounding.
+        Velocities are sums of modes that have been as fast as the ends: the rounding of their sum, as of a tip that is
+        released, is not 0.
         """
         tip, low = ends
         return max(1e-12 * max(abs(tip.velocity), abs(low.velocity)), VELOCITY_ROUNDING * state.fastest)
