@@ -96,10 +96,9 @@ BLOCKS: dict[Path, dict[str, Callable[[], list[str]]]] = {
     DOCS.parent / "README.md": {"scenes": scenes},
     DOCS / "api.md": {"body": body},
     DOCS / "commands.md": {"commands": commands, "options": options},
-    DOCS / "coupling.md": {"phases": phases},
     DOCS / "files.md": {"columns": columns, "results": results},
     DOCS / "measured.md": {"classes": classes},
-    DOCS / "model.md": {"words": words},
+    DOCS / "model.md": {"phases": phases, "words": words},
 }
 
 
