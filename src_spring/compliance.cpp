@@ -19,9 +19,7 @@ double power(double x, double p) {
 
 double Compliance::elastic(double depth) const { return depth > 0.0 ? lambda_ * power(depth, p_) : 0.0; }
 
-double Compliance::energy(double depth) const {
-  return depth > 0.0 ? lambda_ * power(depth, p_ + 1.0) / (p_ + 1.0) : 0.0;
-}
+double Compliance::energy(double depth) const { return std::max(0.0, depth) * elastic(depth) / (p_ + 1.0); }
 
 double Compliance::continued_elastic(double depth) const {
   const double sign = depth < 0.0 && !even() ? -1.0 : 1.0;

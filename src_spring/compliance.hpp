@@ -30,7 +30,7 @@ class Compliance {
   double damping_factor(double rate) const { return std::max(0.0, 1.0 + chi_ * rate); }
   double force(double depth, double rate) const { return elastic(depth) * damping_factor(rate); }  ///< C [N]
 
-  /// The law while touching, continued smoothly to δ < 0: what an integrator sees of an internal step that goes past
+  /// The law while touching, continued smoothly to δ < 0: for internal steps that go past
   /// the opening (the event is then located and what lies beyond is dropped).
   struct Effect {
     double force, dissipation;  ///< [N], [W]

@@ -15,6 +15,11 @@ constexpr const char* out_of_range = "values leave the range of floating-point n
 constexpr double share = 1e-5, least_share = 0.01 * epsilon;
 // Forces of second order in time, which act on the fourth power, are in every series.
 constexpr std::size_t least_order = 4;
+// Sizes are estimates: the next is at least so much smaller that few are needed, and at most so much that none is far
+// too small.
+constexpr double least_cut = 0.5, most_cut = 1.0 / 16.0;
+// A part whose series ends too early is cut by the root of the excess, or by this where rounding leaves none.
+constexpr double least_shortening = 0.9;
 // A power law δ^p of other p than 1, 2, 3, 4 has a series as far as δ does not change by more than this part of it;
 // where that is for parts below this fraction of the time in which the motion changes, IDA needs fewer steps.
 constexpr double part_of_depth = 0.5, least_part = 0.1;
@@ -24,21 +29,21 @@ constexpr double most_decay = 100.0;
 
 }  // namespace
 
-Flight::Flight(const Motion& motion, const Parameters& parameters)
-    : motion_(motion), parameters_(parameters), integrated_(motion, parameters) {}
+Flight::Flight(const EquationOfMotion& equation, const Parameters& parameters)
+    : equation_(equation), parameters_(parameters), integrated_(equation, parameters) {}
 
 const FlightEnd& Flight::run(const Start& start) {
   start_ = start;
   reached_ = {Event::none, 0.0, false, start.y, start.z, 0.0, 0.0, 0.0, 0};
   Expansion motion = expand(start.size);
-  Motion::Rates rates = this->rates(motion);
+  EquationOfMotion::Rates rates = this->rates(motion);
   while (size_ * rates.sum() > 1.0) {
-    motion = expand(std::clamp(1.0 / rates.sum(), size_ / 16, size_ / 2));
+    motion = expand(std::clamp(1.0 / rates.sum(), most_cut * size_, least_cut * size_));
     rates = this->rates(motion);
   }
   bool in_parts = rates.decay <= rates.oscillation || start.size * rates.decay <= most_decay;
   for (; in_parts && !analytic(motion); in_parts = size_ * rates.sum() > least_part) {
-    motion = expand(size_ / 2);
+    motion = expand(least_cut * size_);
     rates = this->rates(motion);
   }
   if (in_parts)
@@ -62,21 +67,21 @@ Expansion Flight::expand(double size) {
   size_ = size;
   loads_ = start_.loads.scaled(size);
   for (touching_ = false;; touching_ = true) {
-    Expansion motion(motion_.elongation(start_.y), start_.z, start_.depth, loads_, size);
-    while (motion.highest <= least_order) motion_.extend(motion, touching_, loads_, size);
+    Expansion motion(equation_.elongation(start_.y), start_.z, start_.depth, loads_, size);
+    while (motion.highest <= least_order) equation_.extend(motion, touching_, loads_, size);
     if (start_.released) motion.x[2] = 0.0;
     if (touching_ || !parameters_.compliant() || direction(motion.depth) <= 0.0) return motion;
   }
 }
 
-Motion::Rates Flight::rates(const Expansion& motion) const {
+EquationOfMotion::Rates Flight::rates(const Expansion& motion) const {
   const Series &x = motion.x, &depth = motion.depth;
   Compliance::Slopes slopes{};
   if (touching_) {
     const double deepest = start_.depth + std::abs(depth[1]) + std::abs(depth[2]);
-    slopes = motion_.compliance().slopes(deepest, depth[1] / size_);
+    slopes = equation_.compliance().slopes(deepest, depth[1] / size_);
   }
-  const auto rates = motion_.rates(std::abs(x[0]) + std::abs(x[1]) + std::abs(x[2]), slopes);
+  const auto rates = equation_.rates(std::abs(x[0]) + std::abs(x[1]) + std::abs(x[2]), slopes);
   if (!std::isfinite(rates.sum())) throw SolverError(out_of_range);
   return rates;
 }
@@ -84,15 +89,15 @@ Motion::Rates Flight::rates(const Expansion& motion) const {
 /// Whether the contact force is, as far as the part goes.
 bool Flight::analytic(const Expansion& motion) const {
   if (!touching_) return true;
-  const Compliance& law = motion_.compliance();
+  const Compliance& law = equation_.compliance();
   const Series& depth = motion.depth;
-  double way = 0.0, change = 0.0;  // of the depth and of its rate
+  double change = 0.0, change_of_rate = 0.0;  // of the depth
   for (std::size_t k = 1; k <= least_order; ++k) {
-    way += std::abs(depth[k]);
-    if (k > 1) change += static_cast<double>(k) * std::abs(depth[k]) / size_;
+    change += std::abs(depth[k]);
+    if (k > 1) change_of_rate += static_cast<double>(k) * std::abs(depth[k]) / size_;
   }
-  const bool smooth_power = law.polynomial() || way <= part_of_depth * start_.depth;
-  return smooth_power && (!law.damped() || 2.0 * change < std::abs(law.release_speed() + depth[1] / size_));
+  const bool smooth_power = law.polynomial() || change <= part_of_depth * start_.depth;
+  return smooth_power && (!law.damped() || 2.0 * change_of_rate < std::abs(law.release_speed() + depth[1] / size_));
 }
 
 /// An upper estimate of the terms that are left out. A power law carries each coefficient on over as many orders as its
@@ -113,12 +118,13 @@ void Flight::follow(Expansion& motion, double oscillation) {
     return part * std::max({std::abs(c[1]), std::abs(c[2]), std::abs(c[3]), std::abs(c[4])});
   };
   const auto excess = [&] { return neglected(motion, oscillation) > allowed(); };
-  while (motion.highest <= max_order && excess()) motion_.extend(motion, touching_, loads_, size_);
+  while (motion.highest <= max_order && excess()) equation_.extend(motion, touching_, loads_, size_);
   while (excess()) {
-    const double shorter = std::pow(allowed() / neglected(motion, oscillation), 1.0 / max_order);
-    if (!(shorter > 0.0)) throw SolverError(out_of_range);
-    motion.shorten(std::min(shorter, 0.9));
-    size_ *= std::min(shorter, 0.9);
+    const double root = std::pow(allowed() / neglected(motion, oscillation), 1.0 / max_order);
+    if (!(root > 0.0)) throw SolverError(out_of_range);
+    const double shorter = std::min(root, least_shortening);
+    motion.shorten(shorter);
+    size_ *= shorter;
   }
   const int order = static_cast<int>(motion.highest) - 1;
 
@@ -152,7 +158,7 @@ void Flight::follow(Expansion& motion, double oscillation) {
 
 /// By α_s, and by the contact: what the contact force does along the depth, less what the law stores.
 double Flight::dissipated(const Expansion& motion, int order, double s) const {
-  const Compliance& law = motion_.compliance();
+  const Compliance& law = equation_.compliance();
   const auto work = [&](const auto& force, const Series& along, int highest) {
     std::array<double, std::size_t{2} * max_order> done{};
     for (std::size_t i = 0; i <= static_cast<std::size_t>(highest); ++i)
@@ -161,8 +167,8 @@ double Flight::dissipated(const Expansion& motion, int order, double s) const {
     return sum_of_powers(done, s, 1, highest + order);
   };
   double lost = 0.0;
-  if (motion_.damping() > 0.0)
-    lost += motion_.damping() / size_ *
+  if (equation_.damping() > 0.0)
+    lost += equation_.damping() / size_ *
             work([&](std::size_t i) { return static_cast<double>(i + 1) * motion.x[i + 1]; }, motion.x, order - 1);
   if (touching_ && law.damped())
     lost += work([&](std::size_t i) { return motion.contact.elastic[i] + motion.contact.damping[i]; }, motion.depth,

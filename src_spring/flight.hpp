@@ -2,18 +2,18 @@
 //
 // Where the forces are analytic, the motion is its Taylor series, y = Σ c_k sᵏ, with H so small that what the series
 // leaves out is below rounding at the default tolerance. Its integrals are exact, and so are its falls to the stop and
-// to the tip (falls.hpp). Two kinds of motion are left to IDA (integrated_flight.hpp): one in touch with the tip where
+// to the tip (events.hpp). Two kinds of motion are left to IDA (integrated_flight.hpp): one in touch with the tip where
 // the law's power has no series, and one over a span in which damping lets most of it die out.
 #pragma once
 
+#include "equation_of_motion.hpp"
 #include "integrated_flight.hpp"
-#include "motion.hpp"
 
 namespace spring {
 
 class Flight {
  public:
-  Flight(const Motion& motion, const Parameters& parameters);
+  Flight(const EquationOfMotion& equation, const Parameters& parameters);
 
   /// Flies on to an event, to the end, or as far as one series serves.
   /// @throws SolverError; reached() says how far it came
@@ -22,14 +22,14 @@ class Flight {
 
  private:
   Expansion expand(double size);
-  Motion::Rates rates(const Expansion& motion) const;
+  EquationOfMotion::Rates rates(const Expansion& motion) const;
   bool analytic(const Expansion& motion) const;
   double neglected(const Expansion& motion, double oscillation) const;
   void follow(Expansion& motion, double oscillation);
   void integrate();
   double dissipated(const Expansion& motion, int order, double s) const;
 
-  const Motion& motion_;
+  const EquationOfMotion& equation_;
   const Parameters& parameters_;
   IntegratedFlight integrated_;
   Start start_{};

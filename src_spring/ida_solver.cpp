@@ -1,6 +1,5 @@
 #include "ida_solver.hpp"
 
-#include <ida/ida.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
@@ -42,12 +41,6 @@ Handle made(Handle handle) {
 }
 
 }  // namespace
-
-void IdaSolver::Destroy::operator()(N_Vector made) const { N_VDestroy(made); }
-void IdaSolver::Destroy::operator()(SUNMatrix made) const { SUNMatDestroy(made); }
-void IdaSolver::Destroy::operator()(SUNLinearSolver made) const { SUNLinSolFree(made); }
-void IdaSolver::Destroy::operator()(SUNContext made) const { SUNContext_Free(&made); }
-void IdaSolver::Destroy::operator()(void* ida) const { IDAFree(&ida); }
 
 int IdaSolver::residual(double s, N_Vector Y, N_Vector Yp, N_Vector F, void* solver) {
   const ImplicitSystem& system = *static_cast<const IdaSolver*>(solver)->system_;

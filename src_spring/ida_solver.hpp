@@ -2,6 +2,7 @@
 // Memory is allocated once; every start() re-initialises IDA completely, so the result depends on the arguments alone.
 #pragma once
 
+#include <ida/ida.h>
 #include <nvector/nvector_serial.h>
 #include <sundials/sundials_context.h>
 #include <sundials/sundials_linearsolver.h>
@@ -64,11 +65,11 @@ class IdaSolver {
 
  private:
   struct Destroy {
-    void operator()(N_Vector made) const;
-    void operator()(SUNMatrix made) const;
-    void operator()(SUNLinearSolver made) const;
-    void operator()(SUNContext made) const;
-    void operator()(void* ida) const;
+    void operator()(N_Vector made) const { N_VDestroy(made); }
+    void operator()(SUNMatrix made) const { SUNMatDestroy(made); }
+    void operator()(SUNLinearSolver made) const { SUNLinSolFree(made); }
+    void operator()(SUNContext made) const { SUNContext_Free(&made); }
+    void operator()(void* made) const { IDAFree(&made); }
   };
   template <class Handle>
   using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Destroy>;

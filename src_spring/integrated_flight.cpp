@@ -25,8 +25,8 @@ enum Unknown { q, p, A, B, e, unknowns };
 
 }  // namespace
 
-IntegratedFlight::IntegratedFlight(const Motion& motion, const Parameters& parameters)
-    : motion_(motion), parameters_(parameters), solver_(unknowns) {}
+IntegratedFlight::IntegratedFlight(const EquationOfMotion& equation, const Parameters& parameters)
+    : equation_(equation), parameters_(parameters), solver_(unknowns) {}
 
 FlightEnd IntegratedFlight::run(const Start& start, bool touching) {
   start_ = start;
@@ -52,19 +52,19 @@ FlightEnd IntegratedFlight::reached(Event event) const {
 
 void IntegratedFlight::launch() {
   const double H = start_.size, z = start_.z;
-  const Compliance& law = motion_.compliance();
+  const Compliance& law = equation_.compliance();
   const auto contact = [&](double deep, double rate) { return touching_ ? law.force(deep, rate) : 0.0; };
   const double rate = depth_rate(H * z, 0.0), force = contact(start_.depth, rate), F = loads_.force[0];
-  const double a = start_.released ? 0.0 : motion_.acceleration(start_.y, z, F, force);
+  const double a = start_.released ? 0.0 : equation_.acceleration(start_.y, z, F, force);
 
   // What y and z are, or become over the span or the time in which the motion changes.
   const Compliance::Slopes slopes = touching_ ? law.slopes(start_.depth, rate) : Compliance::Slopes{};
-  const double change = motion_.rates(std::abs(motion_.elongation(start_.y)), slopes).sum();
+  const double change = equation_.rates(std::abs(equation_.elongation(start_.y)), slopes).sum();
   const double span = H * change > 1.0 ? 1.0 / change : H;
   const double velocity = std::abs(z) + std::abs(a) * span, displacement = std::abs(start_.y) + velocity * span;
   // Rounding of the forces, but that of damping, which grows no larger than that of the velocity.
-  const double forces = std::abs(F) + std::abs(motion_.spring_force(start_.y)) + force;
-  const double noise = noise_margin * epsilon * forces / motion_.mass() * span;
+  const double forces = std::abs(F) + std::abs(equation_.spring_force(start_.y)) + force;
+  const double noise = noise_margin * epsilon * forces / equation_.mass() * span;
   const auto tolerance = [&](double size, double least) {
     const double wanted = share * (parameters_.relative_tolerance * size + parameters_.absolute_tolerance);
     return std::max({wanted, least, least_tolerance});
@@ -73,7 +73,7 @@ void IntegratedFlight::launch() {
   double* tolerances = solver_.absolute_tolerance();
   tolerances[q] = tolerances[A] = tolerances[B] = of_y;
   tolerances[p] = H * of_z;
-  tolerances[e] = motion_.mass() * (velocity + of_z) * of_z;
+  tolerances[e] = equation_.mass() * (velocity + of_z) * of_z;
 
   double* Y = solver_.initial_value();
   double* Yp = solver_.initial_derivative();
@@ -82,14 +82,14 @@ void IntegratedFlight::launch() {
   Y[p] = Yp[q] = H * z;
   Yp[p] = H * H * a;
   const double lost = touching_ ? law.continued(start_.depth, rate).dissipation : 0.0;
-  Yp[e] = H * (motion_.damping() * z * z + lost);
+  Yp[e] = H * (equation_.damping() * z * z + lost);
 
   // Errors of q and p in a step of backward Euler, along the parabola of the start.
   const auto too_long = [&](double s) {
     const double rise = s * H * (z + s * H * a / 2), later = z + s * H * a;
     const double deeper = start_.depth + std::abs(depth(rise, s) - start_.depth);
-    const double then =
-        motion_.acceleration(start_.y + rise, later, value(loads_.force, s), contact(deeper, depth_rate(H * later, s)));
+    const double then = equation_.acceleration(start_.y + rise, later, value(loads_.force, s),
+                                               contact(deeper, depth_rate(H * later, s)));
     return s * s * H * H * std::abs(a) > 2.0 * of_y || s * H * std::abs(then - a) > 2.0 * of_z;
   };
   int halvings = 0;
@@ -122,28 +122,28 @@ double IntegratedFlight::depth_rate(double p, double s) const { return (p - rate
 bool IntegratedFlight::residual(double s, const double* Y, const double* Yp, double* F) const noexcept {
   const double H = start_.size, z = Y[p] / H;
   Compliance::Effect contact{};
-  if (touching_) contact = motion_.compliance().continued(depth(Y[q], s), depth_rate(Y[p], s));
+  if (touching_) contact = equation_.compliance().continued(depth(Y[q], s), depth_rate(Y[p], s));
   F[q] = Yp[q] - Y[p];
-  F[p] = Yp[p] - H * H * motion_.acceleration(start_.y + Y[q], z, value(loads_.force, s), contact.force);
+  F[p] = Yp[p] - H * H * equation_.acceleration(start_.y + Y[q], z, value(loads_.force, s), contact.force);
   F[A] = Yp[A] - Y[q];
   F[B] = Yp[B] - Y[A];
-  F[e] = Yp[e] - H * (motion_.damping() * z * z + contact.dissipation);
+  F[e] = Yp[e] - H * (equation_.damping() * z * z + contact.dissipation);
   return std::isfinite(F[p]) && std::isfinite(F[e]);
 }
 
 void IntegratedFlight::jacobian(double s, double c, const double* Y, const double*, double* J) const noexcept {
   const double H = start_.size;
   Compliance::Slopes contact{};
-  if (touching_) contact = motion_.compliance().slopes(depth(Y[q], s), depth_rate(Y[p], s));
+  if (touching_) contact = equation_.compliance().slopes(depth(Y[q], s), depth_rate(Y[p], s));
   const auto at = [J](int row, int column) -> double& { return J[column * unknowns + row]; };
   for (int i = 0; i < unknowns; ++i) at(i, i) = c;
   at(q, p) = -1.0;
-  at(p, q) = -H * H * motion_.acceleration_by_displacement(start_.y + Y[q], contact.force_by_depth);
-  at(p, p) = c - H * motion_.acceleration_by_velocity(contact.force_by_rate);
+  at(p, q) = -H * H * equation_.acceleration_by_displacement(start_.y + Y[q], contact.force_by_depth);
+  at(p, p) = c - H * equation_.acceleration_by_velocity(contact.force_by_rate);
   at(A, q) = -1.0;
   at(B, A) = -1.0;
   at(e, q) = -H * contact.dissipation_by_depth;
-  at(e, p) = -2.0 * motion_.damping() * Y[p] / H - contact.dissipation_by_rate;
+  at(e, p) = -2.0 * equation_.damping() * Y[p] / H - contact.dissipation_by_rate;
 }
 
 }  // namespace spring

@@ -6,9 +6,9 @@
 // are under error control.
 #pragma once
 
+#include "equation_of_motion.hpp"
 #include "events.hpp"
 #include "ida_solver.hpp"
-#include "motion.hpp"
 
 namespace spring {
 
@@ -36,7 +36,7 @@ struct FlightEnd {
 
 class IntegratedFlight final : public ImplicitSystem {
  public:
-  IntegratedFlight(const Motion& motion, const Parameters& parameters);
+  IntegratedFlight(const EquationOfMotion& equation, const Parameters& parameters);
 
   /// Flies on to an event or to the end; `touching` the tip, or not.
   /// @throws SolverError; reached() says how far it came
@@ -52,7 +52,7 @@ class IntegratedFlight final : public ImplicitSystem {
   double depth(double q, double s) const;       ///< y − u_tip [m]
   double depth_rate(double p, double s) const;  ///< [m/s]
 
-  const Motion& motion_;
+  const EquationOfMotion& equation_;
   const Parameters& parameters_;
   IdaSolver solver_;
   Start start_{};

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "rest.hpp"
+#include "seated.hpp"
 #include "text.hpp"
 
 namespace spring {
@@ -15,8 +15,8 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 /// In one step, counted in internal steps of IDA: some two thousand periods of the spring. A step that needs more is
 /// refused, so that no call lasts longer than a second or two. To start a segment costs as much as some steps.
 constexpr long most_work = 250'000;
-constexpr double smallest_step = 1e-100;
-constexpr double far = 1e9;  ///< as many hilltops away, nothing brings a top back
+constexpr double smallest_step = 1e-100;  ///< [s], whose square, of a series, is far above the least number
+constexpr double far = 1e9;               ///< as many hilltops away, nothing brings a top back
 
 }  // namespace
 
@@ -48,7 +48,7 @@ class Spring::Step {
       fail(error.what(), spring_.flight_.reached().y, t_ + spring_.flight_.reached().elapsed);
     }
     const Reached reached{remaining() > 0.0 ? t_ : size_, to_event && ends()};
-    state_.stop_force = held_ / reached.size;
+    state_.stop_force = seated_impulse_ / reached.size;
     if (reached.event && meeting_) state_.meeting = 1.0;
     return reached;
   }
@@ -82,13 +82,13 @@ class Spring::Step {
     return parameters_.compliant() && direction<3>({depth_, state_.z - u[1], -u[2] / 2}) > 0.0;
   }
 
-  /// At the foundation: rebound, or come to rest, or leave.
+  /// At the foundation: rebound, or stay seated, or leave.
   /// Deviation: impacts that die out are cut short when the top, pressed down, would rise no higher than the solver's
   /// tolerance of y; its last velocity is then lost too.
   void land() {
     const double gap = state_.y - parameters_.stop_position;
     if (gap > 0.0) return;
-    const auto N = spring_.motion_.holding_force(state_.y, now_, touching(), depth_);
+    const auto N = spring_.equation_.holding_force(state_.y, now_, touching(), depth_);
     const bool pressed = direction<3>({N[0], N[1], N[2] / 2}) >= 0.0;
     const double before = state_.z;
     if (before < 0.0) {
@@ -105,13 +105,14 @@ class Spring::Step {
   }
 
   void stay() {
-    const Rest rest = spring::rest(spring_.motion_, state_.y, depth_, parameters_.compliant(), now_, remaining());
-    state_.integral_2 += (state_.integral + state_.y * rest.size / 2) * rest.size;
-    state_.integral += state_.y * rest.size;
-    state_.dissipated += rest.dissipated;
-    held_ += rest.impulse;
-    t_ = rest.released ? t_ + rest.size : size_;
-    released_ = happened_ = rest.released;
+    const SeatedEnd stayed =
+        stay_seated(spring_.equation_, state_.y, depth_, parameters_.compliant(), now_, remaining());
+    state_.integral_2 += (state_.integral + state_.y * stayed.size / 2) * stayed.size;
+    state_.integral += state_.y * stayed.size;
+    state_.dissipated += stayed.dissipated;
+    seated_impulse_ += stayed.impulse;
+    t_ = stayed.released ? t_ + stayed.size : size_;
+    released_ = happened_ = stayed.released;
     if (released_) state_.seated = 0.0;
     meeting_ = false;
   }
@@ -154,18 +155,18 @@ class Spring::Step {
   State state_;
   const double size_;
   const Loads loads_;
-  double t_ = 0.0;         ///< since the step's start
-  long work_ = 0;          ///< what was done so far
-  Loads now_;              ///< loads_ from t_ on
-  double depth_ = -1.0;    ///< y − u_tip at t_
-  bool meeting_;           ///< tip and top are at a contact event: y = u_tip
-  double held_ = 0.0;      ///< ∫N while seated
-  bool released_ = false;  ///< has just left the foundation, N = 0
-  bool happened_ = false;  ///< the last segment ended at an event
+  double t_ = 0.0;               ///< since the step's start
+  long work_ = 0;                ///< what was done so far
+  Loads now_;                    ///< loads_ from t_ on
+  double depth_ = -1.0;          ///< y − u_tip at t_
+  bool meeting_;                 ///< tip and top are at a contact event: y = u_tip
+  double seated_impulse_ = 0.0;  ///< ∫N while seated
+  bool released_ = false;        ///< has just left the foundation, N = 0
+  bool happened_ = false;        ///< the last segment ended at an event
 };
 
 Spring::Spring(const Parameters& p)
-    : parameters_((check(p), p)), motion_(p), flight_(motion_, parameters_), state_{p.displacement, p.velocity} {}
+    : parameters_((check(p), p)), equation_(p), flight_(equation_, parameters_), state_{p.displacement, p.velocity} {}
 
 Spring::Reached Spring::step_to_event(double size, const Inputs& inputs, double time, bool to_event) {
   if (size < smallest_step)
@@ -178,7 +179,7 @@ Spring::Reached Spring::step_to_event(double size, const Inputs& inputs, double 
   const Reached reached = step.run(to_event);
   state_ = step.state();
   const double done = reached.size;
-  see(loads, done, true);
+  observe(loads.from_time(done), true);
   // Impacts turn the velocity around, y goes on: the step's integrals know the work through all of its events.
   state_.load_work += work(load_of(parameters_, inputs), done, state_.y - before.y, state_.integral - before.y * done,
                            state_.integral_2 - before.y * done * done / 2);
@@ -192,7 +193,7 @@ Spring::Reached Spring::step_to_event(double size, const Inputs& inputs, double 
 }
 
 void Spring::strike(double time) {
-  Step step(*this, time, 0.0, {{state_.force, 0.0, 0.0}, tip()});
+  Step step(*this, time, 0.0, {{state_.observed.force, 0.0, 0.0}, tip()});
   step.arrive();
   state_ = step.state();
 }
@@ -201,21 +202,12 @@ bool Spring::finite() const {
   // A sum is not finite where one of its terms is not.
   const State& s = state_;
   return std::isfinite(s.y + s.z + s.integral + s.integral_2 + s.dissipated + s.impact_loss + s.load_work +
-                       s.stop_force + s.stop_impulse + s.force + s.tip + s.tip_rate + s.tip_curvature + acceleration() +
-                       reaction() + kinetic_energy() + potential_energy() + contact_energy());
+                       s.stop_force + s.stop_impulse + s.observed.force + tip()[0] + tip()[1] + tip()[2] +
+                       acceleration() + reaction() + kinetic_energy() + potential_energy() + contact_energy());
 }
 
-/// What acts at `t` is what accelerations and reactions refer to.
-void Spring::see(const Loads& loads, double t, bool extrapolated) {
-  state_.force = value(loads.force, t);
-  state_.tip = value(loads.tip, t);
-  state_.tip_rate = rate(loads.tip, t);
-  state_.tip_curvature = loads.tip[2];
-  state_.extrapolated = extrapolated ? 1.0 : 0.0;
-}
-
-void Spring::observe(const Inputs& inputs, bool extrapolated) {
-  see(Loads::from(parameters_, inputs), 0.0, extrapolated);
+void Spring::observe(const Loads& loads, bool extrapolated) {
+  state_.observed = {loads.force[0], loads.tip, extrapolated ? 1.0 : 0.0};
 }
 
 void Spring::apply_impulse(double impulse) {
@@ -224,23 +216,23 @@ void Spring::apply_impulse(double impulse) {
 }
 
 double Spring::acceleration() const {
-  return seated() ? 0.0 : motion_.acceleration(state_.y, state_.z, state_.force, reaction());
+  return seated() ? 0.0 : equation_.acceleration(state_.y, state_.z, state_.observed.force, reaction());
 }
 double Spring::jerk(double force_rate, double reaction_rate) const {
   if (seated()) return 0.0;
   return (force_rate - reaction_rate - parameters_.damping * acceleration()) / parameters_.mass +
-         motion_.acceleration_by_displacement(state_.y, 0.0) * state_.z;
+         equation_.acceleration_by_displacement(state_.y, 0.0) * state_.z;
 }
 double Spring::reaction() const {
-  return parameters_.compliant() ? motion_.compliance().force(depth(), state_.z - state_.tip_rate) : 0.0;
+  return parameters_.compliant() ? equation_.compliance().force(depth(), state_.z - tip()[1]) : 0.0;
 }
 Compliance::Slopes Spring::reaction_slopes() const {
   if (depth() <= 0.0) return {};
-  return motion_.compliance().slopes(depth(), state_.z - state_.tip_rate);
+  return equation_.compliance().slopes(depth(), state_.z - tip()[1]);
 }
 double Spring::kinetic_energy() const { return parameters_.mass / 2 * state_.z * state_.z; }
-double Spring::potential_energy() const { return motion_.potential_energy(state_.y); }
-double Spring::spring_force() const { return motion_.spring_force(state_.y); }
-double Spring::contact_energy() const { return motion_.compliance().energy(depth()); }
+double Spring::potential_energy() const { return equation_.potential_energy(state_.y); }
+double Spring::spring_force() const { return equation_.spring_force(state_.y); }
+double Spring::contact_energy() const { return equation_.compliance().energy(depth()); }
 
 }  // namespace spring

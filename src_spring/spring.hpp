@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "equation_of_motion.hpp"
 #include "flight.hpp"
-#include "motion.hpp"
 #include "parameters.hpp"
 
 namespace spring {
@@ -44,12 +44,15 @@ class Spring {
   /// The same step, if `to_event` only to the first event after its start: contact begins or ends, the top meets the
   /// foundation or leaves it. What happens there is due in strike() or at the start of the next step.
   Reached step_to_event(double size, const Inputs& inputs, double time, bool to_event);
-  /// At the foundation inside: rebound, or come to rest, at `time`, under the inputs as observed.
+  /// At the foundation inside: rebound, or stay seated, at `time`, under the inputs as observed.
   void strike(double time);
 
   /// Take `inputs` as acting at the present instant, for acceleration(), reaction() and contact_energy() before the
-  /// first step or after an input has jumped. The motion does not depend on it. `extrapolated`: see there.
-  void observe(const Inputs& inputs, bool extrapolated = false);
+  /// first step or after an input has jumped. The motion does not depend on it. `extrapolated`:
+  /// as extrapolated() then says.
+  void observe(const Inputs& inputs, bool extrapolated = false) {
+    observe(Loads::from(parameters_, inputs), extrapolated);
+  }
 
   /// Instantaneous upward impulse J [N·s]: z += J/m.
   void apply_impulse(double impulse);
@@ -76,11 +79,11 @@ class Spring {
   double jerk(double force_rate, double reaction_rate) const;
   double reaction() const;                     ///< C of the law inside [N]; 0 for external
   Compliance::Slopes reaction_slopes() const;  ///< of it
-  double elastic_reaction() const { return motion_.compliance().elastic(depth()); }  ///< λ_nc (y − u_tip)₊^p [N]
+  double elastic_reaction() const { return equation_.compliance().elastic(depth()); }  ///< λ_nc (y − u_tip)₊^p [N]
   double contact_energy() const;  ///< λ_nc (y − u_tip)₊^{p+1}/(p+1) of the law inside [J]
-  Polynomial tip() const { return {state_.tip, state_.tip_rate, state_.tip_curvature}; }  ///< u_tip [m], its rates
+  const Polynomial& tip() const { return state_.observed.tip; }  ///< u_tip [m], its rates
   /// Whether the tip is where the last step left it, and none has been observed since.
-  bool extrapolated() const { return state_.extrapolated != 0.0; }
+  bool extrapolated() const { return state_.observed.extrapolated != 0.0; }
 
   /// The whole dynamic state: all that a step changes, in doubles.
   struct State {
@@ -88,13 +91,16 @@ class Spring {
     double integral = 0.0, integral_2 = 0.0;
     double dissipated = 0.0, impact_loss = 0.0, load_work = 0.0;
     double stop_force = 0.0, stop_impulse = 0.0;
-    double seated = 0.0;                                    ///< 1 on the foundation
-    double force = 0.0;                                     ///< F where the step ended, or as observed
-    double tip = 0.0, tip_rate = 0.0, tip_curvature = 0.0;  ///< u_tip there
+    double seated = 0.0;  ///< 1 on the foundation
     double impacts = 0.0, last_impact = -1.0;
-    double extrapolated = 0.0;  ///< 1: by a step, not observed
-    double steps = 0.0;         ///< IDA's, since the start
-    double meeting = 0.0;       ///< 1: the last step ended early where contact begins or ends
+    double steps = 0.0;    ///< internal ones, since the start
+    double meeting = 0.0;  ///< 1: the last step ended early where contact begins or ends
+    /// What acts at the present instant, where the step ended or as observed. No step depends on it.
+    struct Observed {
+      double force;         ///< F [N]
+      Polynomial tip;       ///< u_tip [m], its rates
+      double extrapolated;  ///< 1: by a step, not observed
+    } observed{};
   };
   const State& state() const { return state_; }
   /// @pre the state is of a spring with the same parameters
@@ -102,12 +108,12 @@ class Spring {
 
  private:
   class Step;
-  void see(const Loads& loads, double t, bool extrapolated);
-  double depth() const { return parameters_.compliant() ? state_.y - state_.tip : -1.0; }
+  void observe(const Loads& loads, bool extrapolated);
+  double depth() const { return parameters_.compliant() ? state_.y - tip()[0] : -1.0; }
   bool finite() const;
 
   const Parameters parameters_;
-  const Motion motion_;
+  const EquationOfMotion equation_;
   Flight flight_;
   State state_;
 };

@@ -6,7 +6,7 @@
 
 namespace fmi {
 
-Status Component::tell(Status status, const std::string& what) {
+Status Component::report(Status status, const std::string& what) {
   constexpr const char* categories[] = {"logEvents", "logStatusWarning", "logStatusDiscard", "logStatusError"};
   if (status == Status::error) instance.progress.phase = error;
   const bool event = status == Status::ok;
@@ -17,7 +17,7 @@ Status Component::tell(Status status, const std::string& what) {
 
 void Component::enter(Phase phase, const char* event) {
   instance.progress.phase = phase;
-  tell(Status::ok, event);
+  report(Status::ok, event);
 }
 
 const char* Component::phase_text() const {
@@ -38,7 +38,7 @@ void Component::set_debugging(bool on, std::size_t n, const char* const categori
     const std::string name = categories[i];
     const auto same = [&](const LogCategory& category) { return name == category.name; };
     if (std::none_of(std::begin(log_categories), std::end(log_categories), same))
-      tell(Status::warning, "there is no log category '" + name + "'");
+      report(Status::warning, "there is no log category '" + name + "'");
     events = events || name == "logEvents" || name == "logAll";
   }
   log_events_ = on && events;
@@ -52,7 +52,7 @@ void Component::start() {
 void Component::reset() {
   instance.reset();
   terminated = false;
-  tell(Status::ok, "reset");
+  report(Status::ok, "reset");
 }
 
 Model::Reached Component::step(double time, double size, bool to_event) {
@@ -65,7 +65,7 @@ Model::Reached Component::step(double time, double size, bool to_event) {
     throw;
   }
   const std::string warning = instance.take_warning();
-  if (!warning.empty()) tell(Status::warning, warning);
+  if (!warning.empty()) report(Status::warning, warning);
   return reached;
 }
 
@@ -161,7 +161,7 @@ Component* instantiate(const char* function, const Log& log, bool log_events, co
     if (guid() != identity) {
       throw std::invalid_argument("the GUID " + std::string(identity) + " is not that of this FMU, " + guid());
     }
-    k.tell(Status::ok, "instantiated");
+    k.report(Status::ok, "instantiated");
   });
   return status == Status::ok ? made.release() : nullptr;
 }

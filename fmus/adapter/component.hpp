@@ -53,8 +53,8 @@ class Component {
 
   /// Sends a message. Events, with Status::ok, are sent if debugging is on for them; the rest always, with the
   /// function's name. After an error the instance is in the phase `error`.
-  Status tell(Status status, const std::string& what);
-  /// Enters a phase, which is told as `event`.
+  Status report(Status status, const std::string& what);
+  /// Enters a phase, which is reported as `event`.
   void enter(Phase phase, const char* event);
   const char* phase_text() const;
 
@@ -62,7 +62,7 @@ class Component {
   void set_debugging(bool on, std::size_t n, const char* const categories[]);
   void start();  ///< the end of initialization mode
   void reset();
-  /// A step of the instance. The model's warning is told, no more: the step is done, and some masters stop at any
+  /// A step of the instance. The model's warning is reported, no more: the step is done, and some masters stop at any
   /// status but OK.
   Model::Reached step(double time, double size, bool to_event = false);
 
@@ -104,9 +104,9 @@ Status guard(void* c, const char* function, unsigned legal, const Body& body) no
       body(component);
       return Status::ok;
     } catch (const Discarded& e) {
-      return component.tell(Status::discard, e.what());
+      return component.report(Status::discard, e.what());
     } catch (const std::exception& e) {
-      return component.tell(Status::error, e.what());
+      return component.report(Status::error, e.what());
     }
   } catch (...) {  // out of memory while reporting, or what is no std::exception
     phase = error;

@@ -156,9 +156,9 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean* discreteStatesN
                                     fmi3Float64* nextEventTime) {
   return call(c, __func__, event_mode, [&](Component& k) {
     k.instance.update();
-    for (fmi3Boolean* told : {discreteStatesNeedUpdate, terminateSimulation, nominalsOfContinuousStatesChanged,
+    for (fmi3Boolean* flag : {discreteStatesNeedUpdate, terminateSimulation, nominalsOfContinuousStatesChanged,
                               valuesOfContinuousStatesChanged, nextEventTimeDefined})
-      if (told) *told = fmi3False;
+      if (flag) *flag = fmi3False;
     if (nextEventTime) *nextEventTime = 0.0;
   });
 }

@@ -263,7 +263,7 @@ void Instance::drop_used(bool stepped) {
     values_[i] = {consumed ? 0.0 : past[0], 0.0, 0.0};
     settable_[i]->set(*model_, values_[i]);
   }
-  if (stepped) model_->settle();
+  if (stepped) model_->forget_what_was_set();
   dirty_ = true;
   inputs_set_ = inputs_set_ && !stepped;
 }

@@ -17,7 +17,7 @@ using Polynomial = std::array<double, 3>;
 /// which does no harm.
 class Discarded : public std::runtime_error {
  public:
-  /// Whether a step of another size may do. Where none does, importers are told to end the simulation: they would ask
+  /// Whether a step of another size may do. Where none does, importers are asked to end the simulation: they would ask
   /// again and again. Those that know better change inputs or restore a state.
   enum class Remedy { other_size, none };
 
@@ -55,15 +55,15 @@ class Model {
   /// Called in event mode: what happens at this instant, impulses and impacts, happens now and not in the next step.
   virtual void update(double time) = 0;
 
-  /// Called after step() or update() and after inputs have lost their derivatives and impulses.
-  virtual void settle() {}
+  /// Called after step(), when inputs have lost their derivatives and impulses: what is set from now on is new.
+  virtual void forget_what_was_set() {}
 
   /// Called for every saved state; the vector is flat and holds everything that build() does not make.
   virtual void save(std::vector<double>& state) const = 0;
   /// A state that a model with these parameters has saved. @throws std::invalid_argument if its length does not fit
   virtual void restore(const std::vector<double>& state) = 0;
 
-  /// Set by step() where the user should be told something that is no error; cleared by whoever tells it.
+  /// Set by step() to what the user should know and is no error; cleared by whoever reports it.
   std::string warning;
   int refused = 0;  ///< steps, counted by whoever asks for them; no part of the state
 };

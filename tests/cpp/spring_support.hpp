@@ -11,6 +11,11 @@
 
 namespace spring_test {
 
+using spring::ContactLaw;
+using spring::Inputs;
+using spring::Parameters;
+using spring::Spring;
+
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr double pi = 3.14159265358979323846;
 
@@ -69,6 +74,40 @@ struct Duffing {
     return softening ? A * omega * j.cn * j.dn : -A * omega * j.sn * j.dn;
   }
 };
+
+/// m = 1, from y and z.
+inline Parameters duffing(double k1, double k2, double y = 0.0, double z = 0.0) {
+  Parameters p;
+  p.linear_stiffness = k1;
+  p.cubic_stiffness = k2;
+  p.displacement = y;
+  p.velocity = z;
+  return p;
+}
+
+/// A spring with k1 = 1 N/m and the contact law λ δ^p inside.
+inline Parameters compliant(double lambda, double exponent) {
+  Parameters p;
+  p.contact_law = ContactLaw::normal_compliance;
+  p.compliance_stiffness = lambda;
+  p.compliance_exponent = exponent;
+  return p;
+}
+
+/// A free mass above a stop at 0.
+inline Parameters ball(double height, double velocity, double restitution) {
+  Parameters p = duffing(0.0, 0.0, height, velocity);
+  p.stop_enabled = true;
+  p.stop_position = 0.0;
+  p.restitution = restitution;
+  return p;
+}
+
+inline Inputs weight(double force) {
+  Inputs inputs;
+  inputs.external_force[0] = -force;
+  return inputs;
+}
 
 /// y(0), ẏ(0) under m ÿ + c ẏ + k y = F, constant, 0 ≤ c < 2√(km): closed form.
 struct LinearOscillator {

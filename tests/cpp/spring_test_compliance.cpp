@@ -10,22 +10,6 @@
 #include "spring_support.hpp"
 
 using namespace spring_test;
-using spring::ContactLaw;
-using spring::Inputs;
-using spring::Parameters;
-using spring::Spring;
-
-namespace {
-
-Parameters compliant(double lambda, double exponent) {
-  Parameters p;
-  p.contact_law = ContactLaw::normal_compliance;
-  p.compliance_stiffness = lambda;
-  p.compliance_exponent = exponent;
-  return p;
-}
-
-}  // namespace
 
 // What an integrator sees beyond the opening: λ δ^p itself where p is an integer, else its odd part; and the slopes.
 TEST(SpringCompliance, TheLawGoesOnSmoothlyBeyondTheOpening) {

@@ -147,7 +147,7 @@ TEST(IntegratedFlight, JacobianMatchesDifferences) {
   // Undamped, damped and, the tip leaving faster than 1/χ, without a force.
   for (const auto& [damping, speed] : std::array<std::pair<double, double>, 3>{{{0.0, 0.4}, {0.8, 0.4}, {0.8, 3.0}}}) {
     p.compliance_damping = damping;
-    const Motion motion(p);
+    const EquationOfMotion motion(p);
     IntegratedFlight flight(motion, p);
     loads.tip = {0.05, speed, -1.0};
     for (const double size : {H, 40 * H}) {
@@ -159,9 +159,10 @@ TEST(IntegratedFlight, JacobianMatchesDifferences) {
   }
 }
 
-Series expanded(const Motion& motion, double y, double z, const Loads& loads, double H, bool touching, double depth) {
+Series expanded(const EquationOfMotion& equation, double y, double z, const Loads& loads, double H, bool touching,
+                double depth) {
   Expansion e(y, z, depth, loads, H);
-  while (e.highest <= max_order) motion.extend(e, touching, loads, H);
+  while (e.highest <= max_order) equation.extend(e, touching, loads, H);
   return e.x;
 }
 
@@ -182,7 +183,7 @@ TEST(Motion, ExpansionIsThatOfTheMotion) {
     loads.tip = {0.05, speed, -1.0};
     p.compliance_damping = damping;
     p.compliance_exponent = exponent;
-    const Motion motion(p);
+    const EquationOfMotion motion(p);
     const double y = loads.tip[0] + depth;
     const Series c = expanded(motion, y, z, loads, 1.0, touching, depth);
     const double force = touching ? motion.compliance().force(depth, z - speed) : 0.0;

@@ -10,22 +10,6 @@
 #include "spring_support.hpp"
 
 using namespace spring_test;
-using spring::Inputs;
-using spring::Parameters;
-using spring::Spring;
-
-namespace {
-
-Parameters duffing(double k1, double k2, double y, double z) {
-  Parameters p;
-  p.linear_stiffness = k1;
-  p.cubic_stiffness = k2;
-  p.displacement = y;
-  p.velocity = z;
-  return p;
-}
-
-}  // namespace
 
 struct DuffingCase {
   double k1, k2, amplitude, period;

@@ -11,10 +11,6 @@
 #include "spring_support.hpp"
 
 using namespace spring_test;
-using spring::ContactLaw;
-using spring::Inputs;
-using spring::Parameters;
-using spring::Spring;
 
 namespace {
 
@@ -34,12 +30,7 @@ void expect(const std::string& message, std::initializer_list<const char*> parts
   for (const char* part : parts) EXPECT_NE(message.find(part), std::string::npos) << message;
 }
 
-Parameters softening() {
-  Parameters p;
-  p.linear_stiffness = 3.0;
-  p.cubic_stiffness = -0.2;
-  return p;
-}
+Parameters softening() { return duffing(3.0, -0.2); }
 
 const double hilltop = std::sqrt(3.0 / 0.2);
 const double hilltop_energy = 9.0 / (4 * 0.2);  // k1²/4|k2|

@@ -8,32 +8,6 @@
 #include "spring_support.hpp"
 
 using namespace spring_test;
-using spring::ContactLaw;
-using spring::Inputs;
-using spring::Parameters;
-using spring::Spring;
-
-namespace {
-
-/// A free mass above a stop at 0.
-Parameters ball(double height, double velocity, double restitution) {
-  Parameters p;
-  p.linear_stiffness = 0.0;
-  p.displacement = height;
-  p.velocity = velocity;
-  p.stop_enabled = true;
-  p.stop_position = 0.0;
-  p.restitution = restitution;
-  return p;
-}
-
-Inputs weight(double force) {
-  Inputs inputs;
-  inputs.external_force[0] = -force;
-  return inputs;
-}
-
-}  // namespace
 
 // Free fall g from h: impacts at t₁ = √(2h/g) and then after flights 2vₖ/g, vₖ = eᵏ g t₁; all are over at
 // t₁ (1 + e)/(1 − e). Compared at many times with the parabola of the flight it must be in.

@@ -8,10 +8,6 @@
 #include "spring_support.hpp"
 
 using namespace spring_test;
-using spring::ContactLaw;
-using spring::Inputs;
-using spring::Parameters;
-using spring::Spring;
 
 namespace {
 

@@ -39,9 +39,9 @@ struct Expansion {
 /// f_s − m a [N]
 Polynomial load_of(const Parameters& parameters, const Inputs& inputs);
 
-class Motion {
+class EquationOfMotion {
  public:
-  explicit Motion(const Parameters& parameters);
+  explicit EquationOfMotion(const Parameters& parameters);
 
   /// ÿ under F and the contact force C of the law inside. [m/s²]
   double acceleration(double y, double z, double force, double contact) const;

@@ -1,4 +1,4 @@
-#include "motion.hpp"
+#include "equation_of_motion.hpp"
 
 #include <cmath>
 
@@ -26,7 +26,7 @@ Polynomial load_of(const Parameters& parameters, const Inputs& inputs) {
   return load;
 }
 
-Motion::Motion(const Parameters& parameters)
+EquationOfMotion::EquationOfMotion(const Parameters& parameters)
     : mass_(parameters.mass),
       damping_(parameters.damping),
       k1_(parameters.linear_stiffness),
@@ -34,11 +34,11 @@ Motion::Motion(const Parameters& parameters)
       unloaded_(parameters.unloaded),
       compliance_(parameters.compliance_stiffness, parameters.compliance_exponent, parameters.compliance_damping) {}
 
-double Motion::acceleration(double y, double z, double force, double contact) const {
+double EquationOfMotion::acceleration(double y, double z, double force, double contact) const {
   return (force - damping_ * z - spring_force(y) - contact) / mass_;
 }
 
-double Motion::acceleration_by_displacement(double y, double contact_slope) const {
+double EquationOfMotion::acceleration_by_displacement(double y, double contact_slope) const {
   const double x = elongation(y);
   return -(k1_ + 3.0 * k2_ * x * x + contact_slope) / mass_;
 }
@@ -56,7 +56,7 @@ void Expansion::shorten(double factor) {
   }
 }
 
-void Motion::extend(Expansion& motion, bool touching, const Loads& loads, double size) const {
+void EquationOfMotion::extend(Expansion& motion, bool touching, const Loads& loads, double size) const {
   auto& [x, square, depth, contact, highest] = motion;
   const std::size_t k = highest - 1;
   double cube = 0.0;
@@ -70,12 +70,12 @@ void Motion::extend(Expansion& motion, bool touching, const Loads& loads, double
   depth[highest] += x[highest];
 }
 
-Motion::Rates Motion::rates(double reach, const Compliance::Slopes& contact) const {
+EquationOfMotion::Rates EquationOfMotion::rates(double reach, const Compliance::Slopes& contact) const {
   const double stiffness = std::abs(k1_) + 3.0 * std::abs(k2_) * reach * reach + contact.force_by_depth;
   return {std::sqrt(stiffness / mass_), (damping_ + contact.force_by_rate) / mass_};
 }
 
-Polynomial Motion::holding_force(double y, const Loads& loads, bool touching, double depth) const {
+Polynomial EquationOfMotion::holding_force(double y, const Loads& loads, bool touching, double depth) const {
   Compliance::Along contact;
   Polynomial force{spring_force(y), 0.0, 0.0};
   for (std::size_t k = 0; k < 3; ++k) {
@@ -85,7 +85,7 @@ Polynomial Motion::holding_force(double y, const Loads& loads, bool touching, do
   return force;
 }
 
-double Motion::potential_energy(double y) const {
+double EquationOfMotion::potential_energy(double y) const {
   const double square = elongation(y) * elongation(y);
   return (k1_ / 2 + k2_ / 4 * square) * square;
 }

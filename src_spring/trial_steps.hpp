@@ -1,0 +1,36 @@
+// Steps of a spring that are tried under one contact force after the other, as a held contact asks for them
+// (held_contact.hpp). The force that is found is that of the next step, whose trial is then the step.
+#pragma once
+
+#include <string>
+
+#include "spring.hpp"
+
+namespace spring {
+
+class TrialSteps {
+ public:
+  explicit TrialSteps(Spring& spring) : spring_(spring) {}
+
+  /// From the spring's present state, over `size` [s], under what else `inputs` say of the start of the step.
+  void begin(double size, const Inputs& inputs);
+  /// y after a step under a contact force [N] held over it; NaN if there is no such step. The spring stays as it is.
+  double displacement_under(double contact_force);
+  /// Why the last step of a series could not be made; empty if all could.
+  const std::string& failure() const { return failure_; }
+
+  /// Puts the spring where the last trial has ended, if that is the step which is asked for: of the same size, under
+  /// the same inputs, from the same state, and without impacts, whose times a trial does not know.
+  /// @return whether it was; if not, nothing has changed
+  bool adopt(double size, const Inputs& inputs);
+
+ private:
+  Spring& spring_;
+  Spring::State start_{}, end_{};
+  double size_ = 0.0;  ///< of a trial that was made; 0: of none
+  Inputs inputs_;
+  double begun_size_ = 0.0, work_ = 0.0;
+  std::string failure_;
+};
+
+}  // namespace spring

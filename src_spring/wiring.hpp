@@ -1,0 +1,43 @@
+// Whether a spring with a contact law inside is connected to its beam as it must be. A pair that is wired wrongly gains
+// or loses energy, or has no contact, without another sign.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "held_contact.hpp"
+
+namespace spring {
+
+/// Counts the steps in which a fault shows, and names it once there are enough of them.
+class Wiring {
+ public:
+  enum Fault : std::size_t {
+    elsewhere,          ///< the tip is not where it was foreseen, by a good part of its path in a step
+    late,               ///< it is where it would be a step later or earlier
+    swapped,            ///< it is where it would be with r₁ for r₂
+    no_first_exchange,  ///< it made the first step without the contact force
+    no_law,             ///< a tip arrives, but there is no contact law inside
+    forecast_not_used,  ///< a forecast arrives, but no force is held
+    faults
+  };
+
+  /// Before the first step: the tip as `arrived`, the contact having begun with it.
+  void check_start(const HeldContact& contact, const TipMessage& arrived);
+  /// At a step's end, before the contact is advanced: the tip as `arrived` at the start of the step.
+  void check_step(const HeldContact& contact, const TipMessage& arrived);
+  /// A step in which the fault shows.
+  void count(Fault fault) { ++shown_[fault]; }
+
+  /// Steps in which something is wrong, of faults that are certain.
+  int warnings() const;
+  /// What is wrong and what to do, once for each fault; NULL if there is nothing new.
+  const char* news();
+
+ private:
+  std::array<int, faults> shown_{};
+  std::array<bool, faults> reported_{};
+  double path_ = 0.0;  ///< longest one of the tip in a step so far [m]
+};
+
+}  // namespace spring
