@@ -39,7 +39,7 @@ class Double(Body):
         self._integrals = (0.0, 0.0)
         self._dissipated = self._work = 0.0
         self._acting = None  #: at the end of the last step, on the modes or the mass [N]
-        self.steps = 0
+        self.steps_made = 0
 
     def mark(self):
         self._marked = {name: getattr(self, name) for name in self.CHANGES}
@@ -49,7 +49,7 @@ class Double(Body):
 
     def _trial(self, time, size):
         before = {name: getattr(self, name) for name in self.CHANGES}
-        end, self.steps = self.advance_alone(time, size), self.steps - 1
+        end, self.steps_made = self.advance_alone(time, size), self.steps_made - 1
         vars(self).update(before)
         return end
 
@@ -87,7 +87,7 @@ class ModalBody(Double):
         self._load = sum(np.outer(f, pattern) for f, pattern in zip(forces, self.patterns, strict=True))
 
     def advance(self, time, size, contact, foundation=NO_FORCE):
-        self.steps += 1
+        self.steps_made += 1
         a, v, S = self.a, self.v, self._responses(size)
         f = np.outer(contact, self.b) + self._load
         f[0] += self.f
@@ -175,7 +175,7 @@ class DuffingBody(Double, EndLoaded):
         self.y, self.z = float(y), float(z)
 
     def advance(self, time, size, contact, foundation=NO_FORCE):
-        self.steps += 1
+        self.steps_made += 1
         force = tuple(n - p + f for n, p, f in zip(foundation, contact, self._on_end, strict=True))
         start = self.motion()
         i1 = i2 = done = 0.0
@@ -317,7 +317,7 @@ def stopping(scene, wrap=lambda beam, spring: (beam, spring)):
     recorder.finish(summary(resolved, master, recorder))
     trajectory = recorder.trajectory()
     trajectory.summary["work"] = {
-        name: body.steps for name, body in (("beam", beam), ("spring", spring)) if hasattr(body, "steps")
+        name: body.steps_made for name, body in (("beam", beam), ("spring", spring)) if hasattr(body, "steps_made")
     }
     return trajectory, stopped
 

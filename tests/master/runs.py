@@ -3,7 +3,7 @@
 import numpy as np
 
 from springbeam.motion.events import Event, EventKind
-from springbeam.results.steps import BEAM_TELLS, SPRING_TELLS, STEP, STEP_COLUMNS
+from springbeam.results.steps import BEAM_REPORTS, SPRING_REPORTS, STEP, STEP_COLUMNS
 from springbeam.results.trajectory import Trajectory, columns_of
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.statics import SHAPE_POINTS
@@ -60,7 +60,7 @@ def block(n=300, scene=PAIR, t_end=3.0, begin=0):
     number = np.arange(begin, begin + n)
     steps["time"], steps["size"] = t_end * number / max(begin + n - 1, 1), np.where(number % 7, t_end / n, 0.0)
     steps["phase"], steps["events"], steps["energy_at_start"] = number % 6, (number + 9) // 10, 0.25
-    steps["told"], steps["degree"] = BEAM_TELLS + SPRING_TELLS, 2.0
+    steps["reports"], steps["degree"] = BEAM_REPORTS + SPRING_REPORTS, 2.0
     steps["tip_share"], steps["reduced_mass"] = 0.25, 0.75
     happen = number[number % 10 == 1]
     events = [Event(float(steps["time"][i - begin]), "impact", 0.5, -1.0, None, 0.1 * i) for i in happen]

@@ -164,7 +164,7 @@ def test_ends_part_and_a_seat_is_left_where_the_force_between_them_vanishes(monk
 
 
 @pytest.mark.parametrize(
-    ("time", "struck", "kink", "expected"),
+    ("time", "after_impact", "kink", "expected"),
     [
         (0.25, False, math.inf, (0.5, 0.25)),  # back to the grid
         (0.5, False, math.inf, (1.0, 0.5)),
@@ -178,7 +178,7 @@ def test_ends_part_and_a_seat_is_left_where_the_force_between_them_vanishes(monk
         (1.5, False, math.inf, (2.0 + 1e-12, 0.5)),  # a remainder that would drown joins the step before it
     ],
 )
-def test_where_the_next_step_ends(time, struck, kink, expected):
+def test_where_the_next_step_ends(time, after_impact, kink, expected):
     """In a run of 2 s in steps of 0.5 s, and one of 1 ps more."""
     grid = MacroGrid(0.0, 2.0 + 1e-12, 0.5)
-    assert grid.next(time, kink, struck=struck) == pytest.approx(expected, rel=1e-15)
+    assert grid.next(time, kink, after_impact=after_impact) == pytest.approx(expected, rel=1e-15)

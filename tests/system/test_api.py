@@ -131,7 +131,7 @@ def test_a_start_that_cannot_be_is_refused_whoever_made_the_body(change, body, s
     with pytest.raises(SceneError, match=says):
         simulate(with_changes(APART, **change), lower=body)
     assert body.motion() == start
-    assert body.steps == 4  # that are tried, and undone
+    assert body.steps_made == 4  # that are tried, and undone
 
 
 @pytest.mark.parametrize(

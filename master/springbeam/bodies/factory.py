@@ -20,11 +20,13 @@ from .protocol import Body, FmuError
 from .quasi_static import QuasiStaticBeam
 
 
-def load_bodies(scene: Scene, start_time: float, degree: int, contact: float = 0.0) -> tuple[Body | None, Body | None]:
+def load_bodies(
+    scene: Scene, start_time: float, degree: int, contact_force: float = 0.0
+) -> tuple[Body | None, Body | None]:
     """Return the upper and the lower body of ``scene`` at ``start_time`` [s], our beam as the approach leaves it.
 
     The force between them is a polynomial of ``degree`` over a step. Where the scene starts at rest, it does so under
-    the force ``contact`` between the ends [N].
+    the force ``contact_force`` between the ends [N].
 
     Raises
     ------
@@ -38,7 +40,7 @@ def load_bodies(scene: Scene, start_time: float, degree: int, contact: float = 0
     bodies: list[Body | None] = []
     with ExitStack() as made:
         for table, spec in (("beam", scene.upper), ("spring", scene.lower)):
-            body = None if spec is None else _body(scene, spec, start_time, found.get(table), degree, contact)
+            body = None if spec is None else _body(scene, spec, start_time, found.get(table), degree, contact_force)
             if body is not None:
                 made.callback(body.close)
             bodies.append(body)
@@ -48,32 +50,39 @@ def load_bodies(scene: Scene, start_time: float, degree: int, contact: float = 0
 
 
 def _body(
-    scene: Scene, spec: Beam | Spring | Partner, start_time: float, found: Findings | None, degree: int, contact: float
+    scene: Scene,
+    spec: Beam | Spring | Partner,
+    start_time: float,
+    found: Findings | None,
+    degree: int,
+    contact_force: float,
 ) -> Body:
     if isinstance(spec, ForeignFmu):
         return ForeignBody(spec, spec is scene.upper, (start_time, scene.time.t_end), found)
     if isinstance(spec, Spring):
-        return FmuSpring(spec, start_time, top_at_rest(scene, contact) if scene.static else None)
+        return FmuSpring(spec, start_time, top_at_rest(scene, contact_force) if scene.static else None)
     if isinstance(spec, Beam):
         if scene.massless:
-            return _massless_beam(scene, spec, start_time, degree, contact)
-        return _beam(scene, spec, start_time, contact)
+            return _massless_beam(scene, spec, start_time, degree, contact_force)
+        return _beam(scene, spec, start_time, contact_force)
     keys = {name: getattr(spec, name) for name in type(spec).model_fields if name != "element"}
     if scene.static and isinstance(spec, SpringDamperElement):
         upper = spec is scene.upper
-        keys["displacement"] = _element_at_rest(scene, spec, contact) if upper else top_at_rest(scene, contact)
+        keys["displacement"] = (
+            _element_at_rest(scene, spec, contact_force) if upper else top_at_rest(scene, contact_force)
+        )
     return ELEMENTS[spec.element](**keys)
 
 
-def _beam(scene: Scene, spec: Beam, start_time: float, contact: float) -> Body:
+def _beam(scene: Scene, spec: Beam, start_time: float, contact_force: float) -> Body:
     slope = spec.initial_deflection_slope + start_time * spec.initial_velocity_slope
-    held = (0.0, scene.loads, contact) if scene.static else (slope, scene.loads)
+    held = (0.0, scene.loads, contact_force) if scene.static else (slope, scene.loads)
     return FmuBeam(spec, start_time, *held)
 
 
-def _massless_beam(scene: Scene, spec: Beam, start_time: float, degree: int, contact: float) -> Body:
+def _massless_beam(scene: Scene, spec: Beam, start_time: float, degree: int, contact_force: float) -> Body:
     if (start := scene.at_start("beam")) is None:  # at rest under the loads and the contact force
-        tip = tip_load_deflection(spec) + contact * tip_compliance(spec)
+        tip = tip_load_deflection(spec) + contact_force * tip_compliance(spec)
         return QuasiStaticBeam(spec, degree, tip, 0.0)
     rate = spec.initial_velocity_slope
     velocity = rate * spec.length
@@ -84,17 +93,17 @@ def _massless_beam(scene: Scene, spec: Beam, start_time: float, degree: int, con
     return beam
 
 
-def top_at_rest(scene: Scene, contact: float) -> float:
-    """Return the equilibrium [m] of the lower end under ``contact`` [N]: of a spring, a wall or a stop.
+def top_at_rest(scene: Scene, contact_force: float) -> float:
+    """Return the equilibrium [m] of the lower end under ``contact_force`` [N]: of a spring, a wall or a stop.
 
     A spring that would rest below the stop rests on it. Raises SceneError if the spring has no equilibrium.
     """
     floor = -inf if scene.stop is None else scene.stop.position
     if isinstance(scene.lower, SpringDamperElement):
-        return max(_element_at_rest(scene, scene.lower, -contact), floor)
+        return max(_element_at_rest(scene, scene.lower, -contact_force), floor)
     if (spring := scene.spring) is None:
         return scene.lower.position if isinstance(scene.lower, RigidWallElement) else floor
-    load = _load_at_start(scene, "spring", spring.mass) - contact
+    load = _load_at_start(scene, "spring", spring.mass) - contact_force
     force = spring.external_force + load
     height = resting_height(spring, force)
     if scene.stop is not None and (height is None or height < floor) and spring.force(floor) > load:

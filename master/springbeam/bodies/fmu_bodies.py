@@ -195,7 +195,7 @@ class FmuBody(Body):
     #: Whether anything happened since the state was marked.
     _moved = False
     #: Steps begun, and how often the state was set back.
-    steps: int = 0
+    steps_made: int = 0
     rewinds: int = 0
 
     def _begin(self, mass: float) -> None:
@@ -253,7 +253,7 @@ class OwnBody(FmuBody):
     """A body of an FMU of this project, whose instance may have been another's: see `Fmu.of`."""
 
     NAMES: ClassVar[Names]
-    tells = True
+    reports = True
     _constants: dict[str, float]  #: of the scene, by the inputs that hold them from the start
     #: By input of the FMU: what is added to it by a unit of which load.
     _shares: dict[str, list[tuple[int, float]]]
@@ -309,7 +309,7 @@ class OwnBody(FmuBody):
         values, slopes = self._loads
         forces = (0.0,) * len(self.NAMES.forces)
         given = (time, _INSTANT * size, *forces, *values, self.state.pending, *(2 * forces), *slopes)
-        self.steps += 1
+        self.steps_made += 1
         self.rewinds += 1
         return self._port.trial(given, self._acceleration)[0]
 
@@ -318,7 +318,7 @@ class OwnBody(FmuBody):
         n, dn, ddn = foundation
         values, slopes = self._loads
         impulse = self.state.pending
-        self.steps += 1
+        self.steps_made += 1
         self._moved = True
         if len(self.NAMES.forces) == 1:  # nothing but the other body presses its end
             return self._take(self._port.step(time, size, c, *values, impulse, dc, ddc, *slopes))

@@ -201,7 +201,7 @@ class ForeignBody(FmuBody, EndLoaded):
         load = self._followed(self._on_end, size)
         exchanged = force.combined((up, 1.0), (contact, foundation))
         inputs = self._followed(force.combined((sign * up, sign * up), (exchanged, load)), size)
-        self.steps += 1
+        self.steps_made += 1
         self._moved = True
         impulse = () if self._spec.impulse is None else (self.state.pending,)
         told = self._port.step(time, size, inputs[0], *impulse, *inputs[1 : 1 + self.abilities.slopes])
@@ -218,7 +218,7 @@ class ForeignBody(FmuBody, EndLoaded):
     def _trial(self, time: float, size: float) -> Motion:
         load = self._followed(force.combined((self._spec.force_sign * self._upward,), (self._on_end,)), size)
         impulse = () if self._spec.impulse is None else (self.state.pending,)
-        self.steps += 1
+        self.steps_made += 1
         self.rewinds += 1
         given = (time, size, load[0], *impulse, *load[1 : 1 + self.abilities.slopes])
         before = self.state

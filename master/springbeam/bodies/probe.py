@@ -76,7 +76,7 @@ class Bench:
         Return rows before the first step and after each, shape (n + 1, 6): the motion, the sum of the known energies,
         and the work done on the end.
         """
-        if self.body.steps > 0 and not self.body.abilities.state:
+        if self.body.steps_made > 0 and not self.body.abilities.state:
             self.renew()
         body = self.body
         body.rewind()

@@ -101,7 +101,7 @@ class Body:
     #: Mass that an impulse on the end moves [kg].
     mass: float
     #: Whether columns have its acceleration and inner forces: true of our own beam and spring.
-    tells = False
+    reports = False
 
     #: Damping of the velocity of the end [N·s/m]; ``None`` if unknown.
     damping: float | None = None
@@ -171,7 +171,7 @@ class Body:
     #: Declared abilities; `can` returns the actual ones.
     abilities = Abilities()
     #: Steps begun and states restored so far; ``None`` if not counted.
-    steps: int | None = None
+    steps_made: int | None = None
     rewinds: int | None = None
     #: Work that the end has received so far [J], if the energy of the interface judges the coupling.
     received: float | None = None
@@ -254,10 +254,10 @@ class Body:
             return None
         try:
             self.apply_impulse(self.mass * speed)
-            struck = self.trial_acceleration(time, size)
+            after = self.trial_acceleration(time, size)
         finally:
             self.state = before
-        return None if struck is None else (free - struck) / speed
+        return None if after is None else (free - after) / speed
 
     def _trial(self, time: float, size: float) -> Motion | None:
         """Return the motion after a step without force on the end, and undo it; ``None`` if it cannot be undone."""
@@ -273,8 +273,8 @@ class Body:
         return Energies(0.0, 0.0, 0.0, 0.0)
 
     def inner_forces(self) -> InnerForces:
-        """Return the inner forces of a beam that `tells`; called once a step."""
-        raise NotImplementedError(f"{type(self).__name__} has no inner_forces, and says that it tells")
+        """Return the inner forces of a beam that `reports`; called once a step."""
+        raise NotImplementedError(f"{type(self).__name__} has no inner_forces, and says that it reports them")
 
     def shape(self) -> np.ndarray | None:
         """Return deflections [m], bending moments [N·m] and shear forces [N] one after another, shape (63,).

@@ -1,7 +1,7 @@
 """Event functions, and where inside a step one of them vanishes.
 
 An event function f is positive while nothing happens and falls through zero at the event. A step knows f and ḟ at
-both ends and the means of f; `springbeam.motion.paths` tells from them where to look, also for a contact that closes
+both ends and the means of f; from these `springbeam.motion.paths` finds where to look, also for a contact that closes
 and opens again inside the step.
 """
 

@@ -56,7 +56,7 @@ class Instant(NamedTuple):
     ends: Ends  #: before the event
     start: Ends  #: where the step began that ends with it
     elapsed: float  #: size of that step [s]
-    contact: float  #: C [N]
+    contact_force: float  #: C [N]
     tolerance: float  #: resolution of positions [m]
     together: float  #: distance within which events are simultaneous [m]
     fastest: float  #: the largest speed of an end so far [m/s]
@@ -154,7 +154,7 @@ class Automaton:
 
     def release(self, at: Instant) -> Outcome:
         """*Touch* if C > 0; else the ends part: *free*."""
-        if at.contact > 0.0:
+        if at.contact_force > 0.0:
             return Outcome(EventKind.RELEASE, Phase(Joint.TOUCH))
         return Outcome(EventKind.RELEASE, Phase(Joint.FREE), self._parting(at.phase, at))
 

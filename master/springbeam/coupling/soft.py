@@ -124,7 +124,7 @@ class SoftSolver(Booked, StepSolver):
             settled = left * left <= _SETTLED * scale * length or length <= _ROUNDING * scale
             if settled and not (guessed and slow):
                 self.state.last_crossing = (size, flexibility)
-                # The correction after the next would be left²/length. For the next one the law's slope tells the force.
+                # The correction after the next would be left²/length; its force follows from the law's slope.
                 change = times(descent, following)
                 return list(map(add, x, following)), [
                     c + m + d for c, m, d in zip(of_law, missing, change, strict=True)

@@ -10,12 +10,12 @@ whatever the coefficients, the step and the bodies. The moments are taken agains
 which spans the same space and keeps the system well conditioned: ∫ g dτ = I₁ and ∫ s g dτ = I₁ − 2 I₂/H, with
 I₁ = ∫ g dτ and I₂ = ∫∫ g dτ dτ = ∫ (H − τ) g dτ.
 
-Both bodies advance under the force
-that the last step tells. Corrections follow from responses: B of the upper body's conditions to a is measured once for
-each size of step and remembered, for the beam is linear. S of the lower body's starts as that of a free mass, and
-Broyden's rank-one updates make it follow. Under a corrected force the lower body advances and the end of the upper one
-is predicted by B. Once the conditions hold so, the upper body advances to verify it, so a step usually costs two steps
-of each body. An upper body that is not linear is found out there, and B follows as S does.
+Both bodies advance under the force of the last step, continued. Corrections follow from responses: B of the upper
+body's conditions to a is measured once for each size of step and remembered, for the beam is linear. S of the lower
+body's starts as that of a free mass, and Broyden's rank-one updates make it follow. Under a corrected force the lower
+body advances and the end of the upper one is predicted by B. Once the conditions hold so, the upper body advances to
+verify it, so a step usually costs two steps of each body. An upper body that is not linear is found out there, and B
+follows as S does.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ class EventKind(str, Enum):
 
     @property
     def strikes(self) -> bool:
-        """Whether the foundation is struck."""
+        """Whether a body collides with the foundation."""
         return self in (EventKind.STOP_IMPACT, EventKind.SEATED)
 
     @property

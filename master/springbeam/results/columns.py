@@ -9,7 +9,7 @@ import numpy as np
 
 from ..motion.events import Event
 from ..scene import Scene, Spring
-from .steps import BEAM_TELLS, PHASE_NAMES, SPRING_TELLS, STEP_COLUMNS, common, joined
+from .steps import BEAM_REPORTS, PHASE_NAMES, SPRING_REPORTS, STEP_COLUMNS, common, joined
 from .trajectory import BODY_COLUMNS, Trajectory, columns_of
 
 #: Limit of a column that does not affect the motion [N]; pictures multiply two of them.
@@ -65,10 +65,10 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
         "energy_residual": energies["e_total"] - steps["energy_at_start"],
         **{f"load_{i}": load.value(steps["time"]) for i, load in enumerate(scene.loads)},
     }
-    told = int(first["told"][0]) if len(first) else BEAM_TELLS + SPRING_TELLS
-    if told & BEAM_TELLS:
+    reports = int(first["reports"][0]) if len(first) else BEAM_REPORTS + SPRING_REPORTS
+    if reports & BEAM_REPORTS:
         found |= {name: steps[field] for name, field in _TOLD_BY_BEAM.items()}
-    if told & SPRING_TELLS and scene.spring is not None:
+    if reports & SPRING_REPORTS and scene.spring is not None:
         found["a_y"] = _acceleration(scene, scene.spring, found, steps)
     if rigid and "a_tip" in found and (scene.lower is None or "a_y" in found):
         # Joined ends move as one; the tip's own acceleration alternates from step to step.

@@ -34,17 +34,17 @@ STEP_COLUMNS = (
     # All energies when the run began, before an impact at its start [J].
     "energy_at_start",
     # Inner forces of the beam at the end of the step, before the event (`springbeam.bodies.protocol.InnerForces`); and
-    # the bodies that report them, the sum of `BEAM_TELLS` and `SPRING_TELLS`, the same in all records of a run.
-    *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress", "told"),
+    # the bodies that report them, the sum of `BEAM_REPORTS` and `SPRING_REPORTS`, the same in all records of a run.
+    *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress", "reports"),
     # The same in all records: the degree of the contact force, the tip's share of the common velocity of joined ends,
     # m_tip/(m_tip + m), and their reduced mass, 1/(1/m_tip + 1/m) [kg], 0 if no rigid law joins them.
     *("degree", "tip_share", "reduced_mass"),
 )
 #: The contact force of a step: C and its two derivatives at the step's start.
 FORCE_COLUMNS = ("contact_force", "contact_force_rate", "contact_force_rate_2")
-#: Flags in ``told``: the record has the inner forces of the beam; the lower body is the spring of the scene.
-BEAM_TELLS = 1
-SPRING_TELLS = 2
+#: Flags in ``reports``: the record has the inner forces of the beam; the lower body is the spring of the scene.
+BEAM_REPORTS = 1
+SPRING_REPORTS = 2
 #: Little-endian doubles, on every machine.
 STEP = np.dtype([(name, "<f8") for name in STEP_COLUMNS])
 #: Bytes of a record from its numbers.

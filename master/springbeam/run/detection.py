@@ -35,19 +35,19 @@ _SHARP = 1e-9
 class Detector:
     """Finds the event that ends a step; the bodies are left where the returned step ends."""
 
-    def __init__(self, pair: Pair, steps: MacroGrid | AdaptiveSteps) -> None:
+    def __init__(self, pair: Pair, controller: MacroGrid | AdaptiveSteps) -> None:
         self._pair = pair
-        self._steps = steps
+        self._controller = controller
         self._automaton = pair.automaton
 
     def tolerance(self, ends: Ends) -> float:
         """Resolution of positions [m]."""
-        return position_tolerance(ends, self._steps.size)
+        return position_tolerance(ends, self._controller.size)
 
     def simultaneity_tolerance(self, ends: Ends) -> float:
         """Position tolerance plus the distance covered in `SAME`·H [m]; events within it are simultaneous."""
         speed = max(abs(end.velocity) for end in ends)
-        return self.tolerance(ends) + SAME * self._steps.size * speed
+        return self.tolerance(ends) + SAME * self._controller.size * speed
 
     def _rest(self, state: State, ends: Ends) -> float:
         """Speed below which ends do not move against each other [m/s].
@@ -122,7 +122,7 @@ class Detector:
                 break
             guess, found, function, bracket = min(candidates, key=lambda c: c[0])
             step = self._located(state, function, bracket, guess)
-            if step.size < SAME * self._steps.size:
+            if step.size < SAME * self._controller.size:
                 # Too short for a contact force: velocities that differ would be turned round by an infinite one.
                 return self._no_step(step), found
         return step, found
@@ -132,12 +132,12 @@ class Detector:
         self._pair.rewind()
         return step._replace(size=0.0, end=step.start)
 
-    # -- events told by forces --------------------------------------------------------------------------------------
+    # -- events by forces ------------------------------------------------------------------------------------------
 
     def _pulls(self, force: PushingForce, state: State, present: Present, ends: Ends) -> bool:
         """Return whether a force that can only push would pull by more than rounding."""
         pair = self._pair
-        H = self._steps.size
+        H = self._controller.size
         pull = -present.of(force)
         if pull <= 0.0 or state.met_again == state.time:
             return False
@@ -150,7 +150,7 @@ class Detector:
         ``None`` if it pushes all the time; of size 0 if it pulls from the start.
         """
         pair = self._pair
-        H = self._steps.size
+        H = self._controller.size
         by_force = self._automaton.guards(state.phase).force
         if by_force is None:
             return None
@@ -192,7 +192,7 @@ class Detector:
             return last, kind
         return None if state.met_again == state.time else (self._no_step(last), kind)
 
-    # -- events told by positions -----------------------------------------------------------------------------------
+    # -- events by positions --------------------------------------------------------------------------------------
 
     def _bracket(
         self, state: State, function: EventFunction, step: Step, floor: float, start: Sample, end: Sample
@@ -233,7 +233,7 @@ class Detector:
         locate(evaluate, guess, bracket.size, tolerance, state.time)
         missed = abs(function(last.end)[0])
         # A tip at rest at 0 is there to the rounding of the modes that it is the sum of.
-        rounding = max(self.tolerance(last.end), VELOCITY_ROUNDING * state.fastest * self._steps.size)
+        rounding = max(self.tolerance(last.end), VELOCITY_ROUNDING * state.fastest * self._controller.size)
         if missed > _JUMP * rounding:
             raise StepRefused(f"an event is not found: the motion jumps by {missed:.3g} m with the size of the step")
         return last

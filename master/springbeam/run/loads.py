@@ -95,7 +95,7 @@ def _bessel(theta: float) -> tuple[float, float, float]:
 
 
 class Loads:
-    """The loads of a scene, handed to its bodies step by step.
+    """The loads of a scene, set on its bodies for each step.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Loads:
         self.any = bool(self._bodies)
 
     def act(self, time: float, size: float) -> None:
-        """Let the loads act on every step from ``time`` by ``size`` [s], until told otherwise."""
+        """Let the loads act on every step from ``time`` by ``size`` [s], until others do."""
         if (time, size) != self._last:
             self._last = (time, size)
             forces = [signal.over(time, size) for signal in self._signals]

@@ -1,4 +1,4 @@
-"""The log of a run: its records, which are checked a thousand at a time, or each second, and handed on."""
+"""The log of a run: its records are checked a thousand at a time, or each second, and go to the recorder."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Log:
         self.shapes = list[np.ndarray]()
         self._events = 0  #: number of those that the recorder has
         self._first = np.empty(0, STEP)  #: record of the run
-        self.due = monotonic() + _WAITS  #: when the next records are handed on, however few [s]
+        self.due = monotonic() + _WAITS  #: when the next records go to the recorder, however few [s]
 
     def flush(self) -> None:
         """Check the records and hand them to the recorder.

@@ -1,6 +1,6 @@
 """Where macro steps end: on the grid t₀ + k H, which events do not shift, or where their error asks for it.
 
-Of steps as long as their error allows, each tells itself how wrong it is. Nothing is computed twice for it: its force
+Adaptive steps estimate their own error. Nothing is computed twice for it: the force of a step
 is looked at beside that of both its ends, and the path of an end beside the cubic (``docs/coupling.md``, "Adaptive
 macro steps").
 """
@@ -49,14 +49,14 @@ class MacroGrid:
         self._end = end
         self.size = macro_step  #: H [s]
 
-    def next(self, time: float, kink: float = inf, *, struck: bool = False) -> tuple[float, float]:
+    def next(self, time: float, kink: float = inf, *, after_impact: bool = False) -> tuple[float, float]:
         """Return when the step from ``time`` should end, and its size [s] (exactly H where it is a whole one).
 
-        It ends at ``kink`` [s], where a load jumps or bends, if that comes first or soon after. It is short if ends
-        have ``struck`` each other at ``time``.
+        It ends at ``kink`` [s], where a load jumps or bends, if that comes first or soon after. It is short
+        ``after_impact``, if bodies have collided at ``time``.
         """
         H = self.size
-        if struck:
+        if after_impact:
             size = _AFTER_IMPACT * H
             if time + size < self._end:
                 return (time + size, size) if kink >= time + size + _SHORT_REMAINDER * H else (kink, kink - time)
@@ -114,10 +114,10 @@ class AdaptiveSteps:
         """H [s] of a whole step from here."""
         return self._length * float(2.0 ** (-self.state.number / _PER_OCTAVE))
 
-    def next(self, time: float, kink: float = inf, *, struck: bool = False) -> tuple[float, float]:
+    def next(self, time: float, kink: float = inf, *, after_impact: bool = False) -> tuple[float, float]:
         """The time at which the step from ``time`` should end, and its size; ``kink`` as of `MacroGrid`.
 
-        Error estimates limit the steps, also where ends have ``struck`` each other.
+        Error estimates limit the steps, also ``after_impact``.
         """
         size = self.size
         left = self._end - time
@@ -201,8 +201,8 @@ class AdaptiveSteps:
         size = step.size
         if state.phase.joint is Joint.FREE and not any(step.contact):
             return 0.0, degree + 3
-        at_end = force.value(step.contact, size) - pair.present(state.phase, step, size).contact
-        at_start = step.contact[0] - state.present.contact
+        at_end = force.value(step.contact, size) - pair.present(state.phase, step, size).contact_force
+        at_start = step.contact[0] - state.present.contact_force
         missed = 0.5 * abs(at_end - (-1.0) ** degree * at_start)
         mass = pair.reduced_mass(state.phase)
         gives = inf if mass == 0.0 else _MOVED[degree] * size * size / (4.0 * mass)
@@ -211,8 +211,8 @@ class AdaptiveSteps:
 
     def _ways(self, step: Step) -> list[tuple[float, float]]:
         """Return the lowest and the highest position of each end [m], with ``step``."""
-        told = zip(self.state.ways, step.start, step.end, strict=True)
+        ends = zip(self.state.ways, step.start, step.end, strict=True)
         return [
             (min(low, a.displacement, b.displacement), max(high, a.displacement, b.displacement))
-            for (low, high), a, b in told
+            for (low, high), a, b in ends
         ]

@@ -20,7 +20,7 @@ from ..coupling.protocol import NotConverged, Step
 from ..motion.events import Event, EventKind, Joint
 from ..results.columns import ledger
 from ..results.recording import Recorder
-from ..results.steps import BEAM_TELLS, SPRING_TELLS, STEP, packed
+from ..results.steps import BEAM_REPORTS, SPRING_REPORTS, STEP, packed
 from .detection import Detector
 from .ledger import Balance
 from .log import TOGETHER, Log
@@ -49,7 +49,7 @@ class Master:
         The bodies at the start time; ``None`` where there is none. An upper one without a shape leaves none.
     recorder
         Receives records, events and shapes.
-    contact
+    contact_force
         Force between the ends at the start [N], where the run starts at rest.
 
     Raises SceneError if a body does not take a load.
@@ -63,21 +63,21 @@ class Master:
         upper: Body | None,
         lower: Body | None,
         recorder: Recorder,
-        contact: float = 0.0,
+        contact_force: float = 0.0,
     ) -> None:
         self._setup = setup
         self.pair = Pair(setup, upper, lower)
-        self.state = self.pair.initial_state(setup.start, contact)
-        self.steps: MacroGrid | AdaptiveSteps
+        self.state = self.pair.initial_state(setup.start, contact_force)
+        self.controller: MacroGrid | AdaptiveSteps
         self._adaptive = None
         if setup.macro_step is None:
-            self.steps = self._adaptive = AdaptiveSteps(setup, self.pair)
+            self.controller = self._adaptive = AdaptiveSteps(setup, self.pair)
         else:
-            self.steps = MacroGrid(setup.start, setup.end, setup.macro_step)
-        self._detector = Detector(self.pair, self.steps)
+            self.controller = MacroGrid(setup.start, setup.end, setup.macro_step)
+        self._detector = Detector(self.pair, self.controller)
         self.balance = Balance(self.pair)
         self._log = Log(recorder, self.balance.check)
-        self._told = BEAM_TELLS * self.pair.upper.tells + SPRING_TELLS * self.pair.lower.tells
+        self._reports = BEAM_REPORTS * self.pair.upper.reports + SPRING_REPORTS * self.pair.lower.reports
         self.state.shapes_left = _SHAPES_AFTER_CONTACT
         self.state.next_shape = setup.start
         length = setup.end - setup.start or 1.0  # 0 where contact is at t_end: the one shape is that of the start
@@ -113,15 +113,15 @@ class Master:
 
     def _step(self) -> None:
         state = self.state
-        steps = self.steps
+        controller = self.controller
         pair = self.pair
-        kink = pair.loads.next_kink(state.time + SAME * steps.size, steps.size) if pair.loads.any else inf
-        target, size = steps.next(state.time, kink, struck=state.struck == state.time)
+        kink = pair.loads.next_kink(state.time + SAME * controller.size, controller.size) if pair.loads.any else inf
+        target, size = controller.next(state.time, kink, after_impact=state.collided == state.time)
         step, event = self._advance(size, to_kink=target == kink)
-        whole = event is None and abs(step.size - size) <= SAME * steps.size
+        whole = event is None and abs(step.size - size) <= SAME * controller.size
         end = target if whole else state.time + step.size
         if event is not None:
-            state.count_event(end, steps.size)
+            state.count_event(end, controller.size)
         if step.size > 0.0:
             if self._adaptive is not None:
                 self._adaptive.accept(step)
@@ -130,9 +130,9 @@ class Master:
             state.macro_steps += 1
             if pair.opens_softly:
                 self._note_soft_contact(step)
-        before = pair.present(state.phase, step, steps.size) if step.size > 0.0 else state.present
+        before = pair.present(state.phase, step, controller.size) if step.size > 0.0 else state.present
         if event is not None:
-            self._act(event, step, before.contact)
+            self._act(event, step, before.contact_force)
         self._record(step, pair.ends(), before, changed=event is not None or (whole and target == kink))
 
     def _advance(self, size: float, *, to_kink: bool) -> tuple[Step, EventKind | None]:
@@ -152,7 +152,7 @@ class Master:
                 if self._adaptive is None or self._adaptive.holds(state, step, cause, to_kink=to_kink):
                     return self._detector.first_event(state, step)
                 pair.rewind()
-                size = self.steps.size
+                size = self.controller.size
             except (StepRefused, OverflowError) as refused:
                 cause = cause_of(refused)
                 if pair.repeatable:
@@ -197,8 +197,8 @@ class Master:
         parting = tip.velocity - low.velocity > 0.0 and not pair.lasting
         return abs(tip.displacement - low.displacement) <= tolerance and not parting
 
-    def _act(self, kind: EventKind, step: Step, contact: float) -> None:
-        """The event at the end of ``step`` happens, where the contact force is ``contact`` [N]."""
+    def _act(self, kind: EventKind, step: Step, contact_force: float) -> None:
+        """The event at the end of ``step`` happens, where the contact force is ``contact_force`` [N]."""
         state = self.state
         pair = self.pair
         ends = pair.ends()
@@ -207,14 +207,14 @@ class Master:
             ends,
             step.start,
             step.size,
-            contact,
+            contact_force,
             self._detector.tolerance(ends),
             self._detector.simultaneity_tolerance(ends),
             state.fastest,
         )
         kind, phase, impact = pair.automaton.after(kind, at)
         # Another event at the time of an impact settles what that has begun.
-        state.struck = state.time if kind.collision and pair.divides else -inf
+        state.collided = state.time if kind.collision and pair.divides else -inf
         if kind.collision and state.parted == state.time:
             state.met_again = state.time
         state.parted = state.time if kind.opens else -inf
@@ -253,7 +253,7 @@ class Master:
         state.ends = ends
         state.present = before
         if changed:
-            state.present = self.pair.present(state.phase, step, self.steps.size, changed=True)
+            state.present = self.pair.present(state.phase, step, self.controller.size, changed=True)
         speed = max(tip[1], -tip[1], low[1], -low[1])
         if speed > state.fastest:
             state.fastest = speed
@@ -288,8 +288,8 @@ class Master:
                 pair.lower.received or 0.0,
                 state.energy_at_start,
             ),
-            *(pair.upper.inner_forces() if self._told & BEAM_TELLS else _NO_INNER_FORCES),
-            *(self._told, pair.joined.degree, pair.tip_share, pair.turned_mass),
+            *(pair.upper.inner_forces() if self._reports & BEAM_REPORTS else _NO_INNER_FORCES),
+            *(self._reports, pair.joined.degree, pair.tip_share, pair.turned_mass),
         )
 
     def _shape(self, early: bool) -> None:

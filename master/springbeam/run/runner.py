@@ -70,15 +70,15 @@ class Simulation(AbstractContextManager["Simulation"]):
                 able[table] = tried(body, scene.contact_time or 0.0, H)
         setup = set_up(scene, *able.values())
         soft = None if setup.law is None or isinstance(setup.law, Rigid) else setup.law.force
-        contact = contact_at_rest(of_scene, setup.degree, soft)
-        self._bodies = beam, spring = load_bodies(of_scene, setup.start, setup.degree, contact)
+        contact_force = contact_at_rest(of_scene, setup.degree, soft)
+        self._bodies = beam, spring = load_bodies(of_scene, setup.start, setup.degree, contact_force)
         #: The scene with what was left to the run.
         self._resolved = scene.model_copy(
             update={"coupling": scene.coupling.model_copy(update={"degree": setup.degree})}
         )
         try:
             admit(self._resolved, setup.start, upper or beam, lower or spring, able)
-            self._master = Master(setup, upper or beam, lower or spring, self.recorder, contact)
+            self._master = Master(setup, upper or beam, lower or spring, self.recorder, contact_force)
         except BaseException:
             self.close()
             raise
@@ -187,13 +187,13 @@ class Simulation(AbstractContextManager["Simulation"]):
     def _summed_up(self, status: dict[str, Any]) -> dict[str, Any]:
         wall_time = perf_counter() - self._loaded
         amounts = summary(self._resolved, self._master, self.recorder)
-        told = zip(("beam", "spring"), self._bodies, strict=True)
-        counting = {name: body for name, body in told if body is not None and body.steps is not None}
+        bodies = zip(("beam", "spring"), self._bodies, strict=True)
+        counting = {name: body for name, body in bodies if body is not None and body.steps_made is not None}
         return {
             **status,
             "version": version("springbeam"),
             **amounts,
-            **{f"{name}_steps": body.steps for name, body in counting.items()},
+            **{f"{name}_steps": body.steps_made for name, body in counting.items()},
             **{f"{name}_rollbacks": body.rewinds for name, body in counting.items()},
             "setup_time": self._setup_time,
             "wall_time": wall_time,

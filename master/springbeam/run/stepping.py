@@ -30,12 +30,12 @@ _REACH_OF_FORCE = 4.0
 class Present(NamedTuple):
     """Contact force C and foundation force N [N] at an instant."""
 
-    contact: float = 0.0
-    foundation: float = 0.0
+    contact_force: float = 0.0
+    foundation_force: float = 0.0
 
     def of(self, name: PushingForce) -> float:
         """Return one of both [N]."""
-        return self.foundation if name == "foundation" else self.contact
+        return self.foundation_force if name == "foundation" else self.contact_force
 
 
 NOTHING = Present()
@@ -56,7 +56,7 @@ class State:
     fastest: float = 0.0  #: the largest speed of an end at a row so far [m/s]
     begun: bool = False  #: whether the row of the start is made
     energy_at_start: float = 0.0  #: before an impact there [J]
-    struck: float = -inf  #: when ends have met, if that was the last event [s]: they may part again soon
+    collided: float = -inf  #: when ends have met, if that was the last event [s]: they may part again soon
     parted: float = -inf  #: when ends have parted, or a seat was left, if that was the last event [s]
     #: When ends have met again at the time at which they had parted [s]: the accelerations there, those of waves that
     #: the steps do not follow, show nothing of where the ends go, and the contact stays closed over the next step.
@@ -154,17 +154,17 @@ class Pair:
         #: Whether a step can be repeated with another size.
         self.divides = self.repeatable and all(able.any_size for able in abilities)
 
-    def initial_state(self, time: float, contact: float = 0.0) -> State:
+    def initial_state(self, time: float, contact_force: float = 0.0) -> State:
         """Return the state before anything happens; ends that a soft law joins for good are joined from the start.
 
-        A rigid law holds them by ``contact`` [N]. Where a run starts at rest, a lower end at the stop rests on it.
+        A rigid law holds them by ``contact_force`` [N]. In a start at rest, a lower end at the stop rests on it.
         """
         tip, low = ends = self.ends()
         if self.law is not None:
-            contact = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
+            contact_force = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
         joint = Joint.TIED if self.law is not None and self.lasting else Joint.FREE
         seated = self.setup.at_rest and not self.alone and low.displacement == self.setup.floor
-        held = (contact, 0.0, 0.0)
+        held = (contact_force, 0.0, 0.0)
         alone = self.alone and self.law is None
         return State(time, ends, Phase(joint, seated), contact=held, foundation=held if alone else NO_FORCE)
 
@@ -188,7 +188,7 @@ class Pair:
         if self.loads.any:
             self.loads.act(state.time, size)
         coupling = self.joined
-        guess = state.contact  # as far as the last step tells
+        guess = state.contact  # the force of the last step, continued
         if phase.joint is Joint.FREE:
             coupling = self._uncoupled
             guess = NO_FORCE
@@ -305,13 +305,13 @@ class Pair:
         for body, sign in ((self.upper, 1.0), (self.lower, -1.0)):
             if body.mass == inf or (phase.seated and body is self.lower):
                 continue
-            told = None if changed else body.acceleration()
-            if told is None:
+            acceleration = None if changed else body.acceleration()
+            if acceleration is None:
                 if self.loads.any:
                     self.loads.act(time, macro_step)
                 free = body.trial_acceleration(time, macro_step)
             else:
-                free = told - sign * acting / body.mass
+                free = acceleration - sign * acting / body.mass
             if free is None:
                 if body not in self.without_acceleration:
                     self.without_acceleration.append(body)
