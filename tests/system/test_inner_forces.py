@@ -2,35 +2,24 @@
 
 import numpy as np
 import pytest
+import scenes
 from references import reference
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.pictures import panels
 from springbeam.studies.metrics import METRICS
 
-#: From the first impact to just before the foundation is struck.
-SOFT = with_changes(load_scene("soft"), time={"t_end": 0.05}, coupling={"degree": 2})
-LOADS = [
-    {"on": "beam", "shape": [1.0, -2.0, 0.5], "amplitude": 2.0, "signal": "harmonic", "frequency": 1.0, "phase": 0.3},
-    {"on": "beam", "at": 0.5},
-    {"on": "tip", "amplitude": -1.0},
-    {"on": "base", "amplitude": 3.0},
-    {"on": "spring", "amplitude": 0.3},
-]
+SOFT = scenes.named("tied/base")
 #: The rounding of forces that follow from accelerations: ε (ω_max/ω₁)² is 2e-12 of the beam.
 ROUNDING = 1e-10
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [{}, {"loads": LOADS}, {"beam": {"tip_load_coefficient": -6.0, "distributed_load": 0.7}}],
-    ids=["bare", "loads", "loads of the beam"],
-)
-def test_they_converge_to_the_reference_of_the_same_mesh(changes):
+@pytest.mark.parametrize("name", scenes.group("tied"))
+def test_they_converge_to_the_reference_of_the_same_mesh(name):
     """The multiplier of a tie is of order 8 with degree 2; the clamp follows the motion, exact but for rounding."""
     errors = []
     for size in (4e-4, 2e-4):
-        scene = with_changes(SOFT, coupling={"macro_step": size}, **changes)
+        scene = with_changes(scenes.named(f"tied/{name}"), coupling={"macro_step": size})
         run = simulate(scene)
         assert np.array_equal(run.a_tip, run.a_y)  # joined throughout
         times = run.time[2:-1]
@@ -60,26 +49,23 @@ def test_at_an_event_the_tip_has_the_acceleration_before_it():
     assert np.abs(run.a_tip - run.a_y)[rows].max() < 15.0 < 0.1 * np.abs(run.a_tip[run.phase == "free"]).max()
 
 
-@pytest.mark.parametrize(
-    ("given", "force", "moment"),
-    [
-        ({"beam": {"distributed_load": 3.0}}, 6.0, 6.0),
-        # The hat of the last element, 0.5 m long: a triangle about 1/3 of that from the tip.
-        ({"beam": {"tip_load_coefficient": 8.0}}, 2.0, 2.0 * (2.0 - 0.5 / 3.0)),
-        ({"loads": [{"on": "beam", "shape": [0.0, 1.0], "amplitude": 5.0}]}, 5.0, 20.0 / 3.0),
-        ({"loads": [{"on": "beam", "at": 0.25, "amplitude": 7.0}]}, 7.0, 3.5),
-        ({"loads": [{"on": "tip", "amplitude": 2.0}]}, 2.0, 4.0),
-        ({"loads": [{"on": "base", "amplitude": 0.5}]}, -6.0, -6.0),
-    ],
-)
+#: Force and moment of the loads about the clamp [N, N·m].
+CLAMPED = {
+    "uniform": (6.0, 6.0),
+    "hat": (2.0, 2.0 * (2.0 - 0.5 / 3.0)),
+    "growing": (5.0, 20.0 / 3.0),
+    "at a place": (7.0, 3.5),
+    "at the tip": (2.0, 4.0),
+    "base moves": (-6.0, -6.0),
+}
+
+
+@pytest.mark.parametrize("name", CLAMPED)
 @pytest.mark.parametrize("simulated", [simulate, reference])
-def test_the_clamp_bears_what_loads_a_beam_at_rest(given, force, moment, simulated):
-    """ρA = 6 kg/m, L = 2 m; N and N·m of the load about the clamp, on the beam and on its reference."""
-    beam = {"density": 2.0, "area": 3.0, "length": 2.0, "n_elements": 4, "approach": "elastic"}
-    time = {"t_end": 1e-3, "initial_state": "static"}
-    beam["initial_velocity_slope"] = 0.0
-    scene = with_changes(load_scene("soft"), beam=beam, spring=None, stop=None, time=time)
-    run = simulated(with_changes(scene, coupling={"macro_step": 1e-3}, **given))
+def test_the_clamp_bears_what_loads_a_beam_at_rest(name, simulated):
+    """On the beam and on its reference."""
+    force, moment = CLAMPED[name]
+    run = simulated(scenes.named(f"clamped/{name}"))
     for row in (0, -1):
         assert (run.clamp_force[row], run.clamp_moment[row]) == pytest.approx((-force, -moment), rel=1e-10)
 
@@ -116,7 +102,7 @@ def test_what_a_turning_beam_feels_at_its_start_is_no_largest_value():
 
 
 def test_a_start_that_the_clamp_allows_counts():
-    run = simulate(with_changes(SOFT, beam={"initial_velocity_slope": 0.0}, loads=LOADS[2:3]))
+    run = simulate(with_changes(SOFT, beam={"initial_velocity_slope": 0.0}, loads=[{"on": "tip", "amplitude": -1.0}]))
     assert run.without_start() is run
     leaning = {"initial_velocity_slope": 0.0, "initial_deflection_slope": 0.01, "approach": "elastic"}
     assert simulate(with_changes(SOFT, beam=leaning, time={"t_end": 1e-3})).without_start().time[0] > 0.0

@@ -7,43 +7,13 @@ from pathlib import Path
 import pytest
 import tomli_w
 from commands import command
-from scenes import completed
+from scenes import TABLE, completed
 
 from springbeam.results.files import load_trajectory
 from springbeam.run.ledger import bounds
 
-#: Meets the spring at once and the foundation at 0.07 s.
-SCENE = {
-    "time": {"t_end": 0.08},
-    "beam": {"young_modulus": 100.0, "shear_modulus": 100.0, "n_elements": 3, "initial_velocity_slope": -1.0},
-    "spring": {"linear_stiffness": 3.0},
-    "stop": {"position": -0.015},
-    "contact": {"stiffness": 1.0, "exponent": 1.0},
-}
-#: A word is an option of the command, ``table.key=value`` a setting, ``no-table`` takes a table out of the scene file.
-OPTIONS = {
-    "accuracy": "--accuracy 1e-2",
-    "json": "--json",
-    "interval": "--output-interval 1e-3",
-    "macro step": "coupling.macro_step=7e-4",
-    "tolerance": "coupling.relative_tolerance=1e-3",
-    "energy 2": "coupling.degree=2",
-    "energy 1": "coupling.degree=1",
-    "Gauss–Seidel": "coupling.scheme=gauss_seidel contact.law=compliance",
-    "Jacobi": "coupling.scheme=jacobi coupling.degree=1 contact.law=compliance",
-    "compliance": "contact.law=compliance",
-    "damped": "contact.law=compliance contact.damping=0.5",
-    "tie": "contact.law=tie",
-    "link": "contact.law=link",
-    "quasi-static": "beam.fidelity=quasi_static",
-    "midpoint": "beam.integrator=midpoint",
-    "elastic": "beam.approach=elastic",
-    "modes": "beam.n_modes=2",
-    "off the grid": "time.t_end=0.0503",
-    "no beam": "no-beam",
-    "no spring": "no-spring",
-    "no stop": "no-stop",
-}
+SCENE = TABLE["scenes"]["in pairs of options"]
+OPTIONS = TABLE["options"]
 
 
 def keys(name):
