@@ -19,11 +19,16 @@ def soft(n_elements=6, **tables):
 
 
 def completed(tables):
-    """Return the tables of a scene with what they leave out; of the contact a stiffness of 1e4 and an exponent of 3."""
+    """Return the tables of a scene with what they leave out; of the contact a stiffness of 1e4 and an exponent of 3.
+
+    A beam that is given by its width has all that it needs.
+    """
     contact = LAW.kept(CONTACT, LAW.kind(tables.get("contact", {})))
     below = {"beam": scene.Beam.ones(), "spring": scene.Spring.ones(), "contact": contact}
     return {
-        name: {**below[name], **content} if name in below and isinstance(content, dict) else content
+        name: {**below[name], **content}
+        if isinstance(content, dict) and name in below and "width" not in content
+        else content
         for name, content in tables.items()
     }
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 from runs import PAIR, SCENES, block
+from scenes import group
 
 from springbeam.motion.events import EVENT_COLUMNS, Event
 from springbeam.results import recording
@@ -47,16 +48,7 @@ def filed(path, *blocks, scene=PAIR):
 # -- columns ------------------------------------------------------------------------------------------------------
 
 
-SPRING = {"equilibrium": -0.01, "mass": 2.0, "damping": 3.0, "external_force": 0.4, "cubic_stiffness": 5.0}
-LOADS = [{"on": "spring", "amplitude": 0.7}, {"on": "base", "amplitude": -11.0}, {"on": "tip", "amplitude": 9.0}]
-LAWS = {
-    "transmission": with_changes(
-        PAIR, beam={"approach": "elastic"}, contact={"stiffness": 7.0, "exponent": 1.5}, spring=SPRING, loads=LOADS
-    ),
-    "tie": with_changes(PAIR, contact={"law": "tie"}, stop=None),
-    "compliance": with_changes(PAIR, contact={"law": "compliance"}),
-    "link": with_changes(PAIR, contact={"law": "link"}, stop=None),
-}
+LAWS = group("recorded")
 
 
 @pytest.mark.parametrize("law", LAWS)

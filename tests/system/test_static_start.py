@@ -6,6 +6,7 @@ it is at u₀ + c C, c = L³/3EI + L/KAG, and the top of a linear spring at (f �
 
 import numpy as np
 import pytest
+import scenes
 from references import reference
 
 from springbeam.motion.events import EventKind
@@ -50,31 +51,21 @@ def link(law, **keys):
     return {"contact": {"law": law, "stiffness": LINK, **keys}}
 
 
-#: What joins the ends, the stiffness of the lower end [N/m], that of the law [N/m], and the phase.
-CASES = {
-    "tied": ({"spring": SPRING}, K1, 0.0, "tied"),
-    "above Ψ": ({"spring": {**SPRING, "equilibrium": -0.02}}, K1, 0.0, "touch"),
-    "tie": ({"spring": SPRING, "contact": {"law": "tie"}}, K1, 0.0, "tied"),
-    "link": ({"spring": SPRING, **link("link", damping=3.0)}, K1, LINK, "tied"),
-    "compliance": ({"spring": SPRING, **link("compliance", exponent=1.0)}, K1, LINK, "touch"),
-    "rigid stop": ({"stop": {"position": 0.0}}, np.inf, 0.0, "seated"),
-    "elastic stop": ({"stop": {"position": 0.0}, **link("compliance", exponent=1.0)}, np.inf, LINK, "touch"),
-    "wall": ({"spring": {"element": "rigid_wall"}}, np.inf, 0.0, "tied"),
-    "midpoint": ({"beam": {**BEAM, "integrator": "midpoint"}, "spring": SPRING}, K1, 0.0, "tied"),
-    "adaptive": ({"spring": SPRING, "coupling": {"relative_tolerance": 1e-5}}, K1, 0.0, "tied"),
-}
+#: The phase in which ends touch, where that is not a tie.
+PHASES = {"above Ψ": "touch", "compliance": "touch", "rigid stop": "seated", "elastic stop": "touch"}
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", scenes.group("touching"))
 def test_ends_that_touch_stay_at_rest_under_the_force_of_statics(name):
-    tables, k, stiffness, phase = CASES[name]
-    what = scene(**tables)
+    what = scenes.named(f"touching/{name}")
+    k = np.inf if what.spring is None else K1
+    stiffness = LINK if name in ("link", "compliance", "elastic stop") else 0.0
     run = run_in_memory(what)
     C, columns = pressed(what.beam, k, stiffness), run.columns
     u = hanging(what.beam) + tip_compliance(what.beam) * C
     assert columns["u_tip"][0] == pytest.approx(u, rel=1e-9, abs=1e-9 * -hanging(what.beam))
     assert np.ptp(columns["u_tip"]) < 1e-13 * -hanging(what.beam)
-    assert set(columns["phase"]) == {phase}
+    assert set(columns["phase"]) == {PHASES.get(name, "tied")}
     force = columns["contact_force" if "contact_force" in columns else "foundation_force"]
     # A gap of an ulp of the parts that the tip is the sum of is closed by the first step, with at most the beam's mass.
     mass, parts = what.beam.density * what.beam.area * what.beam.length, -hanging(what.beam)
