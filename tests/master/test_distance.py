@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from runs import a_trajectory
 
 from springbeam import load_scene, simulate, with_changes
+from springbeam.motion.events import Event, EventKind
 from springbeam.results.contact_times import contact_changes
 from springbeam.results.distance import HELD, apart, distance, motion
 from springbeam.results.steps import joined
@@ -97,3 +99,9 @@ def test_a_top_stays_on_the_foundation_when_the_tip_leaves_it():
     assert [(change.kind, change.time) for change in on_foundation[-1:]] == [("strikes", seated[0])]
     opened = [event.time for event in run.events if event.kind in ("separation", "release")]
     assert [change.time for change in changes if change.kind == "opens"][-1] == opened[-1]
+
+
+def test_a_rest_on_the_foundation_begins_and_ends():
+    events = [Event(0.2, EventKind.SEATED, seated=True), Event(0.4, EventKind.UNSEATED)]
+    found = contact_changes(a_trajectory(events=events), 1e-3)
+    assert [(change.kind, change.time) for change in found] == [("strikes", 0.2), ("leaves", 0.4)]
