@@ -28,10 +28,11 @@ def commands() -> list[str]:
 
 
 def options() -> list[str]:
-    given = cli.common.Commands.makers["run"]().params
-    rows = [
-        (", ".join(f"`{name}`" for name in option.opts), option.help) for option in given if option.opts[0] != "scene"
-    ]
+    rows = []
+    for option in cli.common.Commands.makers["run"]().params:
+        if option.opts[0].startswith("-"):
+            name = " ".join(filter(None, (option.opts[0], option.metavar)))
+            rows.append((", ".join(f"`{word}`" for word in (name, *option.opts[1:])), option.help))
     return table(("option of `run`", "meaning, the same in all commands that have it"), rows)
 
 
