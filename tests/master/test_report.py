@@ -139,17 +139,6 @@ def test_every_chart_of_a_run_that_is_not_resolved_carries_the_mark():
     assert NOT_RESOLVED not in plain
 
 
-@pytest.mark.parametrize("rows", [0, 1, 2])
-@pytest.mark.parametrize("scene", [PAIR, SCENES["no beam"]], ids=["pair", "spring"])
-def test_a_run_that_stopped_at_once_has_a_page(scene, rows):
-    whole = a_trajectory(scene)
-    shapes = None if whole.shape_table is None else whole.shape_table[:rows]
-    columns = {name: values[:rows] for name, values in whole.columns.items()}
-    found = shown(dataclasses.replace(whole, columns=columns, shape_table=shapes, summary={"status": "stopped"}))
-    assert (("slider" in found.ids), found.data is None) == (rows == 2, rows < 2)
-    assert "stopped" in found["warnings"]
-
-
 # -- how to run it again ------------------------------------------------------------------------------------------
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import COMMAND, HANGS, printed, ran, refused, swept
+from commands import COMMAND, printed, ran, refused, swept
 from typer.testing import CliRunner
 
 from springbeam import simulate
@@ -133,24 +133,6 @@ def test_the_command_alone_shows_how_to_start():
 
 
 # -- JSON, quiet, colours -------------------------------------------------------------------------------------------
-
-
-FORCING = ("NO_COLOR", "FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS")
-
-
-def test_what_is_not_for_a_terminal_has_no_colours():
-    script = """
-from springbeam.cli import app
-for line in ("--help", "scenes", "run sotf", "rnu"):
-    try:
-        app(line.split())
-    except SystemExit as end:
-        print("code", end.code)
-"""
-    environment = {key: value for key, value in os.environ.items() if key not in FORCING}
-    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, env=environment, text=True, timeout=HANGS)
-    assert re.findall(r"^code (\d)", ran.stdout, re.M) == ["0", "0", "2", "2"]
-    assert "\x1b" not in ran.stdout + ran.stderr
 
 
 # -- completion -----------------------------------------------------------------------------------------------------

@@ -1,12 +1,9 @@
 """Numbers and spectra of runs: beside closed forms of linear oscillators, and by the command."""
 
-import csv
-import json
 from math import pi, sqrt
 
 import numpy as np
 import pytest
-from commands import printed
 from scenes import scene_from_dict
 
 from springbeam import load_scene, simulate, with_changes
@@ -94,10 +91,6 @@ def test_bouncing_has_no_end_where_the_run_ends_apart():
 
 def spread(run):
     return run.y.max() - run.y.min()
-
-
-def tip_in_g(run):
-    return run["a_tip"] / 9.80665
 
 
 def twice(run):
@@ -267,16 +260,3 @@ def test_up_and_down_are_different_motions_of_a_hardening_spring():
     low = np.interp(12.0, down.frequency[::-1], down.amplitude[::-1])
     assert high > 2.0 * low
     assert (up.way, down.way) == ("up", "down")
-
-
-def test_the_command_writes_tables_and_says_what_they_show(here, importable):
-    printed("run", "vibro-impact", "--no-plots", "--quiet", "--out", "shaken")
-    shown = printed("spectrum", "shaken", "--of", "test_signals:tip_in_g", "--quality", "25")
-    assert "periodic from 0.15" in shown
-    assert "2 of the" in shown
-    told = json.loads(printed("spectrum", "shaken", "--of", "test_signals:tip_in_g", "--json", "--no-plots"))
-    assert told["settled"]["multiple"] == 2
-    with open("shaken-spectrum/shock-tip.csv", newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert [float(row["maximax"]) for row in rows] == told["shock"]["tip"]["maximax"]
-    assert (here / "shaken-spectrum" / "spectrum.png").stat().st_size > 10_000
