@@ -25,7 +25,7 @@ from springbeam.run.master import Master
 from springbeam.run.outcome import RunStopped
 from springbeam.run.setup import set_up
 from springbeam.run.summary import summary
-from springbeam.scene import Beam, with_changes
+from springbeam.scene import Beam
 from springbeam.scene.statics import tip_reach
 from springbeam.studies.stability.predict import impulse_integrals
 
@@ -313,8 +313,7 @@ def stopping(scene, wrap=lambda beam, spring: (beam, spring)):
             master.step()
     except RunStopped as error:
         stopped = error
-    resolved = with_changes(scene, coupling={"degree": setup.degree})
-    recorder.finish(summary(resolved, master, recorder))
+    recorder.finish(summary(master, recorder))
     trajectory = recorder.trajectory()
     trajectory.summary["work"] = {
         name: body.steps_made for name, body in (("beam", beam), ("spring", spring)) if hasattr(body, "steps_made")

@@ -138,7 +138,7 @@ def test_the_window_is_a_fiftieth_of_the_slowest_period():
     nothing = np.zeros(0, STEP)
 
     def window_of(scene):
-        return force_window(scene, Pair(set_up(scene), *bodies(scene)), nothing)
+        return force_window(Pair(set_up(scene), *bodies(scene)), nothing)
 
     slowest = modal_beam(SCENE.beam).omega[0]
     assert window_of(SCENE) == pytest.approx(2.0 * np.pi / slowest / 50.0, rel=1e-12)
@@ -148,13 +148,13 @@ def test_the_window_is_a_fiftieth_of_the_slowest_period():
     reduced = 1.0 / (1.0 / SCENE.spring.mass + 1.0 / tip_inertia(SCENE.beam))
     at_contact = np.zeros(1, STEP)
     at_contact["beam_kinetic"] = 0.1
-    window = force_window(compliant, Pair(set_up(compliant), *bodies(compliant)), at_contact)
+    window = force_window(Pair(set_up(compliant), *bodies(compliant)), at_contact)
     assert window == pytest.approx(2.0 * np.pi * np.sqrt(reduced / 4.0) / 50.0, rel=1e-3)  # its mesh has not all modes
     # 1/k of the beam is 3.3e-3 + 1e-2 m/N: with the spring's 3 N/m it holds 1 kg.
     massless = with_changes(SCENE, beam={"fidelity": "quasi_static"})
     stiffness = 3.0 + 1.0 / (1.0 / 300.0 + 1.0 / 100.0)
     at_rest = np.zeros(1, STEP)
-    window = force_window(massless, Pair(set_up(massless), *bodies(massless)), at_rest)
+    window = force_window(Pair(set_up(massless), *bodies(massless)), at_rest)
     assert window == pytest.approx(2.0 * np.pi / np.sqrt(stiffness) / 50.0, rel=1e-12)
 
 

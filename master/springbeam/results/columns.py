@@ -14,6 +14,11 @@ from .trajectory import BODY_COLUMNS, Trajectory, columns_of
 
 #: Limit of a column that does not affect the motion [N]; pictures multiply two of them.
 MOST_SHOWN = 1e150
+#: Warning of a run in which a force was too large for its column.
+_NOT_SHOWN = (
+    f"compliance_force is larger than {MOST_SHOWN:g} N at times and is written as that, tie_reaction with it; "
+    "the motion does not depend on either. A smaller contact.stiffness or contact.exponent keeps them in range"
+)
 #: Records from which columns are made at once, to bound the memory for a long run.
 _TOGETHER = 4096
 #: Columns from the beam, and their fields in a record.
@@ -122,6 +127,14 @@ def normal_compliance(scene: Scene, u: np.ndarray, first: np.ndarray) -> np.ndar
     """Return λ (Ψ − u)₊^p [N], the part of a rigid contact's force that the paper calls normal compliance."""
     psi = first["y_after"] if scene.equilibrium is None else scene.equilibrium
     return scene.contact.compliance(psi - u)
+
+
+def not_shown(scene: Scene, steps: np.ndarray) -> str | None:
+    """Return a warning if a compliance force beside a rigid law was too large for its column."""
+    if not (scene.coupled and scene.contact.strikes):
+        return None
+    too_large = (normal_compliance(scene, steps["u_tip_after"], steps[:1]) > MOST_SHOWN).any()
+    return _NOT_SHOWN if too_large else None
 
 
 def ledger(steps: np.ndarray, received: Collection[str] = ()) -> dict[str, np.ndarray]:

@@ -6,32 +6,18 @@ from math import inf, sqrt
 
 import numpy as np
 
-from ..results.columns import MOST_SHOWN, normal_compliance
-from ..scene import Scene
 from ..scene.laws import stiffest
 from .resolution import window_of
 from .stepping import Pair
 
-#: Warning of a run in which a force was too large for its column.
-_NOT_SHOWN = (
-    f"compliance_force is larger than {MOST_SHOWN:g} N at times and is written as that, tie_reaction with it; "
-    "the motion does not depend on either. A smaller contact.stiffness or contact.exponent keeps them in range"
-)
 #: Columns whose sum is the energy that both bodies and the contact law store [J].
 _STORED = ("beam_kinetic", "beam_potential", "spring_kinetic", "spring_potential", "law_stored")
 
 
-def not_shown(scene: Scene, pair: Pair, steps: np.ndarray) -> str | None:
-    """Return a warning if a compliance force beside a rigid law was too large for its column."""
-    if pair.law is not None or pair.lasting or not scene.coupled:
-        return None
-    too_large = (normal_compliance(scene, steps["u_tip_after"], steps[:1]) > MOST_SHOWN).any()
-    return _NOT_SHOWN if too_large else None
-
-
-def unknown(scene: Scene, pair: Pair) -> str | None:
+def unknown(pair: Pair) -> str | None:
     """Return a warning that names what cannot be judged, since a body does not say how stiff it is."""
-    places = {"beam": (scene.upper, pair.upper), "spring": (scene.lower, pair.lower)}
+    setup = pair.setup
+    places = {"beam": (setup.upper, pair.upper), "spring": (setup.lower, pair.lower)}
     silent = [f"[{table}]" for table, (there, body) in places.items() if there and body.oscillation() is None]
     if not silent:
         return None
@@ -39,7 +25,7 @@ def unknown(scene: Scene, pair: Pair) -> str | None:
         f"the body in {' and '.join(silent)} does not say its stiffness and damping; how far ends are misplaced, and "
         "how far it turns in a macro step, is not known"
     )
-    if scene.contact.force_window is None and scene.coupled:
+    if setup.force_window is None and setup.law is not None:
         said += "; contact.force_window says over which time the peak contact force is a mean"
     return said
 
@@ -57,15 +43,15 @@ def coarse_force(pair: Pair) -> str | None:
     )
 
 
-def force_window(scene: Scene, pair: Pair, steps: np.ndarray) -> float:
+def force_window(pair: Pair, steps: np.ndarray) -> float:
     """Return over which time the contact force is averaged before its peak is taken [s].
 
     It is ``contact.force_window``, or `springbeam.run.resolution.WINDOW` of a period: that of a contact by a soft law
     that opens where it has taken all the energy, whose peak is the law's; else the slowest of the upper body alone;
     that of both together where that does not oscillate; the run where nothing does.
     """
-    if scene.contact.force_window is not None:
-        return scene.contact.force_window
+    if pair.setup.force_window is not None:
+        return pair.setup.force_window
     upper = pair.upper
     lower = pair.lower
     if pair.opens_softly and pair.law is not None:

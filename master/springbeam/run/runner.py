@@ -72,12 +72,9 @@ class Simulation(AbstractContextManager["Simulation"]):
         soft = None if setup.law is None or isinstance(setup.law, Rigid) else setup.law.force
         contact_force = contact_at_rest(of_scene, setup.degree, soft)
         self._bodies = beam, spring = load_bodies(of_scene, setup.start, setup.degree, contact_force)
-        #: The scene with what was left to the run.
-        self._resolved = scene.model_copy(
-            update={"coupling": scene.coupling.model_copy(update={"degree": setup.degree})}
-        )
+        coupling = scene.coupling.model_copy(update={"degree": setup.degree})
         try:
-            admit(self._resolved, setup.start, upper or beam, lower or spring, able)
+            admit(scene.model_copy(update={"coupling": coupling}), setup.start, upper or beam, lower or spring, able)
             self._master = Master(setup, upper or beam, lower or spring, self.recorder, contact_force)
         except BaseException:
             self.close()
@@ -186,7 +183,7 @@ class Simulation(AbstractContextManager["Simulation"]):
 
     def _summed_up(self, status: dict[str, Any]) -> dict[str, Any]:
         wall_time = perf_counter() - self._loaded
-        amounts = summary(self._resolved, self._master, self.recorder)
+        amounts = summary(self._master, self.recorder)
         bodies = zip(("beam", "spring"), self._bodies, strict=True)
         counting = {name: body for name, body in bodies if body is not None and body.steps_made is not None}
         return {

@@ -39,6 +39,7 @@ class Setup:
     macro_step: float | None
     relative_tolerance: float
     absolute_tolerance: float
+    force_window: float | None  #: time over which the contact force is averaged before its peak is taken [s]
 
 
 def set_up(scene: Scene, *abilities: Abilities) -> Setup:
@@ -72,4 +73,5 @@ def set_up(scene: Scene, *abilities: Abilities) -> Setup:
         macro_step=coupling.macro_step,
         relative_tolerance=coupling.relative_tolerance or 0.0,
         absolute_tolerance=coupling.absolute_tolerance or 0.0,
+        force_window=scene.contact.force_window,
     )

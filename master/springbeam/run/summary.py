@@ -6,21 +6,22 @@ from typing import Any
 
 import numpy as np
 
+from ..results.columns import not_shown
 from ..results.contradictions import contradictions
 from ..results.dense import between_rows
 from ..results.recording import Recorder
 from ..results.totals import totals
-from ..scene import Scene
 from .master import Master
 from .misplaced import misplaced
-from .observed import coarse_force, force_window, not_shown, unknown
+from .observed import coarse_force, force_window, unknown
 from .resolution import peak_force_doubt, why_not_resolved
 
 _SHORTER = "take a shorter macro step that is not a whole period of a body"
 
 
-def summary(scene: Scene, master: Master, recorder: Recorder) -> dict[str, Any]:
-    """Return the summary of what ``recorder`` has of the run of ``scene``, whose degree is resolved."""
+def summary(master: Master, recorder: Recorder) -> dict[str, Any]:
+    """Return the summary of what ``recorder`` has of the run."""
+    scene = recorder.scene
     steps = recorder.steps()
     pair = master.pair
     known = int(steps["events"][-1]) if len(steps) else 0  # a full disk may have events without their records
@@ -29,9 +30,9 @@ def summary(scene: Scene, master: Master, recorder: Recorder) -> dict[str, Any]:
     energies, warnings, changed = master.balance.report(steps)
     off = misplaced(pair, steps, events)
     unresolved = why_not_resolved(pair, steps, off or 0.0, between_rows(scene, steps))
-    window = force_window(scene, pair, steps)
-    warnings += filter(None, [unresolved or peak_force_doubt(pair, window), not_shown(scene, pair, steps)])
-    warnings += filter(None, [unknown(scene, pair), coarse_force(pair)])
+    window = force_window(pair, steps)
+    warnings += filter(None, [unresolved or peak_force_doubt(pair, window), not_shown(scene, steps)])
+    warnings += filter(None, [unknown(pair), coarse_force(pair)])
     amounts = totals(scene, steps, events, window) if len(steps) else {}
     ruled_out = contradictions(scene, steps, events, amounts.get("contact_duration_total", 0.0))
     warnings += [f"not resolved: {what}: an event was missed; {_SHORTER}" for what in ruled_out]
