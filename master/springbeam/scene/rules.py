@@ -11,7 +11,7 @@ from typing import Any
 
 from .laws import LAWS
 from .linearised import hilltop, largest_load, spring_energy, well_depth
-from .loads import MOST_POINTS
+from .loads import MOST_POINTS, Load
 from .messages import Rule, at, either, texts_of, texts_of_loads
 from .partners import RigidWallElement, SpringDamperElement
 from .scene import Scene
@@ -140,6 +140,64 @@ def _mesh(scene: Scene) -> Mapping[str, Any]:
     }
 
 
+def _moves_without_inertia(scene: Scene) -> bool:
+    """Return whether a beam without inertia is released with a velocity."""
+    return _let_go(scene) and scene.beam is not None and scene.beam.initial_velocity_slope != 0.0
+
+
+def _bent_without_damping(scene: Scene) -> bool:
+    """Return whether a beam without inertia and damping is released bent."""
+    beam = scene.beam
+    return _let_go(scene) and beam is not None and beam.alpha_b == 0.0 and beam.initial_deflection_slope != 0.0
+
+
+def _too_many_modes(scene: Scene) -> bool:
+    """Return whether our beam keeps more modes than are found of its mesh."""
+    beam = scene.beam
+    if beam is None or beam.integrator != "modal" or beam.unknowns <= ALL_MODES_UP_TO:
+        return False
+    return not 1 <= beam.n_modes <= _mesh(scene)["most"]
+
+
+def _starts_below_stop(scene: Scene) -> bool:
+    """Return whether the lower end starts below the foundation."""
+    top = scene.at_start("spring")
+    return scene.stop is not None and top is not None and scene.stop.position > top.value
+
+
+def _tied_apart(scene: Scene) -> bool:
+    """Return whether a tie holds ends together that start at different heights."""
+    tip = scene.at_start("beam")
+    top = scene.at_start("spring")
+    if not (scene.contact.lasting and scene.contact.rigid) or tip is None or top is None:
+        return False
+    return not math.isclose(tip.value, top.value, rel_tol=1e-12)
+
+
+def _pushes_away(scene: Scene) -> bool:
+    """Return whether our spring has no stiffness that holds it."""
+    spring = scene.spring
+    if spring is None:
+        return False
+    stiffnesses = (spring.linear_stiffness, spring.cubic_stiffness)
+    return min(stiffnesses) < 0.0 >= max(stiffnesses)
+
+
+def _escapes(scene: Scene) -> bool:
+    """Return whether our spring alone starts with more energy than its well holds, and nothing takes it away."""
+    spring = scene.spring
+    if spring is None or not _alone_in_a_well(scene):
+        return False
+    lossless = spring.damping == 0.0 and (scene.stop is None or scene.stop.restitution == 1.0)
+    return lossless and spring_energy(spring) > well_depth(scene) > -math.inf
+
+
+def _acts_before_contact(scene: Scene, load: Load) -> bool:
+    """Return whether a load moves what an undeformed approach holds."""
+    moves = load.peak > 0.0 and (load.on != "spring" or scene.lower is not None)
+    return moves and _waits(scene) and load.begins < (scene.contact_time or 0.0)
+
+
 #: Rules for scenes.
 FORBIDDEN: tuple[Rule, ...] = (
     # Bodies
@@ -230,14 +288,12 @@ FORBIDDEN: tuple[Rule, ...] = (
         'law = "transmission" or fidelity = "dynamic"',
     ),
     Rule(
-        lambda s: _let_go(s) and s.beam is not None and s.beam.initial_velocity_slope != 0.0,
+        _moves_without_inertia,
         '{beam.initial_velocity_slope}: without inertia, and approach = "elastic", nothing carries a velocity; '
         'use 0.0, or fidelity = "dynamic"',
     ),
     Rule(
-        lambda s: (
-            _let_go(s) and s.beam is not None and s.beam.alpha_b == 0.0 and s.beam.initial_deflection_slope != 0.0
-        ),
+        _bent_without_damping,
         "{beam.initial_deflection_slope}: without inertia and damping the beam starts in its static deflection; "
         'use 0.0, approach = "undeformed", or alpha_b > 0',
     ),
@@ -253,12 +309,7 @@ FORBIDDEN: tuple[Rule, ...] = (
         _mesh,
     ),
     Rule(
-        lambda s: (
-            s.beam
-            and s.beam.integrator == "modal"
-            and s.beam.unknowns > ALL_MODES_UP_TO
-            and not 1 <= s.beam.n_modes <= _mesh(s)["most"]
-        ),
+        _too_many_modes,
         "{beam.n_modes}: of the {unknowns} modes of {mesh} at most {most} are found, all only up to "
         f"{ALL_MODES_UP_TO}; use n_modes = {{fewer}}, fewer elements, or "
         'integrator = "midpoint"',
@@ -266,18 +317,12 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     # Heights
     Rule(
-        lambda s: s.stop and (top := s.at_start("spring")) and s.stop.position > top.value,
+        _starts_below_stop,
         "{stop.position}: the foundation must not lie above {top}",
         _ends,
     ),
     Rule(
-        lambda s: (
-            s.contact.lasting
-            and s.contact.rigid
-            and (tip := s.at_start("beam"))
-            and (top := s.at_start("spring"))
-            and not math.isclose(tip.value, top.value, rel_tol=1e-12)
-        ),
+        _tied_apart,
         "{tip}: the tip starts at {height:.6g} m, but {contact.law} holds it at {top}; let them start at one height, "
         'or use "link"',
         _ends,
@@ -310,7 +355,7 @@ FORBIDDEN: tuple[Rule, ...] = (
     ),
     # A softening spring
     Rule(
-        lambda s: s.spring and min(k := (s.spring.linear_stiffness, s.spring.cubic_stiffness)) < 0.0 >= max(k),
+        _pushes_away,
         "{spring.linear_stiffness}: with {spring.cubic_stiffness} the spring pushes away from {spring.unloaded}; one "
         "of them must be greater than 0",
     ),
@@ -327,13 +372,7 @@ FORBIDDEN: tuple[Rule, ...] = (
         lambda s: {"largest": largest_load(s.spring)},
     ),
     Rule(
-        # Without damping or a stop the top escapes if its energy is above the rim of the well.
-        lambda s: (
-            _alone_in_a_well(s)
-            and s.spring.damping == 0.0
-            and (s.stop is None or s.stop.restitution == 1.0)
-            and spring_energy(s.spring) > well_depth(s) > -math.inf
-        ),
+        _escapes,
         "{spring.cubic_stiffness}: the softening spring starts with {energy:.6g} J and escapes from a well {depth:.6g} "
         "J deep; use a smaller initial_velocity or external_force, an equilibrium nearer to unloaded, or a larger "
         "linear_stiffness",
@@ -385,9 +424,7 @@ FORBIDDEN_LOADS: tuple[Rule, ...] = (
         "constant",
     ),
     Rule(
-        lambda s, load: (
-            _waits(s) and (load.on != "spring" or s.lower) and load.peak > 0.0 and load.begins < s.contact_time
-        ),
+        _acts_before_contact,
         "{load.signal}: acts before the tip arrives at t = {t_c:.6g} s, and {beam.approach} holds everything until "
         'then; give a start from there on, or use approach = "elastic"',
         lambda s, load: {"t_c": s.contact_time},
