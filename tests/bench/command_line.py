@@ -41,6 +41,9 @@ COMMANDS = {
     FIT: 20.0,
 }
 
+#: What takes longer is timed twice [s].
+LONG = 15.0
+
 
 class Taken(NamedTuple):
     """Times of a process [s]."""
@@ -78,8 +81,9 @@ def commands(effort):
         python(folder, "-m", "springbeam", "new", "bumper")
         for line, goal in list(COMMANDS.items())[: 3 if effort.quick else None]:
             words = ("-m", "springbeam", *line.split())
-            python(folder, *words)  # keeps its bytecode
-            pairs = [(python(folder, "-c", BASE), python(folder, *words)) for _ in range(min(effort.rounds, 5))]
+            first = python(folder, *words)  # keeps its bytecode
+            rounds = min(effort.rounds, 5 if first.wall < LONG else 2)
+            pairs = [(python(folder, "-c", BASE), python(folder, *words)) for _ in range(rounds)]
             ratios = [ours.processor / base.processor for base, ours in pairs]
             taken, waited = (statistics.median(times) for times in zip(*(ours for _, ours in pairs), strict=True))
             yield Row(

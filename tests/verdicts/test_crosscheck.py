@@ -10,8 +10,8 @@ from commands import command, printed
 
 from springbeam import load_scene, with_changes
 from springbeam.monolithic import event_driven
-from springbeam.studies.comparison import _judged, compare
-from springbeam.studies.crosscheck import crosscheck, orders
+from springbeam.studies.comparison import PARTS, _judged, compare
+from springbeam.studies.crosscheck import crosscheck, orders, parts_of_orders
 
 SOFT = load_scene("soft")
 
@@ -113,6 +113,16 @@ def test_a_wrong_reference_fails(monkeypatch, what):
     )
     coupling = {"macro_step": 1e-3, "degree": 0 if what == "law" else 2}
     assert compare(with_changes(SOFT, time={"t_end": 0.1}, coupling=coupling))["verdict"] == "differs"
+
+
+def test_each_part_is_said_to_be_done():
+    """For a progress bar that ends where the work does."""
+    said = []
+    scene = with_changes(SOFT, time={"t_end": 0.05}, coupling={"macro_step": 1e-3})
+    crosscheck(scene, done=lambda: said.append(1))
+    assert len(said) == PARTS
+    orders(scene, quick=True, done=lambda: said.append(1))
+    assert len(said) == PARTS + parts_of_orders(quick=True)
 
 
 def test_quick_compares_the_first_quarter_and_leaves_the_last_halving_out(here, unpainted):

@@ -41,8 +41,10 @@ from .common import (
 from .run import picked, picked_in_words
 
 if TYPE_CHECKING:
+    from rich.progress import Progress
+
     from ..studies.study import Records, Study
-    from ..studies.tables import Row
+    from ..studies.tables import Done, Row
 else:
     Study = Any
 
@@ -76,7 +78,8 @@ class Once:
 
     kind: str  #: names the directory of the results
     announced: str  #: what there is to compute
-    find: Callable[[], Findings]
+    parts: int  #: how many parts that is
+    find: Callable[[Done], Findings]  #: finds it, and says when a part is done
 
 
 def study_command(*of_workers: str) -> Callable[[Callable[..., Study | Once]], Callable[..., Findings]]:
@@ -110,17 +113,15 @@ def find(once: Once, scene: str, frame: Frame) -> Findings:
 
     The directory is ``out``, else ``results/SCENE-KIND``, or with -2, -3, … behind it where there are results.
     """
-    from rich.progress import TextColumn, TimeElapsedColumn
-
     from ..monolithic.hybrid_system import ReferenceFailure
     from ..run.outcome import RunStopped
 
     with _new_directory(Path("results") / f"{Path(scene).stem}-{once.kind}", frame) as directory:
-        bar = progress_bar(TextColumn("{task.description}"), TimeElapsedColumn(), quiet=frame.quiet or frame.as_json)
+        bar = _counted(silent=frame.quiet or frame.as_json)
         try:
             with bar:
-                bar.add_task(once.announced, total=None)
-                found = once.find()
+                task = bar.add_task(once.announced, total=once.parts)
+                found = once.find(partial(bar.advance, task))
             if frame.force:
                 for stale in directory.glob(f"{once.kind}.*"):
                     stale.unlink()
@@ -189,8 +190,6 @@ def _going_on(records: Records, total: int) -> Iterator[None]:
 
 def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
     """Return all records, and show the progress."""
-    from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
-
     from ..studies.engine import dask_cluster
 
     total, there = study.expected, len(records.by_name)
@@ -199,7 +198,7 @@ def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
     silent = frame.quiet or frame.as_json
     known = f"\n{there} of {total} records are there" * bool(there)
     console_for(silent=silent).print(f"{study.announced.format(total)}{known}")
-    bar = progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), TimeRemainingColumn(), quiet=silent)
+    bar = _counted(silent=silent)
     task = bar.add_task("", total=total, completed=there)
     processes = (frame.workers or os.cpu_count() or 1) if study.parallel else 0
     with records, dask_cluster(frame.scheduler) if frame.scheduler else nullcontext() as cluster, bar:
@@ -209,6 +208,14 @@ def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
             bar.update(task, completed=done, total=max(total, done))
 
         return study.computed(records, processes, cluster, report)
+
+
+def _counted(*, silent: bool) -> Progress:
+    """Return a progress bar of parts: how many are done, and when all will be."""
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+
+    what = TextColumn("{task.description}")
+    return progress_bar(what, BarColumn(bar_width=20), MofNCompleteColumn(), TimeRemainingColumn(), quiet=silent)
 
 
 # -- the commands ---------------------------------------------------------------------------------------------------
@@ -366,8 +373,12 @@ def converge(
 
     what = scenes.load_scene(scene, settings or ())
     metrics_of(metric or QUANTITIES)
-    announced = f"{len(meshes(what, levels))} runs"
-    return Once("converge", announced, partial(settle, what, levels=levels, metric=metric or ()))
+    runs = len(meshes(what, levels))
+
+    def find(done: Done) -> Findings:
+        return settle(what, levels=levels, metric=metric or (), done=done)
+
+    return Once("converge", f"{runs} runs", runs, find)
 
 
 @study_command()
@@ -389,6 +400,7 @@ def crosscheck(
     """
     from ..monolithic import event_driven
     from ..studies import crosscheck as study
+    from ..studies.comparison import PARTS
 
     what = scenes.load_scene(scene, settings or ())
     event_driven.refuse(what)
@@ -396,14 +408,16 @@ def crosscheck(
     compared = what if made is None else made.scene
     look = study.orders if with_orders else study.crosscheck
 
-    def compare() -> Findings:
-        found = look(compared, quick=quick)
+    def compare(done: Done) -> Findings:
+        found = look(compared, quick=quick, done=done)
         if made is None:
             return found
         return replace(found, shown=[f"accuracy {picked_in_words(made.summary['accuracy'])}", *found.shown])
 
-    announced = "a reference and up to 4 runs" if with_orders else "2 runs and 2 references"
-    return Once("orders" if with_orders else "crosscheck", announced, compare)
+    if with_orders:
+        parts = study.parts_of_orders(quick)
+        return Once("orders", f"a reference and {parts - 1} runs", parts, compare)
+    return Once("crosscheck", "2 runs and 2 references", PARTS, compare)
 
 
 @study_command("workers")

@@ -32,7 +32,7 @@ from ..results.trajectory import BODY_COLUMNS, Trajectory, columns_of
 from ..run.runner import run_in_memory
 from ..scene import Scene, SceneError, with_changes
 from ..scene.frequencies import mesh_frequency, slowest_frequency
-from .tables import Row
+from .tables import Done, Row, unseen
 
 Verdict = Literal["agrees", "differs", "not comparable"]
 #: Largest change by halving the macro step, relative to the largest displacement (velocity), of a resolved motion.
@@ -48,12 +48,14 @@ _GROWTH = 1e4
 SHORT = 2.0
 #: The same where nothing has macro steps, as a share of the time.
 SHORT_SHARE = 2e-3
+#: What a comparison computes: the run, at half its macro step; the reference, from another velocity.
+PARTS = 4
 #: Columns of both motions that are kept for a picture.
 _DRAWN = ("time", "u_tip", "y", "v_tip", "z", "contact_force", "foundation_force")
 
 
-def compare(scene: Scene) -> Row:
-    """Run ``scene`` and the reference of its law and return the comparison.
+def compare(scene: Scene, done: Done = unseen) -> Row:
+    """Run ``scene`` and the reference of its law and return the comparison; ``done`` is called after each of `PARTS`.
 
     Returns
     -------
@@ -73,7 +75,7 @@ def compare(scene: Scene) -> Row:
     """
     found: Row = {"verdict": "differs", "from": scene.contact_time or 0.0, "t_end": scene.time.t_end, "growth": 1.0}
     found |= {"quantities": [], "events": [], "notes": [], "scene": scene.model_dump(exclude_none=True)}
-    runs = _beside_event_driven(scene, found)
+    runs = _beside_event_driven(scene, found, done)
     found["runs"] = {
         name: Trajectory(scene, {column: run[column] for column in present(run, _DRAWN)}, run.events)
         for name, run in zip(("co-simulation", "reference"), runs, strict=False)
@@ -95,19 +97,21 @@ def _judged(name: str, times: np.ndarray, error: np.ndarray, changed: np.ndarray
     }  # fmt: skip
 
 
-def _beside_event_driven(scene: Scene, found: Row) -> tuple[Trajectory, ...]:
+def _beside_event_driven(scene: Scene, found: Row, done: Done) -> tuple[Trajectory, ...]:
     """Compare a run with the event-driven reference, by bounds from a run at half its macro step."""
     event_driven.refuse(scene)
     size = scene.coupling.H
     coarse = run_in_memory(scene)
+    done()
     fine = run_in_memory(with_changes(scene, coupling={"macro_step": 0.5 * size}))
+    done()
     found["horizon"] = _same_story_until(coarse, fine)
     if found["horizon"] <= found["from"]:
         said = [warning for warning in coarse.summary["warnings"] if warning.startswith("not resolved")]
         found["notes"] += said or ["not resolved: half the macro step changes the motion from the first contact on"]
         return ()
     times = macro_points(scene)
-    reference, moved = reference_and_perturbed(scene, times)
+    reference, moved = reference_and_perturbed(scene, times, done)
     changes = [contact_changes(run, SHORT * size) for run in (coarse, fine, reference, moved)]
     stable = _agree_until(changes[2], changes[3], found["from"], float(coarse.time[-1]))
     found["horizon"] = min(found["horizon"], stable)
@@ -208,9 +212,13 @@ def _compare_events(
         row |= {"time": ours, "bound": bound, "passed": abs(ours - time) <= bound}
 
 
-def reference_and_perturbed(scene: Scene, times: np.ndarray) -> tuple[Trajectory, Trajectory]:
+def reference_and_perturbed(scene: Scene, times: np.ndarray, done: Done = unseen) -> tuple[Trajectory, Trajectory]:
     """Return the reference at ``times`` [s], and once more from initial velocities changed by `PERTURBATION`."""
-    return event_driven.integrate(scene, sample_times=times), next(perturbed(scene, PERTURBATION, sample_times=times))
+    reference = event_driven.integrate(scene, sample_times=times)
+    done()
+    moved = next(perturbed(scene, PERTURBATION, sample_times=times))
+    done()
+    return reference, moved
 
 
 def perturbed(scene: Scene, share: float, **options: Any) -> Iterator[Trajectory]:

@@ -22,7 +22,7 @@ from ..scene import Scene, SceneError
 from .design import with_keys
 from .metrics import heading, metrics_of
 from .study import measured, troubles
-from .tables import Findings, Row, difference, table
+from .tables import Done, Findings, Row, difference, table, unseen
 
 #: Default quantities, those that a scene has.
 QUANTITIES = (
@@ -72,7 +72,7 @@ def extrapolated(values: Sequence[float | None], sizes: Sequence[int], *, comple
     return Extrapolated(change, order, last + rest, abs(rest))
 
 
-def converge(scene: Scene, *, levels: int = 4, metric: Sequence[str] = ()) -> Findings:
+def converge(scene: Scene, *, levels: int = 4, metric: Sequence[str] = (), done: Done = unseen) -> Findings:
     """Run ``scene`` on finer and finer meshes, and with more and more modes of its own mesh, and judge the convergence.
 
     Parameters
@@ -83,6 +83,8 @@ def converge(scene: Scene, *, levels: int = 4, metric: Sequence[str] = ()) -> Fi
         Meshes of each sequence, as of `meshes`.
     metric
         The quantities; those of `QUANTITIES` that the scene has if there are none.
+    done
+        Called after the run of each of `meshes`.
 
     Raises
     ------
@@ -95,6 +97,7 @@ def converge(scene: Scene, *, levels: int = 4, metric: Sequence[str] = ()) -> Fi
         began = perf_counter()
         record = measured(partial(with_keys, scene, mesh), metrics)
         rows[name] = {**mesh, **record, "cost_wall_time": perf_counter() - began}
+        done()
     found = judged(scene, list(rows.values()), metric)
     return replace(found, shown=[*found.shown, *troubles(rows)])
 

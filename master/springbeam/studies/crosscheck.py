@@ -18,7 +18,7 @@ from ..run.accuracy import simulate
 from ..run.outcome import RunStopped
 from ..scene import Scene, with_changes
 from .comparison import SHORT, Verdict, away_from, compare, macro_points, quantities, sample
-from .tables import Findings, Row, difference, in_words, table
+from .tables import Done, Findings, Row, difference, in_words, table, unseen
 
 #: Exit codes of the command.
 CODES: dict[Verdict, int] = {"agrees": 0, "differs": 1, "not comparable": 4}
@@ -27,16 +27,16 @@ _STOPPED = 3
 _HALVINGS = 3
 
 
-def crosscheck(scene: Scene, *, quick: bool = False) -> Findings:
+def crosscheck(scene: Scene, *, quick: bool = False, done: Done = unseen) -> Findings:
     """Compare ``scene`` with the reference of its law: quantities, changes of contact, and the verdict.
 
-    The table is of the quantities, the exit code that of `CODES`. ``quick`` compares the first quarter. Raises as
-    `compare`.
+    The table is of the quantities, the exit code that of `CODES`. ``quick`` compares the first quarter. ``done`` and
+    what is raised: as of `compare`.
     """
     event_driven.refuse(scene)
     start = scene.contact_time or 0.0
     end = scene.time.t_end
-    record = compare(with_changes(scene, time={"t_end": start + 0.25 * (end - start)}) if quick else scene)
+    record = compare(with_changes(scene, time={"t_end": start + 0.25 * (end - start)}) if quick else scene, done)
     units = columns_of(scene)
     shown: list[Any] = [*record["notes"]]
     if record["quantities"]:
@@ -78,12 +78,12 @@ def _ok(row: Mapping[str, Any]) -> str:
     return "ok" if row["passed"] else "DIFFERS"
 
 
-def orders(scene: Scene, *, quick: bool = False) -> Findings:
+def orders(scene: Scene, *, quick: bool = False, done: Done = unseen) -> Findings:
     """Compare ``scene`` at H, H/2, H/4, … with the event-driven reference: errors and observed orders.
 
     Errors of displacement, velocity and contact force are in the max norm between two changes of contact, at the macro
     points that all runs share and two macro steps away from the events. A run that stops early leaves its column empty;
-    fewer than two runs show no order: exit code 3.
+    fewer than two runs show no order: exit code 3. ``done`` is called after each of `parts_of_orders`.
 
     Raises
     ------
@@ -94,9 +94,9 @@ def orders(scene: Scene, *, quick: bool = False) -> Findings:
     """
     event_driven.refuse(scene)
     H = scene.coupling.H
-    halvings = range(_HALVINGS + 1 - quick)
-    sizes = {f"H/{2**k}" if k else "H": H / 2**k for k in halvings}
+    sizes = {f"H/{2**k}" if k else "H": H / 2**k for k in range(parts_of_orders(quick) - 1)}
     reference = event_driven.integrate(scene, sample_times=macro_points(scene))
+    done()
     found = dict[str, list[Row]]()
     stopped = dict[str, str]()
     for step, size in sizes.items():
@@ -104,6 +104,7 @@ def orders(scene: Scene, *, quick: bool = False) -> Findings:
             found[step] = _errors(scene, simulate(with_changes(scene, coupling={"macro_step": size})), reference)
         except RunStopped as error:
             stopped[step] = str(error)
+        done()
     rows = list[Row]()
     cells = list[tuple[Any, ...]]()
     curves = dict[str, dict[str, Any]]()
@@ -133,6 +134,11 @@ def orders(scene: Scene, *, quick: bool = False) -> Findings:
         tables={"orders": rows},
         pictures={"orders": draw} if rows else {},
     )
+
+
+def parts_of_orders(quick: bool) -> int:
+    """Return how many solutions `orders` computes: the reference and the runs."""
+    return 1 + _HALVINGS + 1 - quick
 
 
 def _errors(scene: Scene, run: Trajectory, reference: Trajectory) -> list[Row]:

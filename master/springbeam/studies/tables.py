@@ -16,6 +16,12 @@ _DPI = 110
 
 #: Columns of a row by name.
 Row = dict[str, Any]
+#: Called when a part of a study is done, for a progress bar.
+Done = Callable[[], object]
+
+
+def unseen() -> None:
+    """Do nothing when a part is done: nobody watches."""
 
 
 @dataclass(frozen=True)
