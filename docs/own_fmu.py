@@ -61,7 +61,7 @@ def main() -> None:
         below = body(python, m=1.0, k=30.0, c=0.5)
         above = body(python, m=2.0, k=30.0, c=0.5, v0=-0.5)
         together = body(python, m=1.0, k=9.0, c=0.5, v0=-0.5)
-        pairs = (
+        pairs: tuple[tuple[str, Any, Any, dict[str, Any]], ...] = (
             ("below our beam, compliance", BEAM, below, COMPLIANCE),
             ("above our spring, link", above, SPRING, LINK),
             ("two of them, link", above, below, LINK),
