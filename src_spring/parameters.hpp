@@ -39,6 +39,12 @@ struct Inputs {
   Polynomial external_force{};     ///< f_s [N]
   Polynomial base_acceleration{};  ///< a of the foundation [m/s²]: y is relative to it, so that it acts as −m a
   Polynomial tip_displacement{};   ///< u_tip [m]; read by normal_compliance only
+
+  bool operator==(const Inputs& other) const {
+    return contact_force == other.contact_force && foundation_force == other.foundation_force &&
+           external_force == other.external_force && base_acceleration == other.base_acceleration &&
+           tip_displacement == other.tip_displacement;
+  }
 };
 
 /// @throws std::invalid_argument naming the parameter that cannot be beside the others, its value and what is allowed

@@ -72,9 +72,13 @@ class HoldingForce {
         if (stretch.from < s && s < stretch.to) ends.push_back(s);
     ends.push_back(stretch.to);
     for (int k = 2; k >= 0; --k) {
+      // The second derivative is scaled by a power of δ, of which rounding is left where δ is 0. What it does so near
+      // the ends changes N by less than its rounding.
+      const double inset = k == 2 ? 1e-7 * (stretch.to - stretch.from) : 0.0;
       std::vector<double> changes;
-      double low = stretch.from;
-      for (const double high : ends) {
+      double low = stretch.from + inset;
+      for (const double end : ends) {
+        const double high = std::min(end, stretch.to - inset);
         const auto negative = [&](double s) { return derivative_sign(k, s, stretch.pressed) < 0.0; };
         const bool at_low = negative(low);
         if (negative(high) != at_low)

@@ -43,8 +43,8 @@ double TrialSteps::displacement_under(double contact_force) {
 }
 
 bool TrialSteps::adopt(double size, const Inputs& inputs) {
-  const bool same_step = size == size_ && std::memcmp(&inputs, &inputs_, sizeof inputs) == 0;
-  if (!same_step || end_.impacts != start_.impacts || !same_start(spring_.state(), start_)) return false;
+  if (size != size_ || !(inputs == inputs_) || end_.impacts != start_.impacts || !same_start(spring_.state(), start_))
+    return false;
   spring_.restore(end_);
   return true;
 }

@@ -316,5 +316,5 @@ TEST(Falls, OfHoldingForces) {
     const double steep = std::abs(N(reached.size + 1e-7) - N(reached.size - 1e-7)) / 2e-7;
     ASSERT_LE(N(reached.size), rounding(reached.size) + 1e-14 * steep) << i;
   }
-  EXPECT_GT(left, 300);
+  EXPECT_GT(left, 200);
 }

@@ -398,6 +398,22 @@ TEST(SpringStop, ADipOfTheHoldingForceSoonAfterTheStartCounts) {
   }
 }
 
+// N'' of a linear law, damped, is linear in time where δ is not 0: N turns twice, from 0.48 on it is below 0.
+TEST(SpringStop, ADipUnderALinearDampedLawCounts) {
+  Parameters p = ball(0.0, 0.0, 0.0);
+  p.contact_law = ContactLaw::normal_compliance;
+  p.compliance_stiffness = 1.0;
+  p.compliance_exponent = 1.0;
+  p.compliance_damping = 1.2250728094276986;
+  Inputs inputs;
+  inputs.tip_displacement = {-0.03146783808047604, 0.054194832698953199, -0.038117771045798055};
+  inputs.external_force = {0.029377476138549179, -0.049382741135356366, 0.032450429881421106};
+  Spring s(p);
+  const double left = s.step_to_event(1.0, inputs, 0.0, true).size;
+  EXPECT_GT(left, 0.4);
+  EXPECT_LT(left, 0.489);  // where N is -2.4e-9
+}
+
 // y is what the motion says, whatever the distance of a stop that is never reached.
 TEST(SpringStop, ADistantStopDoesNotQuantiseTheDisplacement) {
   for (const double amplitude : {1e-3, 1e-9}) {
