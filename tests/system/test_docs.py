@@ -47,8 +47,6 @@ NOT_RUN = {
     "springbeam animate results/soft": "draws for half a minute; the command is in test_animation.py",
     "springbeam sweep vibro-impact": "takes a minute; the command is in test_sweep.py",
     "springbeam sweep pulse": "takes some seconds; what it asks for is in test_signals.py",
-    "springbeam run duffing --set spring.linear_stiffness=3.1": "is what the next line fits",
-    "springbeam fit duffing": "takes a quarter of a minute; the command is in test_fit.py",
     "springbeam sweep soft": "starts a process for each core; the command is in test_command_line.py",
     "springbeam stability": "takes minutes; parts of it are run in test_stability.py",
     "springbeam sweep bumper.toml": "takes half a minute; the command is in test_sweep.py",

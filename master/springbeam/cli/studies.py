@@ -152,9 +152,8 @@ def carry_out(study: Study, scene: str | None, frame: Frame) -> Findings:
     """
     from ..studies.study import troubles
 
-    total = study.expected
     records = _opened(study, study.kind if scene is None else f"{Path(scene).stem}-{study.kind}", frame)
-    with _going_on(records, total):
+    with _going_on(records, study):
         computed = _computed(study, records, frame)
         found = study.findings(computed).written(records.path.parent, pictures=not frame.no_plots)
     return replace(found, shown=[*study.remarks, *found.shown, *troubles(computed)])
@@ -172,7 +171,7 @@ def _opened(study: Study, default: str, frame: Frame) -> Records:
 
 
 @contextmanager
-def _going_on(records: Records, total: int) -> Iterator[None]:
+def _going_on(records: Records, study: Study) -> Iterator[None]:
     """End the command with the cause, and how to continue the study, if it stops."""
     from ..monolithic.hybrid_system import ReferenceFailure
     from ..run.outcome import RunStopped
@@ -184,15 +183,17 @@ def _going_on(records: Records, total: int) -> Iterator[None]:
     except (KeyboardInterrupt, RunStopped, ReferenceFailure, OSError) as error:
         if isinstance(error, OSError) and not records.by_name:
             raise
-        there = f"; {len(records.by_name)} of {total} records are in {directory}; the same command continues"
-        fail(STOPPED, cause_of(error, directory) + there * bool(records.by_name))
+        done = len(records.by_name)
+        there = f"; {done} of {study.expected(done)} records are in {directory}; the same command continues"
+        fail(STOPPED, cause_of(error, directory) + there * bool(done))
 
 
 def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
     """Return all records, and show the progress."""
     from ..studies.engine import dask_cluster
 
-    total, there = study.expected, len(records.by_name)
+    there = len(records.by_name)
+    total = study.expected(there)
     if there == len(study.cases()) == total:
         return study.computed(records)
     silent = frame.quiet or frame.as_json
@@ -204,8 +205,11 @@ def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
     with records, dask_cluster(frame.scheduler) if frame.scheduler else nullcontext() as cluster, bar:
 
         def report(_: Row) -> None:
+            nonlocal total
             done = len(records.by_name)
-            bar.update(task, completed=done, total=max(total, done))
+            if done > total:
+                total = study.expected(done)
+            bar.update(task, completed=done, total=total)
 
         return study.computed(records, processes, cluster, report)
 

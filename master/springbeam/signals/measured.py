@@ -23,9 +23,11 @@ _MOST = 200_000
 _FEWEST = 2_000
 #: Peaks of a correlation that are refined, and steps by Newton's method after that.
 _PEAKS = 6
-_NEWTON = 2
+_NEWTON = 1
 #: Mean square over the spread that is none.
-_ALIKE = 1e-12
+ALIKE = 1e-12
+#: Shifts fit equally well whose mean squares differ by no more than this share.
+EQUAL = 0.01
 #: Half of the difference that gives a derivative by time, as a share of the run.
 _DIFFERENCE = 1e-6
 
@@ -146,8 +148,8 @@ def aligned(run: Trajectory, measured: Measured, lowest: float = -math.inf, high
     """Return ``run`` and the measurement, its clock shifted to the least mean square of the difference.
 
     Curves are weighed by the spread of the measurement. Periods of an oscillation are similar, so the `_PEAKS` best
-    shifts of a correlation are refined, and the best of these is taken. At least half of the points that the run can
-    cover are used.
+    shifts of a correlation are refined, and the best of these is taken; of equally good ones the smallest.
+    At least half of the points that the run can cover are used.
 
     Parameters
     ----------
@@ -200,7 +202,7 @@ def at_shift(run: Trajectory, measured: Measured, shift: float) -> Aligned:
 def _correlated(
     run: Trajectory, measured: Measured, lowest: float, highest: float
 ) -> tuple[list[tuple[float, float]], float]:
-    """Return shifts [s] within limits with the mean squares there, best first, and the step at which they were sought.
+    """Return shifts [s] within limits with the mean squares there, that to take first, and the step of the search.
 
     Between steps they are found by splines.
     """
@@ -227,7 +229,7 @@ def _correlated(
         total += square / measured.spread(what) ** 2
     shifts = begin - first + step * (np.arange(len(number)) - len(points) + 1.0)
     allowed = (number >= 0.5 * number.max()) & (shifts >= lowest) & (shifts <= highest)
-    total = np.where(allowed, (total / number.clip(1.0) + _ALIKE) / number.clip(1.0), np.inf)
+    total = np.where(allowed, (total / number.clip(1.0) + ALIKE) / number.clip(1.0), np.inf)
     if not allowed.any():
         return [(0.5 * (lowest + highest), math.inf)], highest - lowest
     padded = np.pad(total, 1, constant_values=np.inf)
@@ -241,7 +243,7 @@ def _correlated(
         if not inside.any():
             return math.inf
         # Of periods that fit as well, the one that covers more of the measurement.
-        return (float(np.mean(weighed(off, measured) ** 2)) + _ALIKE) / float(inside.mean())
+        return (float(np.mean(weighed(off, measured) ** 2)) + ALIKE) / float(inside.mean())
 
     refined = [
         minimize_scalar(
@@ -252,7 +254,10 @@ def _correlated(
         )
         for k in lows[np.argsort(total[lows])][:_PEAKS]
     ]
-    return sorted(((float(at.x), float(at.fun)) for at in refined), key=lambda pair: pair[1]), step
+    ranked = sorted(((float(at.x), float(at.fun)) for at in refined), key=lambda pair: pair[1])
+    equal = [pair for pair in ranked if pair[1] <= (1.0 + EQUAL) * ranked[0][1]]
+    smallest = min(equal, key=lambda pair: abs(pair[0]))
+    return [smallest, *(pair for pair in ranked if pair is not smallest)], step
 
 
 def correlated(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -21,13 +20,13 @@ from scipy.special import chdtri, fdtri, stdtrit
 
 from ..run.accuracy import simulate
 from ..run.outcome import RunStopped
-from ..scene import ArgumentError, Scene, SceneError, key_kind
+from ..scene import ArgumentError, Scene, SceneError, key_kind, with_changes
 from ..scene.scene import split_key
-from ..signals.measured import Measured, aligned, correlated, read_measured, reading_of
+from ..scene.tables import TOLERANCE_KEYS
+from ..signals.measured import ALIKE, EQUAL, Measured, aligned, correlated, read_measured, reading_of
 from .design import parse_axis, with_keys
-from .engine import Report, record_all
 from .least import SHIFT, Minimum, Search
-from .study import Records, Study
+from .study import Make, Study
 from .tables import Findings, Row, table
 
 _DISAGREES = 1
@@ -37,9 +36,13 @@ _RANGE = 3.0
 #: Runs all over the range, and searches from the best of them; the second time if what is left is no noise.
 _STARTS = (16, 64)
 _LOOKS = (2, 4)
-#: Runs of a first look by a search, beside its first derivatives, and of the search that goes on.
-_FIRST_LOOK = 5
-_MOST = 40
+#: Steps of a first look by a search, and of the search that goes on.
+_FIRST_LOOK = 2
+_MOST = 25
+#: No more runs than so many for each key are made after those all over the range.
+_MOST_RUNS = 100
+#: Marks of runs that judge a minimum: with shorter steps, and beside the repeated measurement.
+_JUDGES = {"finer", "repeat"}
 #: Searches that end at less than so many times the cost of the best one are continued as well.
 _RIVAL = 4.0
 _CONFIDENCE = 0.95
@@ -48,9 +51,13 @@ _CHANCE = 1e-3
 #: Lags of the autocorrelation that are judged, and the fewest points of which they can be.
 _LAGS = 20
 _FEWEST = 12
-#: What is left of a curve, over its spread: no more than this is no error of the run, no less than that is no fit.
-_EXACT = 1e-6
+#: What is left of a curve, over its spread: no more than this is rounding of a search, no less than that is no fit.
+_ROUNDING = 1e-9
 _APART = 0.5
+#: An error of the run itself is at most so many times what shorter steps change.
+_OWN = 4.0
+#: Makes a tolerance or an accuracy tighter, as half the macro step does.
+_TIGHTER = 0.1
 #: Share of the run within which shifts of the clock belong together.
 _NEAR = 0.01
 #: Unknowns are alike that differ by no more, relative to the keys.
@@ -65,6 +72,7 @@ class Left(NamedTuple):
     off: np.ndarray  #: run less measurement, shape (n,)
     rms: float
     share: float  #: ``rms`` over the spread of what was measured
+    own: float = 0.0  #: rms of what shorter steps change
     noise: float | None = None  #: rms of the noise, by a measurement that was repeated
     free: float = 1.0  #: how many independent points of noise there are
 
@@ -77,16 +85,20 @@ class Found(NamedTuple):
     left: Mapping[str, Left]  #: by curve
     alike: Sequence[str]  #: which unknowns change nothing, or the curves in the same way
     rivals: Sequence[Row]  #: values elsewhere in the ranges that fit as well
+    ended: bool  #: whether no further step of the search would gain anything
 
 
 def undetermined(found: Found) -> list[str]:
     """Return why keys are not determined by the data; nothing if they are.
 
-    They are determined if what is left of every curve is noise (no more than half of its spread, and white, or as large
-    as the noise of a repeated measurement), no other start in their ranges has led to values that fit as well, and
-    every interval lies inside its range and within a factor of two of its value.
+    They are determined if the search has ended in a minimum, what is left of every curve is noise (no more than half of
+    its spread, and white, or as large as the noise of a repeated measurement) or an error of the run itself, no other
+    start in their ranges has led to values that fit as well, and every interval lies inside its range and within a
+    factor of two of its value.
     """
     why = [f"{name}: {doubt}" for name, left in found.left.items() if (doubt := no_noise(left))]
+    if not found.ended:
+        why.append("the search has not ended in a minimum; give a narrower range")
     why += found.alike
     for rival in found.rivals:
         values = ", ".join(f"{name} = {value:.5g}" for name, value in rival.items())
@@ -107,8 +119,8 @@ def undetermined(found: Found) -> list[str]:
 
 
 def no_noise(left: Left) -> str:
-    """Return why what is left of a curve is no noise; nothing if it is, or too small to be an error of the run."""
-    if left.share <= _EXACT:
+    """Return why what is left of a curve is no noise; nothing if it is, or no larger than the error of the run."""
+    if left.share <= _ROUNDING or (left.share <= _APART and left.rms <= _OWN * left.own):
         return ""
     if left.noise is not None:
         if left.rms**2 <= left.noise**2 * float(fdtri(left.free, left.free, 1.0 - _CHANCE)):
@@ -243,11 +255,16 @@ class Fit(Study):
         _ = self.repeated
         return {_name(case): case for case in cases}
 
+    def expected(self, done: int = 0) -> int:
+        """Return the number of runs if the first look finds what is left to be noise; beyond that, the largest."""
+        differences = 1 + len(self.ranges)
+        first = _STARTS[0] + (_LOOKS[0] * (1 + _FIRST_LOOK) + 2) * differences
+        return first if done <= first else self.most + len(_STARTS) * len(_JUDGES)
+
     @property
-    def expected(self) -> int:
-        """Number of runs if the first look finds what is left to be noise."""
-        keys = len(self.ranges)
-        return len(self.cases()) + _LOOKS[0] * (_FIRST_LOOK + keys) + 2 * keys + 2
+    def most(self) -> int:
+        """Number of runs that a search makes at most."""
+        return _STARTS[-1] + _MOST_RUNS * len(self.ranges)
 
     def settings(self) -> dict[str, Any]:
         """Return the identity of a fit; measurements count by their content."""
@@ -259,7 +276,8 @@ class Fit(Study):
         """Run one case; return what is left of the curves at the shift that fits best, or why it cannot be run."""
         keys = {name: case[name] for name in self.ranges}
         try:
-            run = simulate(with_keys(self.scene, keys))
+            scene = with_keys(self.scene, keys)
+            run = simulate(_finer(scene) if case.get("finer") else scene)
         except (RunStopped, SceneError) as refused:
             return {**keys, "error": str(refused)}
         data = self.repeated if case.get("repeat") else self.data
@@ -279,22 +297,10 @@ class Fit(Study):
             "others": found.others,
         }
 
-    def computed(
-        self,
-        records: Records | None = None,
-        workers: int = 0,
-        cluster: Executor | None = None,
-        report: Report = lambda record: None,
-    ) -> dict[str, Row]:
-        """Search; each run that ``records`` lacks is made and kept there. Return them all."""
-        known = {} if records is None else records.by_name
-        keep = known.__setitem__ if records is None else records.add
-
-        def trial(case: Row) -> Row:
-            return record_all({_name(case): case}, self.record, known, keep, report=report)[_name(case)]
-
-        self._found(trial)
-        return known
+    def made(self, make: Make, known: Mapping[str, Row]) -> dict[str, Row]:
+        """Search; return all runs."""
+        self._found(lambda case: make({_name(case): case})[_name(case)])
+        return dict(known)
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Return the values found with their intervals, and why the data does not determine them (exit code 1)."""
@@ -318,8 +324,16 @@ class Fit(Study):
 
     # Search
 
-    def _found(self, trial: Callable[[Row], Row]) -> Found | None:
+    def _found(self, make: Callable[[Row], Row]) -> Found | None:
         """Search from the best of runs all over the ranges; return what was found, ``None`` if nothing can be run."""
+        made = set[str]()
+
+        def trial(case: Row) -> Row:
+            if case.keys() & _JUDGES:
+                return make(case)
+            made.add(_name(case))
+            return make(case) if len(made) <= self.most else {"error": "the search has made as many runs as it may"}
+
         starts = self._starts()
         begun = list[Search]()
         looked = list[Search]()
@@ -339,9 +353,9 @@ class Fit(Study):
             done = until
             if looked:
                 found = self._judged(trial, looked)
-                if not any(map(no_noise, found.left.values())):
+                if found.ended and not any(map(no_noise, found.left.values())):
                     break
-        return found
+        return found and found._replace(ended=found.ended and len(made) <= self.most)
 
     def _begun(
         self, trial: Callable[[Row], Row], at: np.ndarray, shifts: Mapping[str, float] | None = None
@@ -365,57 +379,73 @@ class Fit(Study):
         """
         if self.shift is not None:
             return None
-        turns = [rms(last.row["slope"][name]) / self.data.spread(name) for name in self.data.values]
-        period = 2.0 * math.pi / max(*turns, 1e-300)
         row = trial(self._values(last.at))
-        several = [(misfit, shift) for shift, misfit in row["others"] if abs(shift - last.row[SHIFT]) > 0.4 * period]
+        away = 0.4 * last.period
+        several = [(misfit, shift) for shift, misfit in row.get("others", ()) if abs(shift - last.row[SHIFT]) > away]
         if not several:
             return None
         _, shift = min(several)
-        return self._begun(trial, last.at, {"lowest": shift - 0.1 * period, "highest": shift + 0.1 * period})
+        return self._begun(trial, last.at, {"lowest": shift - 0.25 * away, "highest": shift + 0.25 * away})
 
     def _judged(self, trial: Callable[[Row], Row], looked: Sequence[Search]) -> Found:
         """Go on with the best of searches and with those that may end as well; return the evidence for the best.
 
         ``looked`` are sorted by their costs.
         """
-        minima = [self._ended(looked[0])]
-        minima += [
-            self._ended(other)
-            for other in looked[1:]
-            if other.cost <= _RIVAL * minima[0].cost and (_apart(other.at, minima[0]) or _moved(other.row, minima[0]))
-        ]
+        first = self._ended(trial, looked[0])
+        others = [other for other in looked[1:] if other.cost <= _RIVAL * first.cost]
+        others = [other for other in others if _apart(other.at, first) or _moved(other.row, first.row)]
+        minima = [first, *(self._ended(trial, other) for other in others)]
         best = min(minima, key=_cost)
         # What noise can make of one cost: the F test of all unknowns (Bates & Watts 1988, section 1.3).
         size = best.derivatives.shape[1]
         chance = float(fdtri(size, best.freedom, _CONFIDENCE)) * size / best.freedom
         as_well = [other for other in minima if other.cost <= (1.0 + chance) * best.cost and _apart(other.at, best)]
-        left = self._left(best)
+        names = [*self.ranges, *[SHIFT] * (self.shift is None)]
+        alike = best.alike(names, float(np.ptp(self.data.time))) if best.ended else []
+        changed = self._changed(trial, best)
+        left = self._left(best, changed)
         if self.repeated is not None:
             left = {name: self._beside_noise(trial, best, name, part) for name, part in left.items()}
-        names = [*self.ranges, *[SHIFT] * (self.shift is None)]
-        alike = best.alike(names, float(np.ptp(self.data.time)))
         # Points that remember their past count as fewer.
         counted = max(1.0 if is_white(part.off) else remembered(part.off) for part in left.values())
-        half = [math.inf] * size if alike else (math.sqrt(counted) * _half(best)).tolist()
-        keys = self._intervals(best, half)
-        return Found(keys, self.ranges, left, alike, [self._values(other.at) for other in as_well])
+        half = math.sqrt(counted) * _half(best) + _OWN * np.abs(best.moved_by(changed))
+        keys = self._intervals(best, [math.inf] * size if alike else half.tolist())
+        return Found(keys, self.ranges, left, alike, [self._values(other.at) for other in as_well], best.ended)
 
-    def _left(self, at: Search | Minimum) -> dict[str, Left]:
-        """Return what is left of the curves, by their names."""
+    def _left(self, best: Minimum, changed: Mapping[str, np.ndarray]) -> dict[str, Left]:
+        """Return what is left of the curves, by their names, beside what shorter steps have ``changed``."""
         found = {}
-        for name, curve in at.row["off"].items():
-            off = np.array(curve, float)[at.part]
-            found[name] = Left(off, rms(off), rms(off) / self.data.spread(name))
+        for name, curve in best.row["off"].items():
+            off = np.array(curve, float)[best.part]
+            found[name] = Left(off, rms(off), rms(off) / self.data.spread(name), rms(changed[name]))
         return found
 
-    def _ended(self, search: Search) -> Minimum:
-        """Go on with a search while what is left is no noise, then with each curve weighed by that, to its end."""
-        if any(map(no_noise, self._left(search).values())):
-            search = search.least(_MOST)
+    def _changed(self, trial: Callable[[Row], Row], best: Minimum) -> dict[str, np.ndarray]:
+        """Return what shorter steps change in the curves, 0 if the scene cannot be run with them."""
+        keys = {name: best.row[name] for name in self.ranges}
+        shift = best.row[SHIFT]
+        finer = trial(keys | {"lowest": shift, "highest": shift, "finer": True})
+        if finer["error"]:
+            finer = best.row
+        return {
+            name: np.array(finer["off"][name], float)[best.part] - np.array(curve, float)[best.part]
+            for name, curve in best.row["off"].items()
+        }
+
+    def _ended(self, trial: Callable[[Row], Row], search: Search) -> Minimum:
+        """Return the minimum to which a search leads, several curves weighed by what is left of each.
+
+        Where another shift of the clock fits these keys as well, and is smaller, the search goes on from there.
+        """
+        search = search.least(_MOST)
+        if self.shift is None:
+            anywhere = self._begun(trial, search.at)
+            if anywhere is not None and _moved(anywhere.row, search.row) and _as_good(anywhere, search):
+                search = anywhere.least(_MOST)
         if len(self.data.values) > 1:
             search = search.evenly().least(_MOST)
-        return search.ended()
+        return search.minimum()
 
     def _intervals(self, best: Minimum, half: Sequence[float]) -> list[Row]:
         """Return the values at a minimum, with intervals of a half width unless that is infinite."""
@@ -471,9 +501,25 @@ def _apart(at: np.ndarray, best: Minimum) -> bool:
     return bool(np.any(np.abs(at - best.at) > 3.0 * _half(best)[: len(at)] + _SAME))
 
 
-def _moved(row: Row, best: Minimum) -> bool:
-    """Return whether the clock of a run is elsewhere than at a minimum."""
-    return bool(abs(row[SHIFT] - best.shift) > _NEAR * (row["end"] - row["begin"]))
+def _moved(row: Row, other: Row) -> bool:
+    """Return whether the clocks of two runs are apart."""
+    return bool(abs(row[SHIFT] - other[SHIFT]) > _NEAR * (row["end"] - row["begin"]))
+
+
+def _as_good(search: Search, other: Search) -> bool:
+    """Return whether a search begins at a cost that is not larger than that of another."""
+    return search.cost <= (1.0 + EQUAL) * other.cost + ALIKE
+
+
+def _finer(scene: Scene) -> Scene:
+    """Return a scene with half the macro step, or a tighter accuracy or tolerances."""
+    if scene.accuracy is not None:
+        return with_changes(scene, accuracy=_TIGHTER * scene.accuracy)
+    coupling = scene.coupling
+    if not coupling.adaptive:
+        return with_changes(scene, coupling={"macro_step": 0.5 * coupling.H})
+    tolerances = ((name, getattr(coupling, name)) for name in TOLERANCE_KEYS)
+    return with_changes(scene, coupling={name: _TIGHTER * given for name, given in tolerances if given is not None})
 
 
 def _name(case: Row) -> str:

@@ -1,17 +1,19 @@
-"""Least squares over runs: each residual costs a run, so derivatives are updated by secants between a few of them.
+"""Least squares over runs: each residual costs a run, and derivatives are differences of runs at the present place.
 
 Unknowns are logarithms of keys, which so keep their signs. The shift of the clock is eliminated inside each residual:
 what is left of the curves at the best shift is projected onto what a further shift does not change (variable
-projection; Golub & Pereyra 1973, Kaufman 1975).
+projection; Golub & Pereyra 1973, Kaufman 1975). Steps are those of Levenberg and Marquardt. In a valley, where two keys
+nearly make up for each other, a step along it leaves it to second order: it is corrected by the derivatives there are
+before it is shortened (in 25 steps without that, those of scipy's ``least_squares`` do not reach the end of one).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from ..signals.measured import Measured
 from .tables import Row
@@ -24,16 +26,17 @@ Trial = Callable[[np.ndarray, float, float], Row]
 _MARGIN = 0.02
 #: Residual of a run that cannot be made, so that a search turns back.
 _REFUSED = 1e3
-#: Differences of the unknowns that give the first derivatives of a search, and those where it ends.
-_COARSE = 1e-3
-_FINE = 1e-4
-#: Where a search by secants ends: relative change of the cost, and change of the unknowns.
-_COST = 1e-5
-_STEP = 1e-7
-#: Steps by Newton's method after that, at most, and the share of an interval, or the change, that is small enough.
-_ROUNDS = 5
-_SHARE = 0.1
+#: Differences of the unknowns that give derivatives: to one side on the way, where in a valley of two keys 1e-5 is too
+#: coarse, and to both sides at a minimum.
+_FINE = 1e-6
+_COARSE = 1e-4
+#: A search has ended where a step by Newton's method gains less than this share of what noise does
+#: (Bates & Watts 1981), or changes the unknowns less than that.
+_SHARE = 0.01
 _LEAST = 1e-9
+#: Longest step at first, and trials of one before it is shortened: as it is, and corrected.
+_FIRST = 0.5
+_TRIALS = 4
 #: A combination of unknowns that changes the curves by less than this share of the others is not determined.
 _UNDETERMINED = 1e-5
 
@@ -48,6 +51,8 @@ class Minimum(NamedTuple):
     cost: float  #: see `Search.cost`
     residual: np.ndarray  #: what is left of them, weighed, shape (m,)
     derivatives: np.ndarray  #: by the unknowns and, if the clock is free, by its shift [1/s], shape (m, k or k + 1)
+    weights: Mapping[str, float]  #: of the curves
+    ended: bool  #: whether no further step would gain anything
 
     @property
     def freedom(self) -> int:
@@ -67,6 +72,11 @@ class Minimum(NamedTuple):
         inverse = directions.T / np.maximum(sizes, 1e-300)
         variance = float(self.residual @ self.residual) / self.freedom
         return np.asarray(np.sqrt(variance * (inverse**2).sum(axis=1)) / lengths)
+
+    def moved_by(self, curves: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return how far the unknowns and the shift move if the measurement changes by ``curves``, shapes (n,)."""
+        change = np.concatenate([self.weights[what] * curve for what, curve in curves.items()])
+        return np.asarray(np.linalg.lstsq(self.derivatives, np.nan_to_num(change))[0])
 
     def alike(self, names: Sequence[str], duration: float) -> list[str]:
         """Return which unknowns change nothing, or the curves in the same way; a shift counts over a ``duration``."""
@@ -99,7 +109,6 @@ class Search:
         row: Row,
         *,
         free: bool,
-        weights: Mapping[str, float] | None = None,
     ) -> None:
         self._trial = trial
         self._data = data
@@ -107,8 +116,9 @@ class Search:
         self._free = free
         self.at = at
         self.row = row
+        self._reach = _FIRST
         self._rows = {tuple(at.tolist()): row}
-        self._weights = weights or {what: 1.0 / data.spread(what) for what in data.values}
+        self._weights = {what: 1.0 / data.spread(what) for what in data.values}
         times = data.time + row["shift"]
         margin = _MARGIN * (row["end"] - row["begin"]) * free
         self.part = (times >= row["begin"] + margin) & (times <= row["end"] - margin)
@@ -124,18 +134,30 @@ class Search:
 
     def evenly(self) -> Search:
         """Return this search with each curve weighed by what is left of it."""
-        weights = {}
+        evenly = copy(self)
+        evenly._weights = {}
         for what in self._data.values:
             left = float(np.sqrt(np.nanmean(np.array(self.row["off"][what], float) ** 2)))
-            weights[what] = 1.0 / max(left, 1e-9 * self._data.spread(what))
-        return Search(self._trial, self._data, self._limits, self.at, self.row, free=self._free, weights=weights)
+            evenly._weights[what] = 1.0 / max(left, 1e-9 * self._data.spread(what))
+        return evenly
 
-    def _run(self, at: np.ndarray) -> Row:
-        """Return the record of a run at unknowns."""
+    def _run(self, at: np.ndarray, near: float | None = None) -> Row:
+        """Return the record of a run at unknowns, its clock within a quarter of a period of a shift."""
         key = tuple(at.tolist())
         if key not in self._rows:
-            self._rows[key] = self._trial(at, *self._room)
+            near = self.row["shift"] if near is None else near
+            around = np.clip([near - 0.25 * self.period, near + 0.25 * self.period], *self._room)
+            self._rows[key] = self._trial(at, *around.tolist())
         return self._rows[key]
+
+    @property
+    def period(self) -> float:
+        """That of the motion, or a smaller one [s]."""
+        turns = [
+            float(np.sqrt(np.nanmean(np.array(curve, float) ** 2))) / self._data.spread(what)
+            for what, curve in self.row["slope"].items()
+        ]
+        return 2.0 * np.pi / max(*turns, 1e-300)
 
     def _curves(self, row: Row, name: str) -> np.ndarray:
         """Return ``off`` or ``slope`` of a record where points take part, weighed."""
@@ -158,69 +180,93 @@ class Search:
             return np.full(len(self._data.values) * int(self.part.sum()), _REFUSED)
         return self._eliminated(row)[0]
 
-    def _differences(self, at: np.ndarray, size: float, sides: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """Return derivatives of the residual, and of the shift eliminated in it, by differences to some sides."""
+    def _differences(self, before: float, after: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return derivatives of the residual, and of the shift eliminated in it, by differences around a place.
+
+        ``before`` and ``after`` say how far from it; derivatives are 0 where neither run can be made.
+        """
         columns = []
         moved = []
-        for unit in np.eye(len(at)):
-            tried = [side for side in sides if not self._run(at + side * size * unit)["error"]]
-            tried = tried or [side for side in (-1.0,) if not self._run(at + side * size * unit)["error"]]
-            ends = [self._eliminated(self._run(at + side * size * unit)) for side in tried]
-            if len(ends) < 2:
-                ends.append(self._eliminated(self._run(at)))
-                tried.append(0.0)
-            width = (tried[0] - tried[1]) * size if len(tried) > 1 else np.inf
-            columns.append((ends[0][0] - ends[-1][0]) / width)
-            moved.append((ends[0][1] - ends[-1][1]) / width)
+        for unit in np.eye(len(self.at)):
+            sizes = [size for size in (before, 0.0, after) if not self._run(self.at + size * unit)["error"]]
+            width = (sizes[-1] - sizes[0]) or np.inf
+            ends = [self._eliminated(self._run(self.at + size * unit)) for size in (sizes[0], sizes[-1])]
+            columns.append((ends[1][0] - ends[0][0]) / width)
+            moved.append((ends[1][1] - ends[0][1]) / width)
         return np.transpose(columns), np.array(moved)
 
+    def _ended(self, slopes: np.ndarray) -> bool:
+        """Return whether a step by Newton's method from here gains next to nothing, beside noise."""
+        left = self._residual(self.at)
+        step = np.linalg.lstsq(slopes, -left, _UNDETERMINED)[0]
+        step = self._within(step)
+        freedom = max(len(left) - len(step) - self._free, 1)
+        noise = np.linalg.norm(left) * np.sqrt(len(step) / freedom)
+        return bool(np.linalg.norm(slopes @ step) <= _SHARE * noise or np.abs(step).max() <= _LEAST)
+
     def least(self, most: int) -> Search:
-        """Return a search that begins at a lower cost, after ``most`` runs beside those of the first derivatives."""
-        last = (self.at, self._residual(self.at), self._differences(self.at, _COARSE, (1.0,))[0])
-        if not last[2].any():  # no key changes the curves
-            return self
-
-        def derivatives(at: np.ndarray) -> np.ndarray:
-            """Update those of the last accepted step by Broyden's formula."""
-            nonlocal last
-            here = self._residual(at)
-            before, there, slopes = last
-            step = at - before
-            if step.any():
-                slopes = slopes + np.outer(here - there - slopes @ step, step) / (step @ step)
-            last = (at.copy(), here, slopes)
-            return slopes
-
-        found = least_squares(
-            self._residual, self.at, derivatives, self._limits, ftol=_COST, xtol=_STEP, gtol=None, max_nfev=most
-        )
-        row = self._run(found.x)
-        weights = self._weights
-        return Search(self._trial, self._data, self._limits, found.x, row, free=self._free, weights=weights)
-
-    def ended(self) -> Minimum:
-        """Return the minimum, after last steps by Newton's method with derivatives that hold there."""
-        at = ahead = self.at
-        for _ in range(_ROUNDS):
-            left = self._residual(at)
-            (slopes, moved) = self._differences(at, _FINE, (1.0, -1.0))
-            step, _, _, sizes = np.linalg.lstsq(slopes, -left, _UNDETERMINED)
-            variance = float(left @ left) / max(len(left) - len(at) - self._free, 1)
-            deviation = np.sqrt(variance) / max(float(sizes.min()), 1e-300)
-            ahead = np.clip(at + step, *self._limits)
-            if np.all(np.abs(ahead - at) <= max(_SHARE * deviation, _LEAST)):
+        """Return this search from where it leads to: a minimum, or where it is after ``most`` steps."""
+        ahead = copy(self)
+        for _ in range(most):
+            slopes, moved = ahead._differences(0.0, _FINE)
+            if ahead._ended(slopes) or not ahead._stepped(slopes, moved):
                 break
-            if not np.sum(self._residual(ahead) ** 2) < np.sum(left**2):
-                ahead = at
-                break
-            at = ahead
-        row = self._run(at)
-        shift = self._eliminated(row)[1] + float(moved @ (ahead - at))
-        left = left + slopes @ (ahead - at)
+        return ahead
+
+    def _stepped(self, slopes: np.ndarray, moved: np.ndarray) -> bool:
+        """Move to a lower cost, by derivatives of the residual and of the shift; return whether there is one."""
+        left = self._residual(self.at)
+        while self._reach > _LEAST:
+            step = self._within(_levenberg_marquardt(slopes, left, self._reach))
+            length = float(np.linalg.norm(step))
+            foreseen = left + slopes @ step
+            before = np.inf
+            for _ in range(_TRIALS):
+                row = self._run(self.at + step, self.row["shift"] + float(moved @ step))
+                found = self._residual(self.at + step)
+                size = float(np.linalg.norm(found))
+                if size < np.linalg.norm(left):
+                    self.at = self.at + step
+                    self.row = row
+                    self._reach = max(self._reach, 2.0 * length)
+                    return True
+                if row["error"] or size > 0.5 * before:
+                    break
+                before = size
+                step = self._within(step - np.linalg.lstsq(slopes, found - foreseen, _UNDETERMINED)[0])
+            self._reach = 0.25 * min(length, self._reach)
+        return False
+
+    def _within(self, step: np.ndarray) -> np.ndarray:
+        """Return a step that ends within the limits."""
+        return np.asarray(np.clip(self.at + step, *self._limits) - self.at)
+
+    def minimum(self) -> Minimum:
+        """Return what is left and the derivatives where the search has ended."""
+        left, shift = self._eliminated(self.row)
+        slopes, moved = self._differences(-_COARSE, _COARSE)
+        ended = self._ended(slopes)
         if self._free:
-            turn = self._curves(row, "slope")
+            turn = self._curves(self.row, "slope")
             slopes = np.column_stack([slopes - np.outer(turn, moved), turn])
-        return Minimum(ahead, shift, row, self.part, _mean_square(row, self._data), left, slopes)
+        return Minimum(self.at, shift, self.row, self.part, self.cost, left, slopes, self._weights, ended)
+
+
+def _levenberg_marquardt(slopes: np.ndarray, left: np.ndarray, reach: float) -> np.ndarray:
+    """Return the step that is foreseen to leave least, no longer than ``reach``."""
+    turned, sizes, directions = np.linalg.svd(slopes, full_matrices=False)
+    known = sizes > _UNDETERMINED * sizes[0]
+    aim = -(turned.T @ left)[known]
+    sizes = sizes[known]
+    directions = directions[known]
+
+    def step(damping: float) -> np.ndarray:
+        return np.asarray((sizes * aim / (sizes**2 + damping)) @ directions)
+
+    damping = 0.0
+    while np.linalg.norm(step(damping)) > reach:
+        damping = max(2.0 * damping, 1e-6 * float(sizes[-1]) ** 2)
+    return step(damping)
 
 
 def _mean_square(row: Row, data: Measured) -> float:

@@ -35,6 +35,9 @@ from .engine import Measure, Report, lost, record_all
 from .metrics import Metric, costs
 from .tables import Findings, Row
 
+#: Returns the records of cases, computed where they are not known.
+Make = Callable[[Mapping[str, Row]], dict[str, Row]]
+
 FILE = "study.jsonl"
 #: Format of the files of studies.
 _KINDS = ("sweep", "tradeoff", "stability", "fit")
@@ -58,9 +61,8 @@ class Study(BaseModel, ABC):
     def cases(self) -> Mapping[str, Row]:
         """Return the axes of each case, by its name. Raises SceneError if there is nothing to compute."""
 
-    @property
-    def expected(self) -> int:
-        """Number of records of the finished study; raises as `cases`."""
+    def expected(self, done: int = 0) -> int:
+        """Return the number of records when all is done, as far as ``done`` of them show it; raises as `cases`."""
         return len(self.cases())
 
     @abstractmethod
@@ -77,7 +79,16 @@ class Study(BaseModel, ABC):
         """Compute the cases that ``records`` lacks, keep them there, and return all; others as of `record_all`."""
         known = {} if records is None else records.by_name
         keep = known.__setitem__ if records is None else records.add
-        return record_all(self.cases(), self.measure(known), known, keep, workers, cluster, report, self.lost)
+        measure = self.measure(known)
+
+        def make(cases: Mapping[str, Row]) -> dict[str, Row]:
+            return record_all(cases, measure, known, keep, workers, cluster, report, self.lost)
+
+        return self.made(make, known)
+
+    def made(self, make: Make, known: Mapping[str, Row]) -> dict[str, Row]:
+        """Return all records: those that are ``known``, and others, which ``make`` computes and adds to these."""
+        return make(self.cases())
 
     def measure(self, known: Mapping[str, Row]) -> Measure:
         """Return what measures a case; ``known`` are the records there are when it is called."""
