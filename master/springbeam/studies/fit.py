@@ -38,7 +38,7 @@ _STARTS = (16, 64)
 _LOOKS = (2, 4)
 #: Steps of a first look by a search, and of the search that goes on.
 _FIRST_LOOK = 2
-_MOST = 25
+_MOST = 15
 #: No more runs than so many for each key are made after those all over the range.
 _MOST_RUNS = 100
 #: Marks of runs that judge a minimum: with shorter steps, and beside the repeated measurement.
