@@ -133,6 +133,7 @@ class Pair:
         #: The tip's part in the velocity with which joined ends go on.
         self.tip_share = self.interface.tip_share
         #: Where the ends are; looked up once, since every step asks a few times.
+        self._massless = self.upper.massless
         self._tip = self.upper.motion
         self._low = self.lower.motion
         self._last: Step | None = None  #: at whose end the bodies are
@@ -270,7 +271,7 @@ class Pair:
             C = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
         elif phase.joint is Joint.FREE:
             C = 0.0
-        elif self.upper.massless:
+        elif self._massless:
             C = self.upper.holding_force(low.displacement, low.velocity)
         else:
             C = self._multiplier(phase, time + size, macro_step, force.value(contact, size), changed=changed)
