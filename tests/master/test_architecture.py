@@ -75,3 +75,9 @@ def test_a_command_loads_what_it_uses_and_nothing_else(tmp_path):
     assert loaded_by(tmp_path, "export results/soft") == ["numpy"]
     compared = "crosscheck soft --no-plots --set time.t_end=0.01"
     assert loaded_by(tmp_path, compared) == ["numpy", "scipy", "fmpy", "pyarrow"]
+
+
+def test_no_command_starts_threads_of_blas():
+    """On matrices as small as ours they wait for each other, and take processor time."""
+    script = "import springbeam.cli, numpy, os; print(len(os.listdir('/proc/self/task')))"
+    assert int(ran("env", "-u", "OPENBLAS_NUM_THREADS", sys.executable, "-c", script)) == 1
