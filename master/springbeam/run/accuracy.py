@@ -114,12 +114,10 @@ def pick(scene: Scene) -> Trajectory:
             continue
         if coarse is not None:
             before, errors = _estimated(coarse, fine, asked, before)
-            # Runs that share a step, as from an event to a macro point, agree on its curve whether it is right or not.
-            errors["motion"] = max(errors["motion"], fine.summary.get("misplaced_ends", 0.0))
             agrees = _SAFETY * max(errors.values()) <= asked
             # A run with doubts that are not in the estimate needs one more halving: the runs may agree by chance.
             if agrees and (agreed or not _doubts(fine)):
-                return _with_errors(fine, asked, errors, pilots)
+                return _coarsest(scene, coarse, fine, errors, pilots)
             agreed = agrees
         pilots.append(fine)
         coarse = fine
@@ -128,6 +126,54 @@ def pick(scene: Scene) -> Trajectory:
         f"accuracy = {asked:g}: not reached with {_MOST} steps, {reached}; ask for less, take a coarser mesh or fewer "
         "modes, or shorten [time] t_end"
     )
+
+
+def _coarsest(
+    scene: Scene, coarse: Trajectory, fine: Trajectory, errors: dict[str, float], pilots: list[Trajectory]
+) -> Trajectory:
+    """Return the run with the fewest steps that keeps the accuracy of ``scene``, ``fine`` or a coarser one.
+
+    ``fine`` keeps it with these ``errors``, ``coarse`` is the last of the ``pilots``. The error of a coarser run is its
+    distance from ``fine`` and the error of that.
+    """
+    assert scene.accuracy is not None
+    asked = scene.accuracy
+    runs = {run.scene.coupling.H: run for run in (*pilots, fine)}
+    found = fine
+    found_errors = errors
+    while True:
+        apart = _apart(coarse, fine, asked)
+        beside = _with_own({name: part + errors[name] for name, part in apart.items()}, coarse)
+        if _SAFETY * max(beside.values()) > asked or _doubts(coarse):
+            break
+        found = coarse
+        found_errors = beside
+        H = 2.0 * coarse.scene.coupling.H
+        if scene.duration < _FEWEST * H:
+            break
+        try:
+            coarse = runs.get(H) or runner.run_in_memory(_prepared(scene, H))
+        except RunStopped:
+            break
+        runs[H] = coarse
+    return _with_errors(found, asked, found_errors, [run for run in runs.values() if run is not found])
+
+
+def _apart(run: Trajectory, fine: Trajectory, short: float) -> dict[str, float]:
+    """Return the `distance` of two runs by its parts; ``short`` as of `_estimated`."""
+    parts = distance(run, fine, short * float(fine.time[-1] - fine.time[0]))._asdict()
+    return {name: part for name, part in parts.items() if part is not None}
+
+
+def _with_own(errors: dict[str, float], run: Trajectory) -> dict[str, float]:
+    """Return ``errors`` of ``run`` that are at least those which it shows alone.
+
+    Runs that share a step, as from an event to a macro point, agree on its curve whether it is right or not.
+    """
+    found = {**errors, "motion": max(errors["motion"], run.summary.get("misplaced_ends", 0.0))}
+    if "force" in errors:
+        found["force"] = max(errors["force"], _peak_beside_law(run))
+    return found
 
 
 def _estimated(
@@ -140,17 +186,14 @@ def _estimated(
     shorter than the share ``short`` of the run are no evidence. The error of a peak force is at least that of
     `_peak_beside_law`.
     """
-    found = distance(coarse, fine, short * float(fine.time[-1] - fine.time[0]))
-    apart = {name: part for name, part in found._asdict().items() if part is not None}
+    apart = _apart(coarse, fine, short)
     errors = {}
     for name, now in apart.items():
         then = before.get(name)
         order = min(max(math.log2(then / now), 1.0), 2.0) if then and now else 1.0
         errors[name] = now / (2.0**order - 1.0)
-    if "force" in errors:
-        errors["force"] = max(errors["force"], _peak_beside_law(fine))
     errors["times"] = max(errors["times"], before.get("times", 0.0) / 12.0)  # D/(2² − 1), and four times less
-    return apart, errors
+    return apart, _with_own(errors, fine)
 
 
 def _peak_beside_law(run: Trajectory) -> float:
