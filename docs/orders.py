@@ -1,7 +1,7 @@
 """Errors in the macro step on `soft`, before any event and through three:  .venv/bin/python docs/orders.py   (a minute)
 
-Writes two tables and the picture of docs/measured.md, "Orders", and a table of docs/coupling.md, "One velocity and one
-force".
+Writes three tables and the picture of docs/measured.md, "Orders", and a table of docs/coupling.md, "One velocity and
+one force".
 """
 
 from __future__ import annotations
@@ -77,6 +77,22 @@ def late() -> list[list[str]]:
     return found
 
 
+def each() -> list[list[str]]:
+    """Return each event of `soft` with its time at H/16 and the errors of its time by degree [s]."""
+    soft = load_scene("soft")
+    H = soft.coupling.H
+    fine = simulate(with_changes(soft, coupling={"degree": 2, "macro_step": H / 16.0})).events
+    found = [
+        [str(number), event.kind.value.replace("_", " "), f"{event.time:.6f}"] for number, event in enumerate(fine)
+    ]
+    for degree in DEGREES:
+        run = simulate(with_changes(soft, coupling={"degree": degree}))
+        assert [event.kind for event in run.events] == [event.kind for event in fine]
+        for row, event, exact in zip(found, run.events, fine, strict=True):
+            row.append(f"{abs(event.time - exact.time):.0e}")
+    return found[1:]
+
+
 def joined() -> list[list[str]]:
     """Return rms errors at the rows from 5 ms to the foundation: velocities [m/s], then forces [N]."""
     soft = with_changes(load_scene("soft"), time={"t_end": PHASES["tied, before any event"][1]})
@@ -117,6 +133,8 @@ def main() -> None:
     write_section("measured.md", "orders", table(head, rows(errors)))
     head = ["degree", "H [s]", "foundation impact [s]", "release [s]", "second meeting [s]", "energy residual"]
     write_section("measured.md", "events", table(head, late()))
+    head = ["", "event", "time [s]", *(f"degree {degree} [s]" for degree in DEGREES)]
+    write_section("measured.md", "changes", table(head, each()))
     head = ["degree, H [s]", "v_tip alone [m/s]", "common velocity", "end of the polynomial [N]", "multiplier"]
     write_section("coupling.md", "joined", table(head, joined()))
 

@@ -146,11 +146,12 @@ def lines(runs):
     for kind in sorted({run["scene kind"] for run in fixed}):
         rows.append(row(f"{kind}, fixed steps", [run for run in fixed if run["scene kind"] == kind]))
     shown = table(HEAD, [cells for cells in rows if any(cell not in ("0", "0 (0)", "–") for cell in cells[1:])])
-    ratios = [run["steps_over_need"] for run in runs if "steps_over_need" in run]
-    if ratios:
-        shown += [
-            "",
-            f"An accuracy takes {statistics.median(ratios):.2g} times the steps that it needs (median), at most",
-        ]
-        shown[-1] += f" {max(ratios):.2g} times."
+    for name in SETTINGS:
+        ratios = [run["steps_over_need"] for run in runs if run["setting"] == name and "steps_over_need" in run]
+        if ratios:
+            median = statistics.median(ratios)
+            shown += [
+                "",
+                f"{name} takes {median:.2g} times the steps that it needs (median), at most {max(ratios):.2g}.",
+            ]
     return shown

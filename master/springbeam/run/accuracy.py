@@ -138,7 +138,8 @@ def _coarsest(
     """
     assert scene.accuracy is not None
     asked = scene.accuracy
-    runs = {run.scene.coupling.H: run for run in (*pilots, fine)}
+    known = {run.scene.coupling.H: run for run in pilots}
+    others = [*pilots]
     found = fine
     found_errors = errors
     while True:
@@ -152,11 +153,14 @@ def _coarsest(
         if scene.duration < _FEWEST * H:
             break
         try:
-            coarse = runs.get(H) or runner.run_in_memory(_prepared(scene, H))
+            coarse = known.get(H) or runner.run_in_memory(_prepared(scene, H))
         except RunStopped:
             break
-        runs[H] = coarse
-    return _with_errors(found, asked, found_errors, [run for run in runs.values() if run is not found])
+        if H not in known:
+            others.append(coarse)
+    if found is not fine:
+        others = [fine, *(run for run in others if run is not found)]
+    return _with_errors(found, asked, found_errors, others)
 
 
 def _apart(run: Trajectory, fine: Trajectory, short: float) -> dict[str, float]:

@@ -21,7 +21,9 @@ from .setup import Setup
 #: Events in a row, each within H of the one before; more of them and the contact is said to chatter. Impacts that die
 #: out are up to 18,000 (e = 0.999); those of a lossy body on a lossless stop are without end.
 _MOST_IN_A_ROW = 20_000
-#: Largest product of `Body.decay` and a macro step at which some of an impulse on an end is left at the next row.
+#: Largest product of `Body.decay` c and a macro step H at which the damping of a mismatch of velocities counts. Of an
+#: impulse J a step earlier exp(−c H) is left, and its damping is c J exp(−c H): at this product less than 5e-4 of the
+#: force J/H that turned the mismatch. Beyond it c is that of modes whose velocity is gone, the mismatch that of others.
 _KEPT = 10.0
 #: The force of a step is continued over at most this many times its size; beyond, its end value is held.
 _REACH_OF_FORCE = 4.0
