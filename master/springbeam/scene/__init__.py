@@ -1,10 +1,10 @@
 """Scenes: files, their keys, and values that follow from them before anything is built or loaded.
 
-Imports nothing else of the package. Modules, from below: ``tables`` (the keys), ``laws`` and ``loads`` (those of
-``[contact]`` and ``[[loads]]``; ``recorded`` reads the file of a load) → ``scene`` (all tables) → ``messages`` (keys
-and errors in words): these load numpy when they compute. ``statics`` → ``linearised`` (energies), ``frequencies`` →
-``rules`` (errors and warnings) → ``reading`` (files, overrides; start here) → ``resolution`` (are steps short
-enough). ``files`` reads TOML; ``shipped/`` has the scenes that come with the package.
+Imports nothing else of the package. Modules, from below: ``tables`` (the keys), ``laws``, ``loads`` and ``schemes``
+(those of ``[contact]``, ``[[loads]]`` and ``[coupling]``; ``recorded`` reads the file of a load) → ``scene`` (all
+tables) → ``messages`` (keys and errors in words): these load numpy when they compute. ``statics`` → ``linearised``
+(energies), ``frequencies`` → ``rules`` (errors and warnings) → ``reading`` (files, overrides; start here). ``files``
+reads TOML; ``shipped/`` has the scenes that come with the package.
 """
 
 from typing import TYPE_CHECKING
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from .messages import key_kind, scene_keys
     from .reading import as_scene, load_scene, scene_from_dict, with_changes
     from .scene import SAME, Scene
-    from .schemes import Coupling
     from .tables import ArgumentError, Beam, SceneError, Spring, Stop, Time
 else:
     __getattr__ = attached(
@@ -30,7 +29,6 @@ else:
             "messages": ("key_kind", "scene_keys"),
             "reading": ("as_scene", "load_scene", "scene_from_dict", "with_changes"),
             "scene": ("SAME", "Scene"),
-            "schemes": ("Coupling",),
             "tables": ("ArgumentError", "Beam", "SceneError", "Spring", "Stop", "Time"),
         },
     )
@@ -40,7 +38,6 @@ __all__ = [
     "ArgumentError",
     "Beam",
     "Contact",
-    "Coupling",
     "Load",
     "Scene",
     "SceneError",
