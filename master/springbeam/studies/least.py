@@ -196,7 +196,7 @@ class Search:
         return np.transpose(columns), np.array(moved)
 
     def _ended(self, slopes: np.ndarray) -> bool:
-        """Return whether a step by Newton's method from here gains next to nothing, beside noise."""
+        """Return whether a step by Newton's method from here has a negligible gain compared with noise."""
         left = self._residual(self.at)
         step = np.linalg.lstsq(slopes, -left, _UNDETERMINED)[0]
         step = self._within(step)
