@@ -33,8 +33,6 @@ _MOST_EVENTS = 100_000
 _SAMPLES = 1000
 #: A turn whose value is a smaller share of how much the nodes vary is looked at exactly.
 _CLOSE = 1e-6
-#: A zero of the polynomial through the nodes is corrected by so small a share of the segment at most.
-_CORRECTION = 1e-9
 
 
 def integrate(
@@ -306,15 +304,9 @@ def _crossing(
         return None
     low = float(times[max(below[0] - 1, 0)])
     high = float(times[below[0]])
-    for tau in _zeros(size, series):
-        slope = 2.0 / size * float(legendre.legval(2.0 * tau / size - 1.0, legendre.legder(series)))
-        if low < tau < high and slope != 0.0:
-            correction = g(tau) / slope
-            if abs(correction) <= _CORRECTION * size:
-                return float(tau - correction)
     if g(low) <= 0.0 or g(high) >= 0.0:  # what the nodes have and the exact state differ by less than either's error
         return low if g(low) <= 0.0 else high
-    from scipy.optimize import brentq  # only where the polynomial does not tell where it is
+    from scipy.optimize import brentq  # takes its time to load
 
     # A root at a segment's very start needs no more than the rounding of the segment.
     return float(brentq(g, low, high, xtol=1e-16 * high, rtol=8.9e-16, maxiter=200))
