@@ -165,7 +165,7 @@ class AdaptiveSteps:
 
         No step is too long for what is rounding, though from rest the motion so far is shorter still. The tip is the
         sum of modes, which may be larger than it: of what bends the beam with the energy so far. That is also the
-        length of the motion of ends that have been held so far.
+        length of the motion of ends that have been held so far, and of one whose tolerance is less than rounding.
         """
         curve = 0.0
         spans = []
@@ -177,10 +177,10 @@ class AdaptiveSteps:
             beside = Path.through(start[:2], end[:2], step.size, means).moments_beside_cubic
             way = high - low
             rounding = _ROUNDING * size
-            if way > rounding:
-                spans.append(way)
-            elif bent > 0.0:
+            if bent > way and self._relative * way <= rounding:
                 way = bent
+            elif way > rounding:
+                spans.append(way)
             if way > 0.0:
                 curve = max(curve, beside / (self._absolute + self._relative * way + rounding))
         span = min(spans, default=bent)
