@@ -147,7 +147,7 @@ class LinearForm:
     def _weights(self, size: float) -> tuple[StepWeights, np.ndarray]:
         """Return the weights of a step, and what they make of the forces r at the ends: r.ravel() → `ends_at`."""
         weights = self.oscillators.weights(size)
-        onto = (self.ends[:, None] * self.inputs).reshape(-1, len(self.omega2))
+        onto = (self.ends[:, None] * self.inputs).reshape(2 * len(self.inputs), len(self.omega2))
         of_ends = np.reshape(weights.force[:, :-1] @ onto.T, (2, STAGES, STAGES, 2, len(self.inputs)))
         return weights, np.moveaxis(of_ends, 3, 2).reshape(2 * STAGES * 2, STAGES * len(self.inputs))
 
