@@ -27,7 +27,7 @@ struct Advance {
   const unsigned *inputs, *derivatives, *outputs;  // value references
   const int* orders;                               // of the derivatives
   const double* given;                             // time, size, inputs, derivatives
-  double* told;                                    // outputs
+  double* reported;                                // outputs
   int always;                                      // whether derivatives are set that are all 0
 };
 using Advance2 = Advance<fmi2SetRealTYPE, fmi2SetRealInputDerivativesTYPE, fmi2DoStepTYPE, fmi2GetRealTYPE>;
@@ -46,8 +46,8 @@ int set_derivatives(const Advance3& a, const double* values) {
   return a.set_derivatives(a.instance, a.derivatives, a.n_derivatives, values, a.n_derivatives);
 }
 
-int get(const Advance2& a) { return a.get(a.instance, a.outputs, a.n_outputs, a.told); }
-int get(const Advance3& a) { return a.get(a.instance, a.outputs, a.n_outputs, a.told, a.n_outputs); }
+int get(const Advance2& a) { return a.get(a.instance, a.outputs, a.n_outputs, a.reported); }
+int get(const Advance3& a) { return a.get(a.instance, a.outputs, a.n_outputs, a.reported, a.n_outputs); }
 
 bool finite(const double* values, std::size_t n) {
   for (std::size_t i = 0; i < n; ++i) {
@@ -92,7 +92,7 @@ int advance(const A& a) {
   }
   if (const int failure = step(a)) return failure;
   if (const int status = get(a); status > kWarning) return failed(kGet, status);
-  return finite(a.told, a.n_outputs) ? 0 : failed(kOutputsNotFinite, 0);
+  return finite(a.reported, a.n_outputs) ? 0 : failed(kOutputsNotFinite, 0);
 }
 
 }  // namespace

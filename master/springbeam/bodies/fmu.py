@@ -240,13 +240,13 @@ class Fmu:
         read = self.bound(f"Get{self._slave.REAL}", byref(references), counts[0], byref(values), *last)
         unpacked = partial(Struct(f"{len(values)}d").unpack, values)
 
-        def told() -> tuple[float, ...]:
+        def reported() -> tuple[float, ...]:
             if (status := read()) > WARNING:
                 raise self.failed(status, f"cannot read {', '.join(names)}")
             return unpacked()
 
-        told()
-        return told
+        reported()
+        return reported
 
     def advancing(
         self, inputs: Sequence[str], impulse: Sequence[str], slopes: int, outputs: Sequence[str], always: bool
@@ -266,15 +266,15 @@ class Fmu:
             self._references(names, slave.REAL) for names in ((*inputs, *impulse), derivatives, outputs)
         )
         given = (c_double * (2 + len(of_inputs) + len(each)))()
-        told = (c_double * len(outputs))()
+        reported = (c_double * len(outputs))()
         advance = Advance(
             slave.component, n_inputs=len(of_inputs), n_derivatives=len(each), n_outputs=len(outputs), inputs=of_inputs,
             derivatives=of_derivatives, outputs=of_outputs, orders=(c_int * len(each))(*[order for _, order in each]),
-            given=given, told=told, always=always,
+            given=given, reported=reported, always=always,
             **{key: cast(self._function(name), c_void_p) for key, name in named.items()},
         )  # fmt: skip
         library = self._asked("cannot be used", advances)
-        return partial(library[f"advance{self.version[0]}"], byref(advance)), given, told
+        return partial(library[f"advance{self.version[0]}"], byref(advance)), given, reported
 
     @property
     def variables(self) -> list[Any]:

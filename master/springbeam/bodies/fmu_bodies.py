@@ -101,9 +101,9 @@ class Port:
         self._outputs = outputs
         fmu.reading(self._inputs)  # a wrong reference is found before the run
         self._read = fmu.reading(outputs)
-        self._advance, self._given, told = fmu.advancing(inputs, impulse, slopes, outputs, always)
+        self._advance, self._given, reported = fmu.advancing(inputs, impulse, slopes, outputs, always)
         self._write = partial(Struct(f"{len(self._given)}d").pack_into, self._given, 0)
-        self._told = partial(Struct(f"{len(told)}d").unpack, told)
+        self._reported = partial(Struct(f"{len(reported)}d").unpack, reported)
         #: Save the state, and return to it; both return their status.
         self.get_state, self.set_state = fmu.of_state() if repeats else (lambda: OK, self._refuse_to_repeat)
         if repeats:
@@ -113,26 +113,26 @@ class Port:
         """Return the outputs. Raises StepRefused if one is not finite."""
         return self._finite(self._read())
 
-    def _finite(self, told: tuple[float, ...]) -> tuple[float, ...]:
-        if not all(map(isfinite, told)):
-            values = ", ".join(f"{name} = {value}" for name, value in zip(self._outputs, told, strict=True))
+    def _finite(self, reported: tuple[float, ...]) -> tuple[float, ...]:
+        if not all(map(isfinite, reported)):
+            values = ", ".join(f"{name} = {value}" for name, value in zip(self._outputs, reported, strict=True))
             raise StepRefused(f"not finite: {values} of {self.path.name}")
-        return told
+        return reported
 
     def step(self, *given: float) -> tuple[float, ...]:
         """Step under ``given``: time [s], size [s], inputs, impulse, derivatives; return the outputs."""
         self._write(*given)
         if code := self._advance():
             self._stop(*divmod(code, 16))
-        return self._told()
+        return self._reported()
 
     def trial(self, given: Sequence[float], read: Reading | None = None) -> tuple[float, ...]:
         """Step under ``given``, return the outputs or the result of ``read``, and undo the step."""
         if (status := self._before_trial()) > WARNING:
             raise self.failed(status, CANNOT["get_state"])
         try:
-            told = self.step(*given)
-            return told if read is None else read()
+            reported = self.step(*given)
+            return reported if read is None else read()
         finally:
             if (status := self._after_trial()) > WARNING:
                 raise self.failed(status, CANNOT["set_state"])
@@ -150,7 +150,7 @@ class Port:
         if failure == Failure.INPUTS_NOT_FINITE:
             raise StepRefused(f"{self.path.name}: the force it should step under is not finite: {inputs}")
         if failure == Failure.OUTPUTS_NOT_FINITE:
-            self._finite(self._told())
+            self._finite(self._reported())
         self._fmu.refuse(max(status, DISCARD), time, _ASKED.get(Failure(failure), ""))
 
     def failed(self, status: int, what: str) -> FmuError:
@@ -182,7 +182,9 @@ class FmuState(NamedTuple):
     """State of a body outside of the FMU."""
 
     motion: Motion = Motion(0.0, 0.0, 0.0, 0.0)
-    told: tuple[float, ...] = ()  #: motion and energies as the FMU has told them, with the work of impulses since
+    reported: tuple[
+        float, ...
+    ] = ()  #: motion and energies as the FMU has returned them, with the work of impulses since
     pending: float = 0.0  #: upward impulse that the FMU applies at the start of its next step [N·s]
 
 
@@ -231,17 +233,17 @@ class FmuBody(Body):
 
     def apply_impulse(self, impulse: float) -> None:
         # The FMU applies it at the start of its next step; motion and energies already show it.
-        motion, told, pending, *_ = self.state
+        motion, reported, pending, *_ = self.state
         self._moved = True
         velocity = motion.velocity + impulse / self.mass
         n = self._n_motion
         work = 0.5 * impulse * (motion.velocity + velocity)
-        told = (*told[:n], *[kinetic + work for kinetic in told[n : n + 1]], *told[n + 1 :])
+        reported = (*reported[:n], *[kinetic + work for kinetic in reported[n : n + 1]], *reported[n + 1 :])
         self.state = self.state._replace(
-            motion=motion._replace(velocity=velocity), told=told, pending=pending + impulse
+            motion=motion._replace(velocity=velocity), reported=reported, pending=pending + impulse
         )
 
-    def _take(self, told: tuple[float, ...]) -> Motion:
+    def _take(self, reported: tuple[float, ...]) -> Motion:
         """Set motion and energies to the outputs of the FMU, with no impulse pending; return the motion."""
         raise NotImplementedError
 
@@ -324,14 +326,14 @@ class OwnBody(FmuBody):
             return self._take(self._port.step(time, size, c, *values, impulse, dc, ddc, *slopes))
         return self._take(self._port.step(time, size, c, n, *values, impulse, dc, ddc, dn, ddn, *slopes))
 
-    def _take(self, told: tuple[float, ...]) -> Motion:
-        motion = made_of(Motion, told[:4])
-        self.state = made_of(FmuState, (motion, told, 0.0))
+    def _take(self, reported: tuple[float, ...]) -> Motion:
+        motion = made_of(Motion, reported[:4])
+        self.state = made_of(FmuState, (motion, reported, 0.0))
         return motion
 
     def energies(self) -> Energies:
-        motion, told, _ = self.state
-        kinetic, potential, dissipated, *load = told[4:]
+        motion, reported, _ = self.state
+        kinetic, potential, dissipated, *load = reported[4:]
         if not load:  # the spring has none but its external force
             of_loads = -self._constants["external_force"] * motion.displacement
         else:

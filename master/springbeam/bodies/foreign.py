@@ -80,7 +80,7 @@ class ForeignPort(Port):
     """A `Port` of a foreign FMU that converts to SI units."""
 
     def __init__(self, fmu: Fmu, spec: ForeignFmu, found: Findings) -> None:
-        told = _outputs(spec, found)
+        reported = _outputs(spec, found)
         abilities = found.abilities
         impulse = () if spec.impulse is None else (spec.impulse,)
         # Derivatives of one step may act in the next if they are not set again.
@@ -91,8 +91,8 @@ class ForeignPort(Port):
         slopes = [force / second**order for order in range(1, abilities.slopes + 1)]
         #: SI units by which what a step is given is divided, and those in which the FMU tells its outputs.
         self._of_given = (second, second, force, *(factors["impulse"] for _ in impulse), *slopes)
-        self._of_told = tuple(factors[key] for key in told)
-        super().__init__(fmu, (spec.force,), impulse, tuple(told.values()), abilities.slopes, **always)
+        self._of_reported = tuple(factors[key] for key in reported)
+        super().__init__(fmu, (spec.force,), impulse, tuple(reported.values()), abilities.slopes, **always)
 
     def read(self) -> tuple[float, ...]:
         return self._in_si(super().read())
@@ -100,8 +100,8 @@ class ForeignPort(Port):
     def step(self, *given: float) -> tuple[float, ...]:
         return self._in_si(super().step(*map(truediv, given, self._of_given)))
 
-    def _in_si(self, told: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple(map(mul, told, self._of_told))
+    def _in_si(self, reported: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(map(mul, reported, self._of_reported))
 
 
 def _check(fmu: Fmu, name: str, key: str, wanted: str) -> None:
@@ -141,7 +141,7 @@ class ForeignState(NamedTuple):
     """State of a foreign body outside of the FMU."""
 
     motion: Motion
-    told: tuple[float, ...] = ()  #: motion and energies as far as the FMU has told them
+    reported: tuple[float, ...] = ()  #: motion and energies as far as the FMU has returned them
     pending: float = 0.0  #: upward impulse that the FMU applies at the start of its next step [N·s]
     received: float = 0.0  #: work of all forces and impulses on the end so far, but not of loads [J]
     load_work: float = 0.0  #: of the loads so far [J]
@@ -204,16 +204,16 @@ class ForeignBody(FmuBody, EndLoaded):
         self.steps_made += 1
         self._moved = True
         impulse = () if self._spec.impulse is None else (self.state.pending,)
-        told = self._port.step(time, size, inputs[0], *impulse, *inputs[1 : 1 + self.abilities.slopes])
-        end = self._take(told, size)
+        reported = self._port.step(time, size, inputs[0], *impulse, *inputs[1 : 1 + self.abilities.slopes])
+        end = self._take(reported, size)
         received = self.state.received + force.work_on(exchanged, start, end, size)
         load_work = self.state.load_work + force.work_on(load, start, end, size)
         self.state = self.state._replace(received=received, load_work=load_work, time=time + size, size=size)
         return end
 
     def acceleration(self) -> float | None:
-        told = dict(zip(self._keys, self.state.told, strict=True))
-        return told.get("acceleration") if self.state.pending == 0.0 else None
+        reported = dict(zip(self._keys, self.state.reported, strict=True))
+        return reported.get("acceleration") if self.state.pending == 0.0 else None
 
     def _trial(self, time: float, size: float) -> Motion:
         load = self._followed(force.combined((self._spec.force_sign * self._upward,), (self._on_end,)), size)
@@ -242,23 +242,23 @@ class ForeignBody(FmuBody, EndLoaded):
         received = self.state.received + 0.5 * impulse * (before + self.state.motion.velocity)
         self.state = self.state._replace(received=received)
 
-    def _take(self, told: tuple[float, ...], size: float = 0.0) -> Motion:
+    def _take(self, reported: tuple[float, ...], size: float = 0.0) -> Motion:
         """See `FmuBody._take`; missing outputs of the motion over ``size`` [s] are replaced."""
-        by_key = dict(zip(self._keys, told, strict=True))
+        by_key = dict(zip(self._keys, reported, strict=True))
         w0, v0, *_ = self.state.motion
         w = by_key["displacement"]
         if "velocity" not in by_key:
             v0 = by_key["velocity"] = (w - w0) / size if size > 0.0 else self.found.velocity
         first, second = moments(w0, v0, w, by_key["velocity"], size)
         motion = Motion(w, by_key["velocity"], by_key.get("integral", first), by_key.get("integral_2", second))
-        self.state = self.state._replace(motion=motion, told=told, pending=0.0)
+        self.state = self.state._replace(motion=motion, reported=reported, pending=0.0)
         return motion
 
     def energies(self) -> Energies:
         if not self.abilities.energies:
             return Energies(0.0, self.state.received, 0.0, 0.0)
-        told = dict(zip(self._keys, self.state.told, strict=True))
-        energies = Energies(*(told.get(key, 0.0) for key in self._spec.ENERGIES))
+        reported = dict(zip(self._keys, self.state.reported, strict=True))
+        energies = Energies(*(reported.get(key, 0.0) for key in self._spec.ENERGIES))
         return energies._replace(load_potential=energies.load_potential - self.state.load_work)
 
     def holding_force(self, displacement: float, velocity: float) -> float:

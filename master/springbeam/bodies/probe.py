@@ -102,9 +102,9 @@ class Bench:
             return list(self.taken(inertia, [size * share for share in shares]))
 
         found = None
-        for told in self.taken(column_of, reversed(self.sizes)):
-            column = [value for value in told if value is not None]
-            if len(column) < len(told):
+        for values in self.taken(column_of, reversed(self.sizes)):
+            column = [value for value in values if value is not None]
+            if len(column) < len(values):
                 continue
             # The polynomial through the sizes.
             weights = {1: (1.0,), 2: (-1.0, 2.0), 3: (1.0 / 3.0, -2.0, 8.0 / 3.0)}[len(column)]
@@ -240,7 +240,7 @@ def _wrong_outputs(bench: Bench, impetus: float, h: float) -> set[str]:
     added = "name dissipated_energy and load_potential as well, or no energies"
     return {
         what
-        for named, what, told, due, allowed in (
+        for named, what, values, due, allowed in (
             (spec.velocity, f"velocity {spec.velocity!r} is not the rate {of}", means, moved, seen),
             (spec.integral, f"integral {spec.integral!r} is not that {of}", once[1:], first, h * seen),
             (spec.integral_2, f"integral_2 {spec.integral_2!r} is not that {of}", twice[1:], second, h * h * seen),
@@ -250,7 +250,7 @@ def _wrong_outputs(bench: Bench, impetus: float, h: float) -> set[str]:
                 *(gained, received, seen_work),
             ),
         )
-        if named and not np.abs(told - due).sum() <= allowed
+        if named and not np.abs(values - due).sum() <= allowed
     }
 
 

@@ -111,9 +111,9 @@ def _examine(scene: Scene) -> Findings:
         shown.append(f"mass that an impulse moves: {finding.mass:.9g} kg {mass}")
         shown += described(given.named, finding.units)
         names = ("", "capability", "shown by", "what is offered")
-        told = asdict(finding.abilities)
+        able = asdict(finding.abilities)
         rows = [
-            ("yes", key, shown_by, having) if told[key] > 0 else ("no", key, shown_by, lacking)
+            ("yes", key, shown_by, having) if able[key] > 0 else ("no", key, shown_by, lacking)
             for key, shown_by, having, lacking in OFFERED
         ]
         shown.append(table(names, rows))

@@ -159,9 +159,9 @@ def _lines(p: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "scheme", _exchange(**p["exchange"])
 
 
-def _listed(*told: tuple[str, float | None]) -> str:
+def _listed(*parts: tuple[str, float | None]) -> str:
     """Return the known numbers with their words."""
-    return ", ".join(words.format(value) for words, value in told if value is not None)
+    return ", ".join(words.format(value) for words, value in parts if value is not None)
 
 
 def _exchange(scheme: str, degree: int, spectral_radius: float, critical_step: float | None, threshold: float) -> str:

@@ -182,8 +182,8 @@ def dask_cluster(scheduler: str) -> Iterator[Executor]:
         raise ArgumentError(f"--scheduler {scheduler}: cannot be reached: {error}") from error
     with client:
         own = metadata.version("springbeam")
-        told: Any = client.get_versions(packages=["springbeam"])
-        theirs = {address: worker["packages"]["springbeam"] for address, worker in told["workers"].items()}
+        known: Any = client.get_versions(packages=["springbeam"])
+        theirs = {address: worker["packages"]["springbeam"] for address, worker in known["workers"].items()}
         if set(theirs.values()) != {own}:
             others = ", ".join(f"{address} has {version}" for address, version in theirs.items()) or "there are none"
             raise SceneError(f"the workers need springbeam {own}, as is here; {others}")

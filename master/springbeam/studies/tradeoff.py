@@ -173,8 +173,8 @@ class Tradeoff(Study):
             table(("error:.0e", "configuration", "solve [ms]:.3g"), cells, "cheapest for an error"),
             table(columns, on_front, "Pareto front"),
         ]
-        told = {"until": until, "cheapest": dict(zip(map(str, TARGETS), best, strict=True)), "front": front}
-        return Findings(told, shown, tables={self.kind: rows}, pictures={self.kind: self._picture(rows, front)})
+        summary = {"until": until, "cheapest": dict(zip(map(str, TARGETS), best, strict=True)), "front": front}
+        return Findings(summary, shown, tables={self.kind: rows}, pictures={self.kind: self._picture(rows, front)})
 
     def _picture(self, rows: Sequence[Row], front: Sequence[Row]) -> Callable[[], Any]:
         """Return what draws the work–precision diagrams: error over time, and over doStep calls."""

@@ -76,11 +76,11 @@ class Grid(Study):
         if errors:
             beside += f": errors {statistics.median(errors):.0e} in the median, at most {max(errors):.0e}"
         classes = Counter(record["kind"] for record in records.values())
-        told = {"cells": len(records), "classes": classes, "without_warning": quiet, "compared": len(errors)}
+        summary = {"cells": len(records), "classes": classes, "without_warning": quiet, "compared": len(errors)}
         cells, rows = self.cases(), self.rows(records)
         slices = any(row["slice"] for row in rows)
         return Findings(
-            {**told, "garbage": bad},
+            {**summary, "garbage": bad},
             [_classes(rows), beside, *garbage],
             code=1 if bad else 0,
             tables={self.kind: [row | dict(zip(_NAMES, row.pop("coupling"), strict=True)) for row in map(dict, rows)]},
