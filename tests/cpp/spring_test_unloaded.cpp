@@ -28,8 +28,6 @@ struct ShiftedCase {
 
 class ShiftedSpring : public testing::TestWithParam<ShiftedCase> {};
 
-}  // namespace
-
 // A driven spring beside one that is higher by `raised`, with the stop and the tip. y is then rounded at 0.4 m instead
 // of 0.02 m, by 6e-17 m; over some periods of a motion whose impacts and contacts carry that on it stays below 1e-12 m.
 TEST_P(ShiftedSpring, MotionIsShiftedWithAllThatItMeets) {
@@ -126,3 +124,5 @@ TEST(UnloadedSpring, HilltopIsAroundIt) {
   p.displacement = 0.0;
   EXPECT_THROW(Spring{p}, std::invalid_argument);
 }
+
+}  // namespace
