@@ -34,6 +34,7 @@ from springbeam.results.trajectory import BODY_COLUMNS, COLUMNS
 from springbeam.run.log import Log
 from springbeam.run.outcome import RunStopped
 from springbeam.scene import with_changes
+from springbeam.studies.tables import write_parquet
 
 
 def filed(path, *blocks, scene=PAIR):
@@ -263,6 +264,14 @@ def test_a_run_that_goes_on_is_exported_up_to_its_last_block(tmp_path):
     assert len((tmp_path / "run" / "trajectory.csv").read_text().splitlines()) == 41
     recorder.finish({"status": "done"})
     assert len(load_trajectory(tmp_path / "run")) == 40
+
+
+def test_texts_of_a_table_stay_texts_in_parquet(tmp_path):
+    """Also those that look like times; a number may be infinite, or missing."""
+    rows = [{"case": "2020-01-01", "error": 1.0, "none": None}, {"case": "2020-01-02", "error": np.inf}]
+    table = parquet.read_table(write_parquet(tmp_path / "table.parquet", rows))
+    assert table.to_pylist() == [row | {"none": None} for row in rows]
+    assert str(table.schema.field("none").type) == "double"
 
 
 @pytest.mark.parametrize("scene", [PAIR, SCENES["spring"]])

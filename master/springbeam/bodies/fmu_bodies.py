@@ -182,9 +182,8 @@ class FmuState(NamedTuple):
     """State of a body outside of the FMU."""
 
     motion: Motion = Motion(0.0, 0.0, 0.0, 0.0)
-    reported: tuple[
-        float, ...
-    ] = ()  #: motion and energies as the FMU has returned them, with the work of impulses since
+    #: Motion and energies as the FMU has returned them, with the work of impulses since.
+    reported: tuple[float, ...] = ()
     pending: float = 0.0  #: upward impulse that the FMU applies at the start of its next step [N·s]
 
 

@@ -2,7 +2,7 @@
 
 A phase lasts as long as its guards are positive. A guard is a function of the ends (`springbeam.contact.events`) or a
 force that can only push; where the first of them falls through zero its event happens. The effect of the event is the
-next phase and an impact. ``docs/coupling.md``, "Events", shows the table; ``docs/model.md`` states the laws.
+next phase and an impact. ``docs/model.md``, "Phases", shows the table and states the laws.
 """
 
 from __future__ import annotations
@@ -111,11 +111,8 @@ class Automaton:
     def samples(self, phase: Phase, ends: Ends) -> list[Sample]:
         """Return f, ḟ of each function of ``phase``."""
         if phase is not self._phase or ends != self._ends:
-            functions = self.guards(phase).functions
+            self._samples = [function(ends) for _, function in self.guards(phase).functions]
             self._ends = ends
-            self._samples = []
-            for _, function in functions:
-                self._samples.append(function(ends))
         return self._samples
 
     def after(self, kind: EventKind, at: Instant) -> Outcome:

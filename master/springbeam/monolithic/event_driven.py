@@ -289,9 +289,7 @@ def _crossing(
     def g(tau: float) -> float:
         return float(watch.function(s.motion(phase, segment.inside(tau))))
 
-    series = TO_LEGENDRE @ values
-    size = float(segment.nodes[-1])
-    turns, there = _turns(size, values, series)
+    turns, there = _turns(float(segment.nodes[-1]), values)
     if not len(turns) and np.min(values) >= 0.0:
         return None
     close = np.abs(there) <= _CLOSE * np.ptp(values)
@@ -312,19 +310,14 @@ def _crossing(
     return float(brentq(g, low, high, xtol=1e-16 * high, rtol=8.9e-16, maxiter=200))
 
 
-def _turns(size: float, values: np.ndarray, series: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _turns(size: float, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return where in a segment of ``size`` [s] the polynomial through ``values`` turns, and its values there.
 
     Nothing where these are far above zero: a smooth minimum lies below the nodes by less than they vary.
     """
     if np.min(values) > np.ptp(values):
         return np.empty(0), np.empty(0)
-    turns = _zeros(size, legendre.legder(series))
-    return turns, np.asarray(legendre.legval(2.0 * turns / size - 1.0, series))
-
-
-def _zeros(size: float, series: np.ndarray) -> np.ndarray:
-    """Return where in a segment of ``size`` [s] a Legendre ``series`` is zero, ascending."""
-    roots = legendre.legroots(legendre.legtrim(series, 0.1 * NOISE * np.max(np.abs(series))))
-    x = roots.real[(roots.imag == 0.0) & (np.abs(roots.real) < 1.0)]
-    return np.sort(0.5 * size * (1.0 + x))
+    series = TO_LEGENDRE @ values
+    turns = legendre.legroots(legendre.legder(legendre.legtrim(series, 0.1 * NOISE * np.max(np.abs(series)))))
+    x = turns.real[(turns.imag == 0.0) & (np.abs(turns.real) < 1.0)]
+    return 0.5 * size * (1.0 + x), np.asarray(legendre.legval(x, series))

@@ -138,7 +138,7 @@ def _coarsest(
     """
     assert scene.accuracy is not None
     asked = scene.accuracy
-    known = {run.scene.coupling.H: run for run in pilots}
+    known = {run.scene.coupling.H: run for run in pilots if run.summary["status"] == "done"}
     others = [*pilots]
     found = fine
     found_errors = errors

@@ -37,9 +37,11 @@ _LOST = 1e3
 _QUIET = 1e-8
 #: Radians of a term, or lines of a table, per point of the quadrature of a load over a step; its points, at least and
 #: at most.
-_DENSE, _OF_LOAD = 1.0, (8, 96)
-#: Terms of a body that loads move, and steps that are looked at together: they need little memory.
-_MOVED, _TOGETHER = 40, 1024
+_DENSE = 1.0
+_OF_LOAD = (8, 96)
+#: Slowest terms of a body that loads move, and steps of one array, which so needs little memory.
+_MOVED = 40
+_TOGETHER = 1024
 
 
 def misplaced(pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float | None:
@@ -208,7 +210,8 @@ class _Errors:
 
     def strike(self, stays: float, turns: float, most: float) -> None:
         """Do to the lower end what `_after_events` says."""
-        self.y, self.z = stays * self.y, stays * self.z + max(-most, min(turns * self.y, most))
+        self.z = stays * self.z + max(-most, min(turns * self.y, most))
+        self.y *= stays
 
     def strike_tip(self, stays: float, turns: float, most: float) -> None:
         """Do to the tip what `_after_events` says; the impulse that is earlier or later moves the beam besides."""
@@ -435,7 +438,8 @@ def _after_events(interface: Interface, steps: np.ndarray, events: Sequence[Even
     displacement changes the velocity [1/s], at most by the jump of the stroke [m/s]: the end is struck earlier or
     later, under the acceleration before and after that.
     """
-    shares, (turns, most) = np.where(steps["phase"] >= 3.0, 0.0, 1.0), np.zeros((2, len(steps)))
+    shares = np.where(steps["phase"] >= 3.0, 0.0, 1.0)
+    turns, most = np.zeros((2, len(steps)))
     struck = [n for n, event in enumerate(events, 1) if event.kind is EventKind.STOP_IMPACT]
     made = np.flatnonzero(steps["size"] > 0.0)
     if struck and len(made):

@@ -158,7 +158,7 @@ def window_of(pair: Pair, omega: float) -> float:
 
 
 def peak_force_doubt(pair: Pair, window: float) -> str | None:
-    """Return why the peak contact force, a mean over ``window`` [s], is unreliable, and the remedy; ``None`` if it can.
+    """Return why the peak contact force, a mean over ``window`` [s], is unreliable, and the remedy; else ``None``.
 
     At a rigid impact the force at an instant grows with the mesh. Its mean over a window settles where the window is
     longer than `SETTLED` periods of the fastest wave kept (``docs/choose.md`` has the numbers).

@@ -97,7 +97,8 @@ def write_csv(path: Path, rows: Sequence[Row]) -> Path:
 def write_parquet(path: Path, rows: Sequence[Row]) -> Path:
     """Write rows, ``None`` as null, and return the path; a column without any value is one of numbers.
 
-    By way of JSON: before it looks at a list, pyarrow loads pandas where there is one, which takes a second.
+    By way of JSON: before it looks at a list, pyarrow loads pandas where there is one, which takes a second. Of JSON it
+    would take texts that look like times for times.
     """
     import pyarrow as pa
     import pyarrow.json
@@ -107,7 +108,10 @@ def write_parquet(path: Path, rows: Sequence[Row]) -> Path:
     found = pa.table({})
     if rows:
         lines = [to_json(row, inf_nan_mode="constants", fallback=lambda value: value.tolist()) for row in rows]
-        found = pa.json.read_json(BytesIO(b"\n".join(lines)))
+        names = _names(rows)
+        texts = [name for name in names if any(isinstance(row.get(name), str) for row in rows)]
+        as_given = pa.json.ParseOptions(explicit_schema=pa.schema([(name, pa.string()) for name in texts]))
+        found = pa.json.read_json(BytesIO(b"\n".join(lines)), parse_options=as_given).select(names)
     fields = [field.with_type(pa.float64()) if pa.types.is_null(field.type) else field for field in found.schema]
     pa.parquet.write_table(found.cast(pa.schema(fields)), path)
     return path
