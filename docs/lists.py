@@ -74,18 +74,10 @@ def phases() -> list[str]:
         seat = seats.get(row.seated, [])
         phase = ", ".join([*([] if row.joint is None else [f"*{row.joint}*"]), *seat])
         said = [" ".join((part.__doc__ or "").split()).rstrip(".") for part in (row.guard, row.effect)]
-        rows.append((WHERE[row.where], phase, said[0], f"`{row.kind}`", said[1]))
+        rows.append((row.where.__doc__, phase, said[0], f"`{row.kind}`", said[1]))
     return table(("where", "phase", "lasts while", "else", "what happens, and the next phase"), rows)
 
 
-#: Where a transition exists, by `Transition.where`.
-WHERE = {
-    "rigid": "a rigid law between two ends",
-    "strikes": "the law `transmission`",
-    "founded": "a foundation",
-    "carried": "a foundation below two ends",
-    "alone": "a foundation below the tip alone",
-}
 #: Methods of a body of one's own, the needed ones first.
 MEMBERS = (
     *("advance", "motion", "mark", "rewind", "apply_impulse", "holding_force", "energies", "stiffness"),

@@ -1,6 +1,7 @@
 """An accuracy asked for is kept: judged by the monolithic reference, on scenes that are not shipped."""
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -91,6 +92,28 @@ def test_steps_are_halved_until_the_estimate_of_each_error_does(apart, runs, mon
     assert len(sizes) == runs
     assert found.summary["accuracy"]["pilot_runs"] == runs - 1
     np.testing.assert_allclose(sizes, sizes[0] / 2.0 ** np.arange(runs), rtol=1e-12)
+
+
+def test_a_pilot_that_stopped_early_is_not_returned_however_near_it_is(monkeypatch):
+    """Its macro step is the coarsest that was tried, and up to its end it agrees with all finer runs."""
+    scene = scene_from_dict({**SCENES["hard spring"], "accuracy": 1e-3})
+    whole = simulate(with_changes(scene, accuracy=None, coupling={"macro_step": 0.01}))
+    sizes = []
+
+    def made(prepared):
+        sizes.append(prepared.coupling.macro_step)
+        if sizes[-1] < sizes[0]:
+            return replace(whole, scene=prepared)
+        error = RunStopped("made up", 0.0)
+        error.run = replace(whole, scene=prepared, summary={**whole.summary, "status": "stopped"})
+        raise error
+
+    monkeypatch.setattr(search.runner, "run_in_memory", made)
+    monkeypatch.setattr(search, "distance", lambda *_: Distance(**SAME))
+    found = search.pick(scene)
+    assert found.summary["status"] == "done"
+    assert found.scene.coupling.macro_step == sizes[1]
+    np.testing.assert_allclose(sizes, sizes[0] / np.array([1.0, 2.0, 4.0, 1.0]), rtol=1e-12)
 
 
 def test_runs_differ_by_the_largest_of_their_motion_and_by_their_peak_force():

@@ -49,21 +49,6 @@ class Interface:
         return isinstance(self.law, Rigid)
 
     @cached_property
-    def strikes(self) -> bool:
-        """Whether a rigid law joins ends where they meet, and lets them part again."""
-        return self.rigid and not self.lasting
-
-    @cached_property
-    def founded(self) -> bool:
-        """Whether there is a foundation."""
-        return self.floor is not None
-
-    @cached_property
-    def carried(self) -> bool:
-        """Whether the foundation is below two ends."""
-        return self.founded and not self.alone
-
-    @cached_property
     def soft(self) -> SoftLaw | None:
         """The soft law between the ends."""
         return None if isinstance(self.law, Rigid) else self.law

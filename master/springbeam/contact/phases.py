@@ -123,7 +123,7 @@ class Automaton:
         functions: list[tuple[EventKind, EventFunction]] = []
         force = None
         for row in TRANSITIONS:
-            if getattr(self._interface, row.where) and row.joint in (None, phase.joint) and phase.seated in row.seated:
+            if row.where(self._interface) and row.joint in (None, phase.joint) and phase.seated in row.seated:
                 guard = row.guard(self._interface, phase)
                 if isinstance(guard, str):
                     force = (row.kind, guard)
@@ -225,6 +225,34 @@ class Automaton:
         return meeting(tip.velocity, low.velocity, self._tip_mass, self._mass)
 
 
+# -- where there is a transition ---------------------------------------------------------------------------------------
+
+
+def joins(interface: Interface) -> bool:
+    """a rigid law between two ends"""
+    return interface.rigid
+
+
+def lets_part(interface: Interface) -> bool:
+    """the law `transmission`"""
+    return interface.rigid and not interface.lasting
+
+
+def has_foundation(interface: Interface) -> bool:
+    """a foundation"""
+    return interface.floor is not None
+
+
+def carries_two_ends(interface: Interface) -> bool:
+    """a foundation below two ends"""
+    return interface.floor is not None and not interface.alone
+
+
+def carries_the_tip(interface: Interface) -> bool:
+    """a foundation below the tip alone"""
+    return interface.alone
+
+
 # -- guards ------------------------------------------------------------------------------------------------------------
 
 
@@ -272,7 +300,7 @@ def foundation_pushes(interface: Interface, phase: Phase) -> PushingForce:
 class Transition(NamedTuple):
     """What ends a phase, and what happens then."""
 
-    where: str  #: the property of an `Interface` that has this transition
+    where: Callable[[Interface], bool]  #: whether an interface has this transition
     joint: Joint | None  #: the phases that it ends; ``None``: whether the ends are joined or not
     seated: tuple[bool, ...]  #: the phases that it ends
     guard: Callable[[Interface, Phase], EventFunction | PushingForce]  #: positive as long as the phase lasts
@@ -285,13 +313,13 @@ _ON = (True,)
 _EITHER = (False, True)
 #: What ends each phase. Where two guards become zero at once, the first one counts.
 TRANSITIONS = (
-    Transition("rigid", Joint.FREE, _EITHER, gap_above_zero, EventKind.IMPACT, Automaton.meet),
-    Transition("strikes", Joint.TIED, _OFF, below_equilibrium, EventKind.RELEASE, Automaton.release),
-    Transition("strikes", Joint.TOUCH, _EITHER, above_equilibrium, EventKind.RETIE, Automaton.tie),
-    Transition("strikes", Joint.TOUCH, _OFF, contact_pushes, EventKind.SEPARATION, Automaton.part),
-    Transition("founded", None, _OFF, above_foundation, EventKind.STOP_IMPACT, Automaton.strike),
-    Transition("carried", None, _ON, foundation_pushes, EventKind.UNSEATED, Automaton.leave),
-    Transition("alone", None, _ON, contact_pushes, EventKind.SEPARATION, Automaton.part),
+    Transition(joins, Joint.FREE, _EITHER, gap_above_zero, EventKind.IMPACT, Automaton.meet),
+    Transition(lets_part, Joint.TIED, _OFF, below_equilibrium, EventKind.RELEASE, Automaton.release),
+    Transition(lets_part, Joint.TOUCH, _EITHER, above_equilibrium, EventKind.RETIE, Automaton.tie),
+    Transition(lets_part, Joint.TOUCH, _OFF, contact_pushes, EventKind.SEPARATION, Automaton.part),
+    Transition(has_foundation, None, _OFF, above_foundation, EventKind.STOP_IMPACT, Automaton.strike),
+    Transition(carries_two_ends, None, _ON, foundation_pushes, EventKind.UNSEATED, Automaton.leave),
+    Transition(carries_the_tip, None, _ON, contact_pushes, EventKind.SEPARATION, Automaton.part),
 )
 _EFFECTS = {row.kind: row.effect for row in TRANSITIONS}
 #: A soft law acts in every phase, and no step ends where its contact begins or ends: the event and the next joint.
