@@ -8,8 +8,9 @@ from bodies import DuffingBody, Upper
 from scenes import table
 
 from springbeam import SceneError, load_scene, with_changes
-from springbeam.bodies.gate import admit, refusals
 from springbeam.bodies.protocol import Abilities, Body
+from springbeam.run.gate import admit, refusals
+from springbeam.run.setup import set_up
 
 # -- what a scene needs of its bodies -------------------------------------------------------------------------------
 
@@ -20,8 +21,9 @@ ASKED = table("master/cases.toml")["asked"]
 def test_a_scene_asks_of_a_body_what_it_needs_and_no_more(what):
     changes = dict(ASKED[what])
     lacks, asks = changes.pop("lacks"), changes.pop("asks")
-    told = refusals(with_changes(load_scene("soft"), **changes, stop=None), {"spring": replace(Abilities(), **lacks)})
-    assert [line.partition(" = ")[0].partition(":")[0] for line in told] == asks
+    setup = set_up(with_changes(load_scene("soft"), **changes, stop=None))
+    lines = refusals(setup, {"spring": replace(Abilities(), **lacks)})
+    assert [line.partition(" = ")[0].partition(":")[0] for line in lines] == asks
 
 
 class Unstruck(DuffingBody):
@@ -38,4 +40,4 @@ def test_bodies_are_admitted_where_they_can_begin(lower, why):
     """Above a foundation at −15 mm, to rounding; and struck, if the law is rigid."""
     scene = with_changes(load_scene("soft"), beam={"approach": "elastic"})
     with pytest.raises(SceneError, match=why) if why else nullcontext():
-        admit(scene, 0.0, Upper(1.0, y=0.1), lower)
+        admit(set_up(scene), Upper(1.0, y=0.1), lower)

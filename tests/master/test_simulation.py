@@ -1,14 +1,16 @@
 """The master on exact bodies: events against the event-driven reference, refused steps, the ledger."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bodies import DuffingBody, Upper, simulate, stopping
 from scenes import kinds, scene_from_dict
 
 import springbeam
-from springbeam.bodies.gate import admit
 from springbeam.bodies.protocol import Abilities, StepRefused
 from springbeam.results.steps import STEP
+from springbeam.run.gate import admit
 from springbeam.run.ledger import Balance, bounds, errors
 from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair
@@ -209,11 +211,12 @@ def test_a_contact_too_stiff_for_its_degree_is_made_in_shorter_steps_and_keeps_t
 def test_an_undeformed_tip_may_miss_what_it_meets_by_the_rounding_of_its_way(miss):
     """It has come down by 1 m/s for 0.5 s, to 1e-12 of that; a start at rest has no way to round."""
     scene = with_changes(load_scene("soft"), beam={"initial_deflection_slope": 0.5})
-    assert scene.contact_time == 0.5
-    admit(scene, 0.5, Upper(1.0, y=miss, z=-1.0), DuffingBody(1.0))
+    setup = set_up(scene)
+    assert setup.start == 0.5
+    admit(setup, Upper(1.0, y=miss, z=-1.0), DuffingBody(1.0))
     for u, time in ((miss, 0.0), (4.0 * miss, 0.5)):
         with pytest.raises(SceneError, match="the upper end starts at"):
-            admit(scene, time, Upper(1.0, y=u, z=-1.0), DuffingBody(1.0))
+            admit(replace(setup, start=time), Upper(1.0, y=u, z=-1.0), DuffingBody(1.0))
 
 
 @pytest.mark.parametrize("law", ["compliance", "link"])

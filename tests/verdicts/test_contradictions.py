@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from springbeam import load_scene, simulate
-from springbeam.results.contradictions import contradictions
+from springbeam.run.contradictions import contradictions
+from springbeam.run.setup import set_up
 from springbeam.scene import scene_from_dict
 
 #: A mass on a spring that starts at 0.5 m, above a rigid stop at −0.4 m; it meets the stop at arccos(−0.8)/100 s.
@@ -36,7 +37,7 @@ def found(run, **changes):
     for field, change in changes.get("steps", {}).items():
         steps[field] += change
     events = changes.get("events", run.events)
-    return contradictions(run.scene, steps, events, changes.get("contact_time", 0.0))
+    return contradictions(set_up(run.scene), steps, events, changes.get("contact_time", 0.0))
 
 
 @pytest.mark.parametrize("name", SCENES)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import closing
 
 from ..scene import Scene
+from ..scene.laws import SoftLaw
 from ..scene.partners import SpringDamperElement
 from ..scene.statics import tip_compliance
 from .factory import load_bodies, top_at_rest
 
 
-def contact_at_rest(scene: Scene, degree: int, law: Callable[[float], float] | None) -> float:
+def contact_at_rest(scene: Scene, degree: int, law: SoftLaw | None) -> float:
     """Return the contact force C [N] under which the bodies of ``scene`` start at rest; 0 if they do not touch.
 
     The upper end is linear, u = u₀ + c C with the c of its mesh; C satisfies the law, or closes the gap of a rigid one.
@@ -21,7 +21,7 @@ def contact_at_rest(scene: Scene, degree: int, law: Callable[[float], float] | N
     scene, degree
         As of `load_bodies`.
     law
-        C [N] of a soft law at a penetration [m].
+        That between the ends, if it is soft.
 
     Raises SceneError if the spring has no equilibrium, FmuError.
     """
@@ -43,7 +43,7 @@ def contact_at_rest(scene: Scene, degree: int, law: Callable[[float], float] | N
 
     def too_small(contact: float) -> float:
         p = top_at_rest(scene, contact) - free - compliance * contact
-        return p if law is None else law(p) - contact
+        return p if law is None else law.force(p) - contact
 
     while too_small(scale) * deep > 0.0:
         scale *= 2.0

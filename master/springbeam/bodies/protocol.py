@@ -286,7 +286,7 @@ class Body:
     def apply_impulse(self, impulse: float) -> None:
         """Apply an upward impulse [N·s] on the end.
 
-        The law ``transmission``, ``[stop]`` and a tie of ends of two velocities need it (`springbeam.bodies.gate`). An
+        The law ``transmission``, ``[stop]`` and a tie of ends of two velocities need it (`springbeam.run.gate`). An
         impulse within rounding counts as none.
         """
         if abs(impulse) > ROUNDED_IMPULSE * self.mass * abs(self.motion().velocity):

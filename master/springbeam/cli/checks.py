@@ -93,8 +93,9 @@ def _asked(name: str, version: str) -> dict[str, Any]:
 def _examine(scene: Scene) -> Findings:
     """Return the abilities of the bodies of ``scene``; it is an error if the scene cannot be run with them."""
     from ..bodies.factory import findings
-    from ..bodies.gate import OFFERED, refusals
     from ..bodies.units import described
+    from ..run.gate import OFFERED, refusals
+    from ..run.setup import set_up
     from ..scene.partners import kind_of
 
     found = findings(scene)
@@ -111,13 +112,14 @@ def _examine(scene: Scene) -> Findings:
         shown.append(f"mass that an impulse moves: {finding.mass:.9g} kg {mass}")
         shown += described(given.named, finding.units)
         names = ("", "capability", "shown by", "what is offered")
-        able = asdict(finding.abilities)
+        has = asdict(finding.abilities)
         rows = [
-            ("yes", key, shown_by, having) if able[key] > 0 else ("no", key, shown_by, lacking)
+            ("yes", key, shown_by, having) if has[key] > 0 else ("no", key, shown_by, lacking)
             for key, shown_by, having, lacking in OFFERED
         ]
         shown.append(table(names, rows))
-    refused = refusals(scene, {table: finding.abilities for table, finding in found.items()})
+    able = {table: finding.abilities for table, finding in found.items()}
+    refused = refusals(set_up(scene, *able.values()), able)
     document = {"bodies": {name: asdict(finding) for name, finding in found.items()}, "refused": refused}
     if faults := [*(fault for finding in found.values() for fault in finding.faults), *refused]:
         return Findings(document, shown, code=BAD_INPUT, error="\n".join(faults))

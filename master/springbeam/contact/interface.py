@@ -49,16 +49,9 @@ class Interface:
         return isinstance(self.law, Rigid)
 
     @cached_property
-    def soft(self) -> SoftLaw | None:
-        """The soft law between the ends."""
-        return None if isinstance(self.law, Rigid) else self.law
-
-    @cached_property
     def lasting(self) -> bool:
         """Whether the law joins the ends from the start and for good."""
-        if isinstance(self.law, Rigid):
-            return self.law.lasting
-        return self.law is not None and not self.law.one_sided
+        return self.law is not None and self.law.lasting
 
     @cached_property
     def tip_share(self) -> float:

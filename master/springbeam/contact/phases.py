@@ -17,7 +17,7 @@ from ..motion.events import EventKind, Joint
 from ..motion.paths import Sample
 from .events import EventFunction, Height, Holding, gap
 from .impacts import NO_IMPACT, Impact, foundation_impact, meeting, rebound
-from .interface import Interface, common_velocity
+from .interface import Interface, Rigid, common_velocity
 
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only); slower than the
 #: second, if it would also rise no higher than the resolution of positions.
@@ -195,8 +195,8 @@ class Automaton:
         return Outcome(EventKind.UNSEATED, Phase(at.phase.joint), impact)
 
     def _ties(self, phase: Phase) -> bool:
-        """Whether a rigid law holds the ends together in ``phase``."""
-        return phase.joint is not Joint.FREE and self._interface.soft is None
+        """Whether a rigid law, or the foundation, holds the ends together in ``phase``."""
+        return phase.joint is not Joint.FREE and isinstance(self._interface.law, Rigid | None)
 
     def _is_at_equilibrium(self, at: Instant) -> bool:
         """Whether the lower end is at Ψ, within the resolution of events."""

@@ -128,14 +128,14 @@ class Extremes(NamedTuple):
         return cls(float(values[low]), float(times[low]), float(values[high]), float(times[high]))
 
 
-def extremes(scene: Scene, steps: np.ndarray, name: str) -> Extremes:
+def extremes(rigid: bool, steps: np.ndarray, name: str) -> Extremes:
     """Return the lowest and the highest value of the motion on the curve that `at` follows.
 
-    ``name`` is one of `MOTION`; ``steps`` are all records of a run of ``scene``.
+    ``name`` is one of `MOTION`; ``steps`` are all records of a run, ``rigid`` as of `motion`.
     """
     parts = [steps[f"{part}_after"] for part in (("u_tip", "y") if name == "gap" else (name,))]
     found = list(Extremes.of_rows(steps["time"], parts[0] - parts[1] if name == "gap" else parts[0]))
-    for after, curves in _curves(scene, steps):
+    for after, curves in _curves(rigid, steps):
         for place, sign in ((0, 1.0), (2, -1.0)):
             lowest, step, share = _lowest(sign * curves[name], below=sign * found[place])
             if step >= 0:
@@ -144,14 +144,14 @@ def extremes(scene: Scene, steps: np.ndarray, name: str) -> Extremes:
     return Extremes(*found)
 
 
-def between_rows(scene: Scene, steps: np.ndarray) -> float:
+def between_rows(rigid: bool, steps: np.ndarray) -> float:
     """Return the largest error of the curve of an end between the rows, over its largest distance from its start.
 
     Rows that are right may miss a part of the motion that turns far in a step. The last moment of a step shows it: its
     part of the curve is 0.8 to 2 times the error where that is above a percent, and more below.
     """
     found = 0.0
-    for _, curves in _curves(scene, steps):
+    for _, curves in _curves(rigid, steps):
         for position in ("u_tip", "y"):
             places = steps[f"{position}_after"]
             unsure = LAST_MOMENT * np.abs(curves[position][_DEGREE]).max() - _ROUNDING * np.abs(places).max()
@@ -160,21 +160,21 @@ def between_rows(scene: Scene, steps: np.ndarray) -> float:
     return found
 
 
-def _curves(scene: Scene, steps: np.ndarray) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray]]]:
+def _curves(rigid: bool, steps: np.ndarray) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray]]]:
     """Yield the numbers of the records that end steps, some thousand at a time, and the `motion` over these steps."""
     made = np.flatnonzero(steps["size"] > 0.0)
     for begin in range(0, len(made), _TOGETHER):
         after = made[begin : begin + _TOGETHER]
-        yield after, motion(scene, steps[after - 1], steps[after])
+        yield after, motion(rigid, steps[after - 1], steps[after])
 
 
-def motion(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
+def motion(rigid: bool, before: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
     """Return displacements, velocities and gap over ``steps`` as polynomials of s = τ/H.
 
     Parameters
     ----------
-    scene
-        As run.
+    rigid
+        Whether ends that are joined have one position.
     before, steps
         Records of steps of sizes above 0 and those before them, shape (n,).
 
@@ -185,7 +185,7 @@ def motion(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
     """
     found: dict[str, np.ndarray] = {}
     size: Any = steps["size"]
-    together = scene.contact.rigid & joined(before)
+    together = rigid & joined(before)
     held = before["phase"] >= 3.0
 
     def of(end: int, records: np.ndarray, field: str) -> Any:
@@ -210,8 +210,10 @@ def motion(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
     return found
 
 
-def forces(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
-    """Return C and N over ``steps`` [N] as Legendre series of 2τ/H − 1, shape (6, n); parameters as of `motion`.
+def forces(exchanges: bool, before: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
+    """Return C and N over ``steps`` [N] as Legendre series of 2τ/H − 1, shape (6, n).
+
+    ``exchanges`` says whether the scheme exchanges values once per macro step; other parameters are as of `motion`.
 
     They are the polynomials applied minus a defect D. For a soft law D has no part of a degree up to d; for a tie it is
     μ g̈, whose parts up to degree 3 follow from the rates and the moments of the gap. The parts of the next two degrees
@@ -225,7 +227,7 @@ def forces(scene: Scene, before: np.ndarray, steps: np.ndarray) -> dict[str, np.
         dc = size * steps[f"{name}_rate"]
         ddc = size**2 * steps[f"{name}_rate_2"]
         series = np.zeros((6, len(steps)))
-        if not scene.coupling.exchanges:
+        if not exchanges:
             series[:3] = c + dc / 2.0 + ddc / 6.0, dc / 2.0 + ddc / 4.0, ddc / 12.0
             series[:4] -= np.where(together, _turning(before, steps), 0.0)
             first = np.where(together, 4, steps["degree"].astype(int) + 1)
@@ -266,11 +268,14 @@ def _between(
 
     found["time"] = times
     found["size"] = share * after["size"]
-    for name, series in forces(scene, before, after).items():
+    for name, series in forces(scene.coupling.exchanges, before, after).items():
         found[f"{name}_after"] = legval(2.0 * share - 1.0, series, tensor=False)
         if name == "contact_force" and scene.contact.opens:
             found[f"{name}_after"] = np.maximum(found[f"{name}_after"], 0.0)
-    curves = {name: polyval(share, powers, tensor=False) for name, powers in motion(scene, before, after).items()}
+    curves = {
+        name: polyval(share, powers, tensor=False)
+        for name, powers in motion(scene.contact.rigid, before, after).items()
+    }
     for name in ("u_tip", "v_tip", "y", "z"):
         found[f"{name}_after"] = curves[name]
     if scene.coupled and not (scene.contact.rigid or scene.contact.lasting):

@@ -91,7 +91,7 @@ def totals(scene: Scene, steps: np.ndarray, events: Iterable[Event], window: flo
     if scene.coupled or (beam and stop):
         found |= _contact(scene, steps, events, window)
     if beam:
-        found["deepest_tip"], found["deepest_tip_time"] = extremes(scene, steps, "u_tip")[:2]
+        found["deepest_tip"], found["deepest_tip_time"] = extremes(scene.contact.rigid, steps, "u_tip")[:2]
     if stop:
         found["stop_strokes"] = sum(event.kind.strikes for event in events)
         held = impulse(steps, "foundation_force").sum()

@@ -27,6 +27,7 @@ from . import runner
 from .ledger import CHANGED
 from .outcome import Progress, RunStopped
 from .resolution import LAW_MISSED, NOT_RESOLVED
+from .setup import Setup, set_up
 
 #: Fewest and most macro steps of a run.
 _FEWEST, _MOST = 8.0, 50_000
@@ -232,20 +233,21 @@ def _first(scene: Scene) -> float:
     It is half as many as a run needs that calls itself resolved; with joined ends fewer for a loose accuracy, by the
     order of their error: else the first run would have steps far smaller than it needs.
     """
-    bodies = [body for body in load_bodies(scene, scene.contact_time or 0.0, scene.degree) if body is not None]
+    setup = set_up(scene)
+    bodies = [body for body in load_bodies(scene, setup.start, setup.degree) if body is not None]
     try:
-        fastest = max([*_rates(scene, bodies), *(load.rate for load in scene.loads)], default=0.0)
+        fastest = max([*_rates(setup, bodies), *(load.rate for load in setup.loads)], default=0.0)
     finally:
         for body in bodies:
             body.close()
-    steps = 0.5 * fastest * scene.duration
+    steps = 0.5 * fastest * (setup.end - setup.start)
     assert scene.accuracy is not None
-    if scene.coupled:
+    if setup.law is not None:
         steps *= float(_SHARP / max(scene.accuracy, _SHARP)) ** (1.0 / _ORDER)
     return max(_FEWEST, math.ceil(steps))
 
 
-def _rates(scene: Scene, bodies: Sequence[Body]) -> Iterator[float]:
+def _rates(setup: Setup, bodies: Sequence[Body]) -> Iterator[float]:
     """Yield the frequencies that macro steps follow [rad/s], each over the angle that it may turn in one."""
     for body in bodies:
         omega, ratio = body.oscillation() or (0.0, 0.0)
@@ -254,12 +256,12 @@ def _rates(scene: Scene, bodies: Sequence[Body]) -> Iterator[float]:
     known = [body.stiffness(body.motion().displacement) for body in bodies]
     if None in known:
         return
-    if (law := scene.soft_law) is not None:
-        stored = [sum(body.energies()[:2]) for body in bodies]
-        yield math.sqrt(stiffest(law, sum(stored)) * sum(1.0 / body.inertia for body in bodies)) / _CONTACT_TURN
+    if setup.soft is not None:
+        stored = sum(sum(body.energies()[:2]) for body in bodies)
+        yield math.sqrt(stiffest(setup.soft, stored) * sum(1.0 / body.inertia for body in bodies)) / _CONTACT_TURN
     elif bodies[0].massless:
         yield math.sqrt(sum(known) / bodies[-1].mass) / _CONTACT_TURN if len(bodies) > 1 else 0.0
-    elif scene.coupled or scene.stop is not None:
+    elif setup.law is not None or setup.floor is not None:
         yield _lasting(bodies[0]) / _WAVE_TURN
 
 

@@ -12,13 +12,12 @@ from typing import Any
 
 from ..bodies.equilibrium import contact_at_rest
 from ..bodies.factory import findings, load_bodies
-from ..bodies.gate import admit, tried
 from ..bodies.protocol import Body
-from ..contact.interface import Rigid
 from ..results.recording import MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, as_scene
 from ..scene.suspicions import suspicions
+from .gate import admit, tried
 from .master import Master
 from .outcome import Progress, RunStopped
 from .setup import set_up
@@ -69,12 +68,10 @@ class Simulation(AbstractContextManager["Simulation"]):
             if body is not None:
                 able[table] = tried(body, scene.contact_time or 0.0, H)
         setup = set_up(scene, *able.values())
-        soft = None if setup.law is None or isinstance(setup.law, Rigid) else setup.law.force
-        contact_force = contact_at_rest(of_scene, setup.degree, soft)
+        contact_force = contact_at_rest(of_scene, setup.degree, setup.soft)
         self._bodies = beam, spring = load_bodies(of_scene, setup.start, setup.degree, contact_force)
-        coupling = scene.coupling.model_copy(update={"degree": setup.degree})
         try:
-            admit(scene.model_copy(update={"coupling": coupling}), setup.start, upper or beam, lower or spring, able)
+            admit(setup, upper or beam, lower or spring, able)
             self._master = Master(setup, upper or beam, lower or spring, self.recorder, contact_force)
         except BaseException:
             self.close()

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from ..bodies.protocol import Abilities
 from ..contact.interface import Rigid
 from ..scene import Load, Scene
+from ..scene import SceneError as SceneError
 from ..scene.laws import SoftLaw
 from ..scene.scene import SAME as SAME
 from ..scene.scene import SHORTEST_STEP as SHORTEST_STEP
@@ -25,8 +26,10 @@ class Setup:
     upper: bool
     lower: bool
     law: SoftLaw | Rigid | None  #: between the ends; ``None`` where nothing acts
+    law_name: str  #: in the scene, for messages
     equilibrium: float | None  #: Ψ [m]; ``None`` where it is the height at which the lower end starts
     at_rest: bool  #: whether the run starts at rest under the loads
+    undeformed: bool  #: whether it starts where an undeformed tip meets the body below
     floor: float | None  #: φ, the height of the rigid foundation [m]
     restitution: float  #: e of impacts on it
     level: float  #: of the wall that is in place of an absent lower body [m]
@@ -40,6 +43,16 @@ class Setup:
     relative_tolerance: float
     absolute_tolerance: float
     force_window: float | None  #: time over which the contact force is averaged before its peak is taken [s]
+
+    @property
+    def soft(self) -> SoftLaw | None:
+        """The soft law between the ends."""
+        return None if isinstance(self.law, Rigid) else self.law
+
+    @property
+    def lasting(self) -> bool:
+        """Whether the law joins the ends from the start and for good."""
+        return self.law is not None and self.law.lasting
 
 
 def set_up(scene: Scene, *abilities: Abilities) -> Setup:
@@ -60,8 +73,10 @@ def set_up(scene: Scene, *abilities: Abilities) -> Setup:
         upper=scene.upper is not None,
         lower=scene.lower is not None,
         law=law,
+        law_name=scene.contact.law,
         equilibrium=scene.equilibrium,
         at_rest=scene.static,
+        undeformed=scene.beam is not None and scene.beam.approach == "undeformed",
         floor=None if rigid is None else rigid.position,
         restitution=1.0 if rigid is None else rigid.restitution,
         level=0.0 if stop is None else stop.position,

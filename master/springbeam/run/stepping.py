@@ -141,7 +141,7 @@ class Pair:
         self._last: Step | None = None  #: at whose end the bodies are
         self._holding = 0.0  #: what holds a seated lower end, without loads and contact [N]
         #: The soft law between the ends; a rigid one has no force of its own, and ties them while they are joined.
-        self.law = self.interface.soft
+        self.law = setup.soft
         #: μ of ends that a rigid law joins, whose mismatch of velocities a step turns round [kg]; else 0.
         self.turned_mass = self.interface.reduced_mass() if self.law is None else 0.0
         #: The bodies whose acceleration, or its change by damping, is unknown.

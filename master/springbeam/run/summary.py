@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from ..results.columns import not_shown
-from ..results.contradictions import contradictions
 from ..results.dense import between_rows
 from ..results.recording import Recorder
 from ..results.totals import totals
+from .contradictions import contradictions
 from .master import Master
 from .misplaced import misplaced
 from .observed import coarse_force, force_window, unknown
@@ -29,12 +29,12 @@ def summary(master: Master, recorder: Recorder) -> dict[str, Any]:
     made = int(np.count_nonzero(np.diff(steps["time"])))
     energies, warnings, changed = master.balance.report(steps)
     off = misplaced(pair, steps, events)
-    unresolved = why_not_resolved(pair, steps, off or 0.0, between_rows(scene, steps))
+    unresolved = why_not_resolved(pair, steps, off or 0.0, between_rows(pair.law is None, steps))
     window = force_window(pair, steps)
     warnings += filter(None, [unresolved or peak_force_doubt(pair, window), not_shown(scene, steps)])
     warnings += filter(None, [unknown(pair), coarse_force(pair)])
     amounts = totals(scene, steps, events, window) if len(steps) else {}
-    ruled_out = contradictions(scene, steps, events, amounts.get("contact_duration_total", 0.0))
+    ruled_out = contradictions(pair.setup, steps, events, amounts.get("contact_duration_total", 0.0))
     warnings += [f"not resolved: {what}: an event was missed; {_SHORTER}" for what in ruled_out]
     return {
         "degree": pair.setup.degree,

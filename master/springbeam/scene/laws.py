@@ -37,6 +37,11 @@ class SoftLaw:
     one_sided: ClassVar[bool] = True
 
     @property
+    def lasting(self) -> bool:
+        """Whether it joins the ends from the start and for good, for either sign of C."""
+        return not self.one_sided
+
+    @property
     def damped(self) -> bool:
         """Whether D is not zero."""
         return False

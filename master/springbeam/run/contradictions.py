@@ -1,4 +1,4 @@
-"""Results that contradict the scene: an end below a rigid stop, ends beyond each other, times beyond the run.
+"""Results that contradict the setup: an end below a rigid stop, ends beyond each other, times beyond the run.
 
 A step that misses an event leaves no other trace, so the records of every run are searched for these.
 """
@@ -9,9 +9,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ..contact.interface import Rigid
 from ..motion.events import Event
-from ..scene import Scene
-from .dense import Extremes, extremes
+from ..results.dense import Extremes, extremes
+from .setup import Setup
 
 #: Largest penetration over the range of an end: the error of curves between right rows.
 _MOST = 0.01
@@ -19,13 +20,13 @@ _MOST = 0.01
 _SAME = 1e-9
 
 
-def contradictions(scene: Scene, steps: np.ndarray, events: Sequence[Event], contact_time: float) -> list[str]:
-    """Return in words the results of a run that contradict ``scene``; a right run has none.
+def contradictions(setup: Setup, steps: np.ndarray, events: Sequence[Event], contact_time: float) -> list[str]:
+    """Return in words the results of a run that contradict its ``setup``; a right run has none.
 
     Parameters
     ----------
-    scene
-        As run.
+    setup
+        What was run.
     steps, events
         Of the whole run so far; steps of dtype `springbeam.results.steps.STEP`.
     contact_time
@@ -33,21 +34,22 @@ def contradictions(scene: Scene, steps: np.ndarray, events: Sequence[Event], con
     """
     if not len(steps):
         return []
-    return [*_ends(scene, steps), *_times(steps, events, contact_time)]
+    return [*_ends(setup, steps), *_times(steps, events, contact_time)]
 
 
-def _ends(scene: Scene, steps: np.ndarray) -> Iterator[str]:
-    if scene.stop is not None and not scene.elastic_stop:
-        end, name = ("u_tip", "the tip") if scene.lower is None else ("y", "the spring's top")
-        places = extremes(scene, steps, end)
-        if scene.stop.position - places.lowest > _MOST * _range(places):
+def _ends(setup: Setup, steps: np.ndarray) -> Iterator[str]:
+    rigid = setup.soft is None
+    if setup.floor is not None:
+        end, name = ("y", "the spring's top") if setup.lower else ("u_tip", "the tip")
+        places = extremes(rigid, steps, end)
+        if setup.floor - places.lowest > _MOST * _range(places):
             yield (
                 f"{name} is at {places.lowest:.6g} m at {places.lowest_time:.6g} s, below the rigid stop at "
-                f"{scene.stop.position:.6g} m"
+                f"{setup.floor:.6g} m"
             )
-    if scene.joins and scene.contact.rigid:
-        gap = extremes(scene, steps, "gap")
-        if -gap.lowest > _MOST * min(_range(extremes(scene, steps, end)) for end in ("u_tip", "y")):
+    if isinstance(setup.law, Rigid):
+        gap = extremes(rigid, steps, "gap")
+        if -gap.lowest > _MOST * min(_range(extremes(rigid, steps, end)) for end in ("u_tip", "y")):
             yield f"the tip is {-gap.lowest:.6g} m below the spring's top at {gap.lowest_time:.6g} s"
 
 

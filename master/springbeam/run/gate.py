@@ -1,0 +1,228 @@
+"""Reject bodies with which a run cannot be made: our FMUs, FMUs of others, bodies of the caller.
+
+The rules of the scene check its keys. This gate checks the bodies, once, before the first step: their abilities,
+initial positions and velocities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+
+from ..bodies.protocol import NO_FORCE, Abilities, Body, BodyFailed, Force, StepRefused
+from ..contact.interface import Rigid
+from .setup import SAME, SceneError, Setup
+
+# -- abilities ---------------------------------------------------------------------------------------------------------
+
+#: Texts about missing abilities.
+_LACKS = {
+    "state": "its state cannot be saved (canGetAndSetFMUstate = false)",
+    "any_size": "its steps have one size (canHandleVariableCommunicationStepSize = false)",
+    "velocity": "it has no velocity",
+    "integrals": "its Motion has wrong integrals, or it has not integral and integral_2",
+    "impulse": "it has no impulse, or of a body of your own no apply_impulse",
+}
+_TO_BE_STRUCK = ("state", "any_size", "velocity", "impulse")
+#: The abilities of our own bodies, which are all there are.
+_ALL = Abilities()
+_LEFT_OUT = 'leave it out, or use scheme = "energy"'
+
+#: Abilities in words: (ability, how a body shows it, possible couplings with it, and without it).
+OFFERED = (
+    ("state", "canGetAndSetFMUstate", 'scheme "energy", tie, transmission, foundation', '"jacobi", "gauss_seidel"'),
+    ("any_size", "canHandleVariableCommunicationStepSize", "events, adaptive steps", "equal macro steps only"),
+    ("slopes", "canInterpolateInputs", "degree 1, 2", "degree 0"),
+    ("integrals", "integral, integral_2", "degree 1, 2; adaptive steps", "degree 0"),
+    ("velocity", "velocity", "events, adaptive steps, the force at an instant", "the mean over a step in its place"),
+    ("impulse", "impulse", "rigid impacts, foundation", '"compliance", "link", "tie" of equal velocities'),
+    ("energies", "kinetic_energy, potential_energy", "the whole ledger", "the ledger of the interface"),
+)
+
+
+#: What a run needs: the key that asks for it, what may be given instead, and the abilities.
+Need = tuple[str, str, tuple[str, ...]]
+
+
+def _needs(setup: Setup) -> Iterator[Need]:
+    """Yield what ``setup`` needs of both bodies."""
+    degree = f"[coupling] degree = {setup.degree}"
+    if not setup.exchanges:
+        instead = 'use scheme = "jacobi" or "gauss_seidel" with [contact] law = "link" or "compliance", without [stop]'
+        yield f'[coupling] scheme = "{setup.scheme}"', instead, ("state",)
+    elif setup.degree > 0:
+        yield degree, _LEFT_OUT, ("velocity",)
+    if setup.exchanges and setup.soft is not None and setup.soft.damped:
+        yield "[contact] damping", _LEFT_OUT, ("velocity",)
+    if isinstance(setup.law, Rigid) and not setup.lasting:
+        yield f'[contact] law = "{setup.law_name}"', 'use "compliance", "link" or "tie"', _TO_BE_STRUCK
+    if setup.floor is not None:
+        yield "[stop]", "leave it out", _TO_BE_STRUCK
+    H = setup.macro_step
+    if H is None:
+        tolerances = "[coupling] relative_tolerance, absolute_tolerance"
+        yield tolerances, "use macro_step", ("any_size", "velocity", "integrals")
+        return
+    multiple = f"use a multiple of [coupling] macro_step = {H}"
+    if _between_steps(setup, [setup.end]):
+        yield f"[time] t_end = {setup.end}", multiple, ("any_size",)
+    kinks = (time for load in setup.loads if not load.is_finer_than(H) for time in load.kinks)
+    if _between_steps(setup, (time for time in kinks if time < setup.end)):
+        yield "[[loads]]: a step ends where each jumps or bends", multiple, ("any_size",)
+
+
+def _between_steps(setup: Setup, times: Iterable[float]) -> bool:
+    """Return whether one of the ``times`` [s] lies in the run, but not where a whole macro step ends."""
+    assert setup.macro_step is not None
+    steps = [(time - setup.start) / setup.macro_step for time in times if time >= setup.start]
+    return any(abs(number - round(number)) > SAME for number in steps)
+
+
+def refusals(setup: Setup, abilities: Mapping[str, Abilities]) -> list[str]:
+    """Return why a run cannot be made with bodies of these ``abilities``, by table, each with a remedy."""
+    needs = list(_needs(setup))
+    return [line for table, body in abilities.items() for line in _lacking(setup, needs, table, body)]
+
+
+def _lacking(setup: Setup, needs: Iterable[Need], table: str, body: Abilities) -> Iterator[str]:
+    for key, instead, names in needs:
+        for name in names:
+            if getattr(body, name) < getattr(_ALL, name):
+                yield f"{key}: the body in [{table}] cannot do that, {_LACKS[name]}; {instead}"
+    degree = f"[coupling] degree = {setup.degree}: the body in [{table}] cannot do that"
+    # The scheme sets as many integrals of the gap to 0; an exchange needs none.
+    followed = body.slopes if setup.exchanges else min(body.integrals, body.slopes)
+    if setup.degree > body.slopes:
+        yield (
+            f"{degree}, it follows derivatives of the force of order {body.slopes} at most (canInterpolateInputs; "
+            f"FMI 3.0 has none; a body of your own, in advance); use degree = {followed}"
+        )
+    if not setup.exchanges and setup.degree > body.integrals:
+        yield f"{degree}, {_LACKS['integrals']}; use degree = {followed}"
+
+
+#: Length of a trial step over a macro step; displacement by a force in it, over that of the body or 1 m.
+_TRIAL, _MOVED = 2.0**-8, 1e-6
+
+
+def tried(body: Body, time: float, macro_step: float) -> Abilities:
+    """Return the abilities of a ``body`` of the caller, by four short steps from ``time`` [s] that are undone.
+
+    They show whether it follows a force that grows over a step, and returns the integrals of its motion. If it refuses
+    them, its declared abilities count.
+    """
+    able = body.can()
+    if not able.state or not 0.0 < body.mass < inf:
+        return able
+    h = _TRIAL * macro_step if able.any_size else macro_step
+    w, v, _, _ = body.motion()
+    moved = _MOVED * (max(abs(w), h * abs(v)) or 1.0)
+    push = 2.0 * body.mass * moved / (h * h)  # constant, it moves a free mass as far
+    forces: list[Force] = [NO_FORCE, (push, 0.0, 0.0), (0.0, push / h, 0.0), (0.0, 0.0, 2.0 * push / h**2)]
+    body.mark()
+    ends = []
+    try:
+        for force in forces:
+            ends.append(body.advance(time, h, force))
+            body.rewind()
+    except (BodyFailed, StepRefused, OverflowError):
+        body.rewind()
+        return able
+    alone, *others = np.array(ends)
+    held, grown, bent = (np.abs(end - alone) for end in others)
+    if held[0] == 0.0:
+        return able
+    # Of a free mass the responses are 1/3, 1/6 and L h/3, L h²/12: a stiff body's are larger.
+    slopes = [grown[0] > held[0] / 6.0, bent[0] > held[0] / 12.0]
+    integrals = [held[2] > held[0] * h / 6.0, held[3] > held[0] * h * h / 24.0]
+    return replace(
+        able,
+        slopes=min(able.slopes, [*slopes, False].index(False)),
+        integrals=min(able.integrals, [*integrals, False].index(False)),
+    )
+
+
+# -- starts ------------------------------------------------------------------------------------------------------------
+
+#: Velocities closer than this share are equal for an end without impulses: given, and measured from displacements.
+_SAME_SPEED, _SAME_SPEED_MEASURED = 1e-13, 1e-6
+#: Heights closer than this share are equal.
+_SAME_PLACE = 1e-12
+
+
+def admit(setup: Setup, upper: Body | None, lower: Body | None, found: Mapping[str, Abilities] | None = None) -> None:
+    """Raise SceneError if a run cannot be made with these bodies as they are at its start.
+
+    That is if a body lacks a needed ability, or if the contact law, the foundation or an undeformed approach cannot
+    begin from the initial positions and velocities. Abilities ``found``, by table, replace the declared ones.
+    """
+    bodies = {name: body for name, body in (("beam", upper), ("spring", lower)) if body is not None}
+    able = {table: body.can() for table, body in bodies.items()}
+    lines = refusals(setup, {**able, **(found or {})})
+    lines += [
+        f"the body in [{table}]: mass = 0: only an upper end can be without inertia, tied by a rigid law to one that "
+        "has some; give it a mass greater than 0 [kg]"
+        for table, body in bodies.items()
+        if body.massless and (table == "spring" or not isinstance(setup.law, Rigid))
+    ]
+    if setup.floor is not None and (lower is not None or not setup.at_rest):  # else the stop holds the tip up
+        table, end = list(bodies.items())[-1]
+        w = end.motion().displacement
+        if setup.floor - w > _SAME_PLACE * max(abs(w), abs(setup.floor)):
+            lines.append(
+                f"[stop] position = {setup.floor:g}: the body in [{table}] starts below the foundation, at {w:.9g} m; "
+                "it must start there or above"
+            )
+    if upper is not None and lower is not None and not lines:
+        lines += _starts(setup, upper, lower)
+        if isinstance(setup.law, Rigid) and setup.lasting:
+            lines += _joined(setup, upper, lower)
+    if lines:
+        raise SceneError("\n".join(lines))
+
+
+def _starts(setup: Setup, upper: Body, lower: Body) -> Iterator[str]:
+    """Yield why two bodies cannot begin where they are."""
+    u, v, _, _ = upper.motion()
+    y, z, _, _ = lower.motion()
+    # An undeformed tip has come down by v t, which rounds.
+    apart = not setup.at_rest and abs(u - y) > _SAME_PLACE * max(abs(u), abs(y), setup.start * abs(v))
+    ends = f"the upper end starts at {u:.9g} m and the lower one at {y:.9g} m"
+    undeformed = '[beam] approach = "undeformed"'
+    elastic = 'use approach = "elastic"'
+    if setup.lasting:
+        if apart and isinstance(setup.law, Rigid):
+            yield f'[contact] law = "{setup.law_name}": {ends}; let them start at one height, or use "link"'
+        return
+    if setup.start > 0.0 and z != 0.0:
+        yield (
+            f"{undeformed}: the body in [spring] starts with {z:.6g} m/s, but nothing moves until the tip arrives at "
+            f"t = {setup.start:.6g} s; let it start at rest, or {elastic}"
+        )
+    if apart and u < y:
+        yield f"[beam]: {ends}; it must start there or above"
+    elif apart and setup.undeformed:
+        yield (
+            f"{undeformed}: {ends}, and where the body below is when they meet is not known beforehand; {elastic}, or "
+            "let them start at one height"
+        )
+
+
+def _joined(setup: Setup, upper: Body, lower: Body) -> Iterator[str]:
+    """Join ends that are to be tied, if one takes no impulse; yield an error if their velocities differ."""
+    v = upper.motion().velocity
+    z = lower.motion().velocity
+    for table, body, other in (("beam", upper, lower), ("spring", lower, upper)):
+        abilities = body.can()
+        if abilities.impulse:
+            continue
+        if abs(v - z) > (_SAME_SPEED if abilities.velocity else _SAME_SPEED_MEASURED) * max(abs(v), abs(z)):
+            yield (
+                f'[contact] law = "{setup.law_name}": the ends start with {v:.6g} and {z:.6g} m/s and are joined by an '
+                f"impulse, which the body in [{table}] does not take; give it one (impulse of an FMU, apply_impulse "
+                'of a body of your own), let both start with one velocity, or use "link"'
+            )
+        body.join(other.motion().velocity)
