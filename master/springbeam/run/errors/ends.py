@@ -1,0 +1,164 @@
+"""How the errors of both ends go on from step to step: by the modes of the beam, and the linearised lower body."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from ...bodies.protocol import Modes
+
+
+class Terms(NamedTuple):
+    """The terms of the modes of a body, (n,) each.
+
+    Each mode is c₊ exp(r₊ t) + c₋ exp(r₋ t), with r the roots of r² + 2 ζ ω r + ω² = 0; where these are conjugates one
+    of the terms is kept and counts twice.
+    """
+
+    rates: np.ndarray  #: r [1/s]
+    impulse: np.ndarray  #: what an impulse of 1 N·s at the end adds
+    shown: np.ndarray  #: what the terms add to the displacement of the end, and to its velocity, (2, n)
+    stiffness: np.ndarray  #: ω² [1/s²]
+    damping: np.ndarray  #: 2 ζ ω [1/s]
+
+    @classmethod
+    def of(cls, modes: Modes, duration: float) -> Terms:
+        """Return those of ``modes``; a free mass is a mode so soft that it does not turn in ``duration`` [s]."""
+        stiffness = np.maximum(modes[0], (1e-4 / duration) ** 2)
+        decay = 0.5 * modes[1]
+        tip = modes[2]
+        root = np.sqrt(decay**2 - stiffness * (1.0 + 1e-12j))  # never 0
+        creeps = decay**2 >= stiffness
+
+        def both(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+            return np.concatenate([first, second[creeps]])
+
+        impulse = 0.5 * tip / root
+        rates = both(root - decay, -(root + decay))
+        displaced = both(np.where(creeps, 1.0, 2.0) * tip, tip)
+        return cls(
+            rates,
+            both(impulse, -impulse),
+            np.array([displaced, displaced * rates]),
+            both(stiffness, stiffness),
+            both(modes[1], modes[1]),
+        )
+
+
+class Ends:
+    """Errors of the tip's ``u`` [m] and ``v`` [m/s], the sums of terms, and of the lower end's ``y`` and ``z``.
+
+    Parameters
+    ----------
+    modes
+        Of the upper body.
+    mass, damping
+        Of the lower body [kg, N·s/m]; a mass of 0 is one that no force moves.
+    duration
+        Of the run [s].
+    """
+
+    def __init__(self, modes: Modes, mass: float, damping: float, duration: float) -> None:
+        self.terms = Terms.of(modes, duration)
+        self.u = self.v = self.y = self.z = 0.0
+        #: Of both ends [1/kg].
+        self.mobility = float(modes[2] @ modes[2])
+        self.per_mass = 1.0 / mass if mass > 0.0 else 0.0
+        self._resists = self.per_mass * damping
+        #: What a jump of the tip by 1 N·s² adds to the terms, and to v.
+        self._jump = self.terms.impulse * self.terms.rates
+        self._resisted = float((self.terms.shown[1] @ self._jump).real)
+        self._values = np.zeros(len(self._jump), complex)
+        self._pairs = self._values.view(float)
+        self._moves = cache(self._move)
+        #: The force [N], the impulse [N·s] and the shift [N·s²] of this step that the terms do not have yet.
+        self._due = [0.0, 0.0, 0.0]
+        self._added = np.zeros((3, len(self._pairs)))
+
+    def _move(self, H: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[float, float], tuple[float, float]]:
+        """Return what a step of ``H`` [s] makes of the terms, and of u and v in these.
+
+        Further, in rows, what its end adds to the terms: of a constant force of 1 N, of an impulse of 1 N·s, and of
+        1 N·s², which moves a free mass, of the modes that the step follows; and what force and shift add to u and v.
+        """
+        rates, impulse, shown, stiffness, damping = self.terms
+        moved = np.exp(rates * H)
+        by_force = impulse * np.expm1(rates * H) / rates
+        follows = 1.0 / (1.0 + 0.5 * H * (damping + 0.5 * H * stiffness))
+        shifted = moved * (self._jump + damping * impulse) * follows
+        at_end = _reals(np.conj(shown * moved))
+        added = _reals(np.array([by_force, impulse, shifted]))
+        force_moves, shift_moves = ((shown @ terms).real.tolist() for terms in (by_force, shifted))
+        return moved, at_end, added, force_moves, shift_moves
+
+    def drift(self, H: float, stiffness: float, per_mass: float, shift: float = 0.0) -> tuple[float, float]:
+        """Advance by ``H`` [s] without a force, the lower end by the midpoint rule.
+
+        Return y − u at the end [m], and by how much `act` with 1 N reduces it. ``shift`` [N·s²] moves free masses
+        besides. ``stiffness`` is the spring's over its mass [1/s²], ``per_mass`` that of the lower end [1/kg], 0 while
+        the foundation holds it.
+        """
+        if any(self._due):
+            self._pairs += np.array(self._due).dot(self._added)
+        moved, at_end, self._added, self._by_force, by_shift = self._moves(H)
+        self._due = [0.0, 0.0, shift]
+        u, v = at_end.dot(self._pairs).tolist()
+        self._values *= moved
+        self.u = u + shift * by_shift[0]
+        self.v = v + shift * by_shift[1]
+        self.y -= shift * per_mass
+        half = 0.5 * H
+        slow = 1.0 / (1.0 + half * (self._resists + half * stiffness))
+        mean = slow * (self.z - half * stiffness * self.y)
+        self.y += H * mean
+        self.z = 2.0 * mean - self.z
+        faster = H * slow * per_mass
+        self._lower = half * faster, faster
+        return self.y - self.u, self._by_force[0] + half * faster
+
+    def act(self, C: float) -> None:
+        """Let the mean force ``C`` [N] act over the step of the last `drift`, too."""
+        self._due[0] += C
+        self.u += C * self._by_force[0]
+        self.v += C * self._by_force[1]
+        self.y -= C * self._lower[0]
+        self.z -= C * self._lower[1]
+
+    def add(self, terms: np.ndarray, u: float, v: float, y: float, z: float) -> None:
+        """Add what something else does over the step of the last `drift`."""
+        self._values += terms
+        self.u += u
+        self.v += v
+        self.y += y
+        self.z += z
+
+    def kick(self, impulse: float, per_mass: float) -> None:
+        """Let an ``impulse`` [N·s] lift the tip and press the lower end; ``per_mass`` as of `drift`."""
+        self._due[1] += impulse
+        self.v += impulse * self.mobility
+        self.z -= impulse * per_mass
+
+    def kick_apart(self, apart: float, per_mass: float) -> None:
+        """Let v − z be ``apart`` [m/s] by an impulse; ``per_mass`` as of `drift`."""
+        self.kick((apart - self.v + self.z) / (self.mobility + per_mass), per_mass)
+
+    def rebound(self, share: float, turns: float, most: float) -> None:
+        """Change the errors of the lower end by a `springbeam.run.errors.strokes.Strokes` of the foundation."""
+        self.z = share * self.z + max(-most, min(turns * self.y, most))
+        self.y *= share
+
+    def rebound_of_tip(self, share: float, turns: float, most: float) -> None:
+        """Change those of the tip; the impulse that is earlier or later moves the beam besides."""
+        jump = (share - 1.0) * self.u / self.mobility
+        change = (share - 1.0) * self.v + max(-most, min(turns * self.u, most))
+        self._values += jump * self._jump
+        self.u *= share
+        self.v += jump * self._resisted
+        self.kick(change / self.mobility, 0.0)
+
+
+def _reals(values: np.ndarray) -> np.ndarray:
+    """Return complex ``values`` as pairs of reals."""
+    return np.ascontiguousarray(values).view(float)

@@ -1,0 +1,60 @@
+"""The part of a load that a step leaves out: it takes the projection of the load onto polynomials of degree 2.
+
+What is left out (`springbeam.run.loads`) hardly moves what is slow, but a mode that turns far in a step may be in
+resonance with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...scene.loads import Load, TableLoad
+from .ends import Terms
+from .steps import Steps
+
+#: Radians of a term, or lines of a table, per point of the quadrature of a load over a step; its points, at least and
+#: at most.
+_DENSE = 1.0
+_POINTS = (8, 96)
+#: Slowest terms of a body that loads move, and steps of one array, which so needs little memory.
+_MOVED = 40
+_TOGETHER = 1024
+_NORMS = [0.5, 1.5, 2.5]
+
+
+def left_out(loads: Sequence[tuple[Load, float]], terms: Terms, steps: Steps, quiet: float) -> np.ndarray | None:
+    """Return what the part of ``loads`` that each step leaves out adds to the terms of a body, (n of the steps, terms).
+
+    The loads come with the force that each unit of them is at the end [N]. ``None`` where they move no end by ``quiet``
+    [m].
+    """
+    loads = [(load, force) for load, force in loads if force > 0.0]
+    if not loads:
+        return None
+    slow = np.argsort(np.abs(terms.rates))[:_MOVED]
+    turns = float(np.abs(terms.rates[slow]).max()) + max(_changes(load) for load, _ in loads)
+    points = int(np.clip(_DENSE * turns * float(steps.size.max()), *_POINTS))
+    nodes, shares = np.polynomial.legendre.leggauss(points)
+    P = np.polynomial.legendre.legvander(nodes, 2)
+    found = np.zeros((len(steps.size), len(terms.rates)), complex)
+    moved = 0.0
+    for first in range(0, len(steps.size), _TOGETHER):
+        some = slice(first, first + _TOGETHER)
+        half = 0.5 * steps.size[some, None]
+        left = half * (1.0 - nodes)
+        signal = sum(force * load.value(steps.ends["time"][some, None] - left) for load, force in loads)
+        missing = (signal - (signal * shares) @ P * _NORMS @ P.T) * shares * half
+        moved += float(np.abs(missing).sum())
+        for k in slow.tolist():
+            found[some, k] = terms.impulse[k] * (missing * np.exp(terms.rates[k] * left)).sum(axis=1)
+    bound = moved * float(np.abs(terms.shown[0] * terms.impulse)[slow].sum())
+    return found if bound > quiet else None
+
+
+def _changes(load: Load) -> float:
+    """Return how many radians it turns, or lines of its table it has, in a second."""
+    if isinstance(load, TableLoad):
+        return len(load.record.x) / float(np.ptp(load.record.x))
+    return load.rate

@@ -1,0 +1,40 @@
+"""The steps of a run, without the rows of events that end no step."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...motion.paths import Path
+
+
+class Steps(NamedTuple):
+    """Records of steps (`springbeam.results.steps.STEP`), (n,) each."""
+
+    before: np.ndarray  #: at the start of each step
+    ends: np.ndarray  #: at its end
+    last: np.ndarray  #: at its end, after all events there
+    size: np.ndarray  #: [s]
+
+    @classmethod
+    def of(cls, records: np.ndarray) -> Steps:
+        """Return those of all ``records`` of a run."""
+        made = np.flatnonzero(records["size"] > 0.0)
+        last = np.append(made[1:], len(records)) - 1
+        return cls(records[made - 1], records[made], records[last], records["size"][made])
+
+
+def path_of(steps: Steps, position: str, velocity: str) -> Any:
+    """Return the path of a ``position`` inside each step, the coefficients of `Path`, shape (6, n)."""
+    size: Any = steps.size
+    start: Any = steps.before[f"{position}_after"], steps.before[f"{velocity}_after"]
+    end: Any = steps.ends[position], steps.ends[velocity]
+    means: Any = steps.ends[f"{position}_integral"] / size, steps.ends[f"{position}_integral_2"] / size**2
+    powers: Any = Path.through(start, end, size, means).powers
+    return np.array(powers)
+
+
+def penetration(steps: Steps) -> Any:
+    """Return the path of y − u inside each step, as of `path_of`."""
+    return path_of(steps, "y", "z") - path_of(steps, "u_tip", "v_tip")

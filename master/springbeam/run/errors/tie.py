@@ -1,0 +1,36 @@
+"""What ties leave open inside steps: ends that have one position at each row, and a gap between two."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...motion.paths import derivative, value
+from ...results.steps import force, joined
+from .steps import Steps, penetration
+
+
+class Tie(NamedTuple):
+    """What is known of each step of ends that a rigid law joins, (n,) each but the first."""
+
+    places: list[list[list[float]]]  #: y − u [m] and its rate [m/s] at the ends of equal parts of each step
+    tied: np.ndarray  #: whether the ends are joined over the step
+    tied_after: np.ndarray  #: and after its events
+    apart: np.ndarray  #: v − z after these [m/s]
+    pull: np.ndarray  #: C/ẏ where a tie is released at the end of the step: the impulse by an error of y [N·s/m]
+
+
+def tie(steps: Steps, degree: int, quiet: float) -> Tie:
+    """Return it for forces of this ``degree``; steps whose gap stays below ``quiet`` [m] have one part."""
+    parts = degree + 2  # one more than the step has forces
+    path = penetration(steps)
+    slope = derivative(path)
+    shares = (np.arange(parts) + 1.0) / parts
+    inside = np.array([[value(path, s), value(slope, s) / steps.size] for s in shares]).transpose(2, 0, 1)
+    whole = np.abs(inside[:, :, 0]).max(axis=1) <= quiet
+    places = [part[-1:] if one else part for part, one in zip(inside.tolist(), whole.tolist(), strict=True)]
+    released = (steps.before["phase"] == 1.0) & (steps.last["phase"] == 0.0) & (steps.ends["z"] != 0.0)
+    pull = np.divide(force(steps.ends, steps.size), steps.ends["z"], out=np.zeros(len(whole)), where=released)
+    apart = steps.last["v_tip_after"] - steps.last["z_after"]
+    return Tie(places, joined(steps.before), joined(steps.last), apart, pull)
