@@ -1,6 +1,7 @@
 #include "equation_of_motion.hpp"
 
 #include <cmath>
+#include <limits>
 
 namespace spring {
 namespace {
@@ -68,6 +69,28 @@ void EquationOfMotion::extend(Expansion& motion, bool touching, const Loads& loa
                        contact.elastic[k] - contact.damping[k];
   x[++highest] = force / mass_ * size * size / ((n + 1.0) * (n + 2.0));
   depth[highest] += x[highest];
+}
+
+double EquationOfMotion::residual(const Expansion& motion, bool touching, const Loads& loads, double size) const {
+  constexpr double rounding = 4.0 * std::numeric_limits<double>::epsilon();
+  double x = 0.0, rate = 0.0, depth = 0.0, depth_rate = 0.0, acceleration = 0.0, magnitude = 0.0;
+  for (std::size_t k = 0; k < motion.highest; ++k) {
+    const double n = static_cast<double>(k), second = n * (n - 1.0) * motion.x[k];
+    x += motion.x[k];
+    rate += n * motion.x[k];
+    depth += motion.depth[k];
+    depth_rate += n * motion.depth[k];
+    acceleration += second;
+    magnitude += std::abs(second);
+  }
+  const double contact = touching ? compliance_.continued(depth, depth_rate / size).force : 0.0;
+  const double per_force = size * size / mass_;
+  for (const double force : {value(loads.force, 1.0), -k1_ * x, -k2_ * x * x * x, -damping_ * rate / size, -contact}) {
+    acceleration -= per_force * force;
+    magnitude += per_force * std::abs(force);
+  }
+  const double left = std::abs(acceleration) - rounding * magnitude;
+  return left <= 0.0 ? 0.0 : left;
 }
 
 EquationOfMotion::Rates EquationOfMotion::rates(double reach, const Compliance::Slopes& contact) const {

@@ -51,6 +51,9 @@ class EquationOfMotion {
 
   /// Adds one coefficient to the motion; loads and size are those that it began with.
   void extend(Expansion& motion, bool touching, const Loads& loads, double size) const;
+  /// What the motion below its highest coefficient leaves of the equation at s = 1, as H² |ÿ| [m]; 0 if that is
+  /// rounding, NaN if it leaves the range of numbers.
+  double residual(const Expansion& motion, bool touching, const Loads& loads, double size) const;
 
   /// Bounds of the rates with which the solution can change, for |x| ≤ `reach`: √(stiffness/m), damping/m [1/s].
   struct Rates {

@@ -47,7 +47,7 @@ const FlightEnd& Flight::run(const Start& start) {
     rates = this->rates(motion);
   }
   if (in_parts)
-    follow(motion, rates.oscillation);
+    follow(motion);
   else
     integrate();
   return reached_;
@@ -69,7 +69,11 @@ Expansion Flight::expand(double size) {
   for (touching_ = false;; touching_ = true) {
     Expansion motion(equation_.elongation(start_.y), start_.z, start_.depth, loads_, size);
     while (motion.highest <= least_order) equation_.extend(motion, touching_, loads_, size);
-    if (start_.released) motion.x[2] = 0.0;
+    if (start_.released) {  // what the force leaves there is rounding
+      start_.loads.force[0] -= 2.0 * equation_.mass() * motion.x[2] / (size * size);
+      loads_ = start_.loads.scaled(size);
+      motion.x[2] = 0.0;
+    }
     if (touching_ || !parameters_.compliant() || direction(motion.depth) <= 0.0) return motion;
   }
 }
@@ -100,31 +104,28 @@ bool Flight::analytic(const Expansion& motion) const {
   return smooth_power && (!law.damped() || 2.0 * change_of_rate < std::abs(law.release_speed() + depth[1] / size_));
 }
 
-/// An upper estimate of the terms that are left out. A power law carries each coefficient on over as many orders as its
-/// exponent says, those between may be 0.
-double Flight::neglected(const Expansion& motion, double oscillation) const {
-  const std::size_t k = motion.highest;
-  const Series& c = touching_ ? motion.depth : motion.x;
-  double before = 0.0;
-  for (std::size_t j = k - Compliance::highest_power; j < k; ++j) before = std::max(before, std::abs(c[j]));
-  return static_cast<double>(k) * std::abs(c[k]) + size_ * oscillation * (size_ * oscillation) * before;
-}
-
-void Flight::follow(Expansion& motion, double oscillation) {
+/// The series ends where the first coefficient that it leaves out is small, and the equation of motion at the part's
+/// end shows no more of the others: from rest those of a power law or of a cubic spring are 0 up to a high order.
+void Flight::follow(Expansion& motion) {
   auto& x = motion.x;
-  const double part = std::max(share * parameters_.relative_tolerance, least_share);
   const Series& c = touching_ ? motion.depth : x;
+  const double part = std::max(share * parameters_.relative_tolerance, least_share);
   const auto allowed = [&] {
     return part * std::max({std::abs(c[1]), std::abs(c[2]), std::abs(c[3]), std::abs(c[4])});
   };
-  const auto excess = [&] { return neglected(motion, oscillation) > allowed(); };
+  const auto neglected = [&] {
+    const double n = static_cast<double>(motion.highest), first = n * std::abs(c[motion.highest]);
+    return first > allowed() ? first : equation_.residual(motion, touching_, loads_, size_) / (n - 1.0);
+  };
+  const auto excess = [&] { return !(neglected() <= allowed()); };
   while (motion.highest <= max_order && excess()) equation_.extend(motion, touching_, loads_, size_);
   while (excess()) {
-    const double root = std::pow(allowed() / neglected(motion, oscillation), 1.0 / max_order);
+    const double root = std::pow(allowed() / neglected(), 1.0 / max_order);
     if (!(root > 0.0)) throw SolverError(out_of_range);
     const double shorter = std::min(root, least_shortening);
     motion.shorten(shorter);
     size_ *= shorter;
+    loads_ = start_.loads.scaled(size_);
   }
   const int order = static_cast<int>(motion.highest) - 1;
 

@@ -24,8 +24,7 @@ class Flight {
   Expansion expand(double size);
   EquationOfMotion::Rates rates(const Expansion& motion) const;
   bool analytic(const Expansion& motion) const;
-  double neglected(const Expansion& motion, double oscillation) const;
-  void follow(Expansion& motion, double oscillation);
+  void follow(Expansion& motion);
   void integrate();
   double dissipated(const Expansion& motion, int order, double s) const;
 

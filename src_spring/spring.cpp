@@ -193,6 +193,7 @@ Spring::Reached Spring::step_to_event(double size, const Inputs& inputs, double 
 }
 
 void Spring::strike(double time) {
+  if (state_.z >= 0.0) return;  // it rests, or leaves: the next step finds out under the inputs as they then change
   Step step(*this, time, 0.0, {{state_.observed.force, 0.0, 0.0}, tip()});
   step.arrive();
   state_ = step.state();

@@ -44,7 +44,7 @@ class Spring {
   /// The same step, if `to_event` only to the first event after its start: contact begins or ends, the top meets the
   /// foundation or leaves it. What happens there is due in strike() or at the start of the next step.
   Reached step_to_event(double size, const Inputs& inputs, double time, bool to_event);
-  /// At the foundation inside: rebound, or stay seated, at `time`, under the inputs as observed.
+  /// Falling onto the foundation inside: rebound, or come to rest, at `time`, under the inputs as observed.
   void strike(double time);
 
   /// Take `inputs` as acting at the present instant, for acceleration(), reaction() and contact_energy() before the

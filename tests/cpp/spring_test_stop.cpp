@@ -136,6 +136,8 @@ TEST(SpringStop, LeavesWhenTheForceTurns) {
   EXPECT_NEAR(early.stop_force(), 5.0, 1e-11);  // the mean up to there
   EXPECT_FALSE(early.seated());
   EXPECT_NEAR(early.acceleration(), 0.0, 1e-11);
+  early.strike(0.2);  // nothing strikes where it leaves, though N is 0 to rounding
+  EXPECT_FALSE(early.seated());
 }
 
 // Falls for T, then lies at 0: ∫y = ⅔hT, ∫∫y = 5/12 hT² + ⅔hT (1 − T).
