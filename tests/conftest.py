@@ -22,11 +22,14 @@ from matplotlib.figure import Figure
 
 import springbeam.api  # attaches what a trajectory can do
 from springbeam.bodies.fmu import release
+from springbeam.monolithic import event_driven
 
 ROOT = Path(__file__).resolve().parents[1]
 
 # The folders of the helper modules: commands.py here, the others beside the tests that use them.
 sys.path[:0] = [str(ROOT / "tests" / folder) for folder in (".", "master", "system")]
+
+from references import reference  # noqa: E402
 
 # Every run of the tests draws the same examples, however busy the machine, whatever an earlier run has found.
 hypothesis.settings.register_profile("springbeam", derandomize=True, database=None, deadline=None)
@@ -62,6 +65,12 @@ def none_kept():
 
 
 @pytest.fixture
+def kept_references(monkeypatch):
+    """Commands and studies take the references that an earlier run of the tests has kept, if the code is the same."""
+    monkeypatch.setattr(event_driven, "integrate", reference)
+
+
+@pytest.fixture
 def unpainted(monkeypatch):
     """Pictures are composed and their files made, but nothing is painted: that is most of the time a command takes.
 
@@ -92,8 +101,8 @@ def y_by_the_master(**coupling):
     return np.interp(np.arange(1, 401) * 1e-3, run.time, run.y)
 
 
-@pytest.fixture(scope="session")
-def reference():
+@pytest.fixture(scope="session", name="reference")
+def y_of_the_pair():
     """In steps so short that the event-driven solver, which takes twenty times as long, is 6e-9 m off."""
     return y_by_the_master(macro_step=2.5e-4, degree=2)
 

@@ -105,13 +105,13 @@ def test_a_spring_that_runs_away_is_the_cause_not_the_step_that_follows_it():
 
 
 def test_fine_data_ends_no_steps(tmp_path):
-    """A record of 3601 lines, as of a shaken base: steps are as long as the error allows, and the rows keep it."""
-    times = np.linspace(0.0, 0.9, 3601)
+    """A record of 1201 lines, as of a shaken base: steps are as long as the error allows, and the rows keep it."""
+    times = np.linspace(0.0, 0.3, 1201)
     record = sum(np.sin(2.0 * np.pi * f * times + f) / f for f in (3.0, 7.0, 13.0, 23.0))
     np.savetxt(tmp_path / "record.csv", np.column_stack([times, record]), delimiter=",")
     scene = with_changes(
         load_scene("soft"),
-        time={"t_end": 1.0},
+        time={"t_end": 0.35},
         beam={"n_elements": 10, "n_modes": 6, "alpha_b": 1e-3, "initial_velocity_slope": 0.0, "approach": "elastic"},
         spring={"damping": 0.5},
         stop=None,
@@ -119,12 +119,12 @@ def test_fine_data_ends_no_steps(tmp_path):
         loads=[{"on": "base", "signal": "table", "file": str(tmp_path / "record.csv"), "amplitude": 20.0}],
     )
     every_line = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": 2.5e-4}))
-    assert every_line.summary["macro_steps"] >= 4000
-    for tolerance, most in ((1e-4, 130), (1e-6, 400)):
+    assert every_line.summary["macro_steps"] >= 1400
+    for tolerance, most in ((1e-4, 46), (1e-6, 140)):
         sizes = {"macro_step": None, "relative_tolerance": tolerance, "absolute_tolerance": 1e-2 * tolerance}
         run = simulate(with_changes(scene, coupling={"degree": 2, **sizes}))
         assert run.summary["macro_steps"] < most
-        assert 0.9 in run.time  # where it ends, the load jumps
+        assert 0.3 in run.time  # where it ends, the load jumps
         at_rows = every_line.at(run.time)
         for name in ("u_tip", "y"):
             assert np.abs(run[name] - at_rows[name]).max() < tolerance * np.ptp(every_line[name])

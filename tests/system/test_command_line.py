@@ -18,14 +18,14 @@ from springbeam.cli import app
 from springbeam.scene import load_scene
 from springbeam.studies.stability.grid import Grid
 
-pytestmark = pytest.mark.usefixtures("unpainted")
+pytestmark = pytest.mark.usefixtures("unpainted", "kept_references")
 
 #: Arguments of each command that make it print its tables within a second or two.
 TABLES = {
     "scenes": "",
     "keys": "",
     "new": "my_scene",
-    "run": "soft --no-plots",
+    "run": "soft --no-plots --set time.t_end=0.1",
     "paper": "2 --no-plots --set beam.n_elements=10 --set beam.n_modes=0 --set time.t_end=0.55",
     "sweep": "duffing --vary spring.mass=0.5,1 --set time.t_end=1 --scheduler {scheduler} --out varied",
     "compare": "done done --out compared.png",
@@ -64,7 +64,7 @@ def place(tmp_path_factory):
     """A folder with a run that is done."""
     with pytest.MonkeyPatch.context() as there:
         there.chdir(tmp_path_factory.mktemp("place"))
-        printed("run", "soft", "--no-plots", "--out", "done")
+        printed("run", "soft", "--no-plots", "--set", "time.t_end=0.1", "--out", "done")
         curve = simulate(load_scene("duffing", ["time.t_end=1"])).y[:101:8]
         noisy = curve + 0.01 * np.random.default_rng(1).standard_normal(len(curve))
         rows = "".join(f"{0.08 * k:.2f},{value}\n" for k, value in enumerate(noisy))
@@ -187,8 +187,6 @@ def test_a_function_of_the_callers_gets_a_run_with_its_methods(tmp_path):
     """In a process of its own: here the tests have loaded all there is."""
     (tmp_path / "mine.py").write_text("def height(run):\n    return float(run.at([0.1])['y'][0])\n")
     springbeam = (sys.executable, "-m", "springbeam")
-    line = ("sweep", "duffing", "--no-plots", "--set", "time.t_end=0.2", "--vary", "spring.mass=1,2")
+    line = ("sweep", "duffing", "--no-plots", "--set", "time.t_end=0.2", "--vary", "spring.mass=1")
     ran(*springbeam, *line, "--metric", "high=mine:height", "--out", "s", cwd=tmp_path)
-    assert min(swept(tmp_path / "s")["high"]) > 0.0
-    line = ("crosscheck", "duffing", "--no-plots", "--set", "time.t_end=0.2")
-    assert "agrees" in ran(*springbeam, *line, cwd=tmp_path)
+    assert swept(tmp_path / "s")["high"][0] > 0.0

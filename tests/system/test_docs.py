@@ -157,7 +157,7 @@ def test_a_line_that_is_not_printed_is_found(text, wrong):
 
 
 @pytest.mark.parametrize("page", shell_pages(), ids=lambda page: page.name)
-def test_commands_of_the_documentation_run(desk, page, unpainted, monkeypatch):
+def test_commands_of_the_documentation_run(desk, page, unpainted, kept_references, monkeypatch):
     """They end well, complain of nothing, and print what the block ``console`` after them shows."""
     monkeypatch.chdir(desk)
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")

@@ -3,11 +3,9 @@
 import functools
 import importlib
 import os
-import re
 import signal
 import threading
-from contextlib import nullcontext, suppress
-from itertools import product
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from time import sleep
@@ -32,18 +30,23 @@ STIFFNESS, DAMPING = 50.0, 0.1
 #: Names that a scene may leave out, each with what stands on it.
 WITHOUT = {"nothing": (), "velocity, impulse": ("velocity", "impulse")}
 BAD = scenes.table("bad_inputs.toml")["fmus"]
-#: What an FMU does after 1.5 s, and the cause that is told.
+#: What an FMU does after 1.5 s, and the cause that is named.
 LATE = BAD["late"]
 ENERGIES = ("kinetic_energy", "potential_energy", "dissipated_energy", "load_potential")
 
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory):
+    """Write an FMU; another one takes its place at the same path, so that one process serves them all."""
     folder = tmp_path_factory.mktemp("foreign")
+    written = {}
 
-    @functools.cache
-    def make(name="oscillator", **said):
-        return str(oscillator.made(folder / f"{name}.fmu", **said))
+    def make(name="oscillator", **made):
+        path = folder / f"{name}.fmu"
+        if written.get(name) != made:
+            oscillator.made(path, **made)
+            written[name] = made
+        return str(path)
 
     return make
 
@@ -165,13 +168,13 @@ HEAVY = {
 }
 
 
-FALLS, STARTS = (-0.01, 0.5), (0.0, 0.0)  #: position and restitution of a foundation that it falls or starts on
-
-
-@pytest.mark.parametrize(("heavy", "stop"), [*product(HEAVY, [FALLS]), *product(list(HEAVY)[:2], [STARTS])])
-def test_the_seated_force_is_the_body_s(fmu, heavy, stop):
-    """It comes to rest on the foundation, which bears 8 N + k φ."""
-    (tables, k), (position, restitution) = HEAVY[heavy], stop
+@pytest.mark.parametrize(
+    ("heavy", "position", "restitution"),
+    [*((heavy, -0.01, 0.5) for heavy in HEAVY), ("by the FMU", 0.0, 0.0), ("by a load", 0.0, 0.0)],
+)
+def test_the_seated_force_is_the_body_s(fmu, heavy, position, restitution):
+    """It falls or starts on the foundation and comes to rest on it; the foundation bears 8 N + k φ."""
+    tables, k = HEAVY[heavy]
     scene = pair(
         fmu(),
         beam={"element": "point_mass", "mass": 1e-3, "displacement": 5.0, "velocity": 0.0},
@@ -189,7 +192,8 @@ def test_the_seated_force_is_the_body_s(fmu, heavy, stop):
 
 @pytest.mark.parametrize(("scheme", "version"), [("jacobi", "2.0"), ("gauss_seidel", "2.0"), ("jacobi", "3.0")])
 def test_without_state_saving_values_are_exchanged(fmu, scheme, version):
-    path, spring = fmu(f"plain{version}", version=version, state=False, slopes=False), dict.fromkeys(ENERGIES)
+    path = fmu(version=version, state=False, slopes=False)
+    spring = dict.fromkeys(ENERGIES)
     errors = []
     for size in (2e-3, 1e-3):
         coupling = {"scheme": scheme, "degree": 0, "macro_step": size}
@@ -200,43 +204,35 @@ def test_without_state_saving_values_are_exchanged(fmu, scheme, version):
 
 
 def test_steps_of_one_size_stay_of_one_size(fmu):
-    run = simulate(pair(fmu("fixed", variable=False), contact=TIE, coupling={"degree": 0}))
+    run = simulate(pair(fmu(variable=False), contact=TIE, coupling={"degree": 0}))
     assert run.events[0].kind == "impact"  # where steps may have any size, the next one is short
     assert np.diff(run.time[run.time > 0.0]) == pytest.approx(0.02, rel=1e-9)
     assert run.summary["max_interface_residual"] < 1e-12
     with pytest.raises(SceneError, match=r"t_end = 0\.99: .*use a multiple of .*macro_step = 0\.02"):
-        simulate(pair(fmu("fixed", variable=False), time={"t_end": 0.99}, coupling={"degree": 0}))
+        simulate(pair(fmu(variable=False), time={"t_end": 0.99}, coupling={"degree": 0}))
     pulse = {"on": "tip", "signal": "half_sine", "start": 0.1, "duration": 0.3}
-    steps = np.diff(simulate(pair(fmu("fixed", variable=False), loads=[pulse], coupling={"degree": 0})).time)
+    steps = np.diff(simulate(pair(fmu(variable=False), loads=[pulse], coupling={"degree": 0})).time)
     assert steps == pytest.approx(0.02, rel=1e-9)
     pulse["duration"] = 0.25
     with pytest.raises(
         SceneError, match=r"loads\]\]: a step ends where each jumps or bends: .*use a multiple of .*macro_step = 0\.02"
     ):
-        simulate(pair(fmu("fixed", variable=False), loads=[pulse], coupling={"degree": 0}))
+        simulate(pair(fmu(variable=False), loads=[pulse], coupling={"degree": 0}))
 
 
-@pytest.mark.parametrize("what", BAD["lacks"])
-def test_a_missing_capability_is_named_with_what_would_work(fmu, what):
-    changes = dict(BAD["lacks"][what])
-    words, made = changes.pop("said"), changes.pop("fmu", {})
-    changes = scenes.without_false(changes)
-    changes.setdefault("contact", {"damping": 0.0})
-    with pytest.raises(SceneError) as caught:
-        simulate(pair(fmu("plain", **made) if made else fmu(), **changes))
-    lines = str(caught.value).splitlines()
-    assert any(all(text in line for text in (*words, "[spring]")) for line in lines)
-
-
-@pytest.mark.parametrize("lie", BAD["lies"])
-def test_an_fmu_that_lies_is_found_before_the_run(fmu, lie):
-    said = BAD["lies"][lie]
-    parameters = {"m": M2, "k": K, "lie": oscillator.LIES[lie]}
-    path = fmu("three", version="3.0") if "fmi3" in said else fmu()
-    with pytest.raises(FmuError) as caught:
-        simulate(pair(path, spring={"parameters": parameters}, coupling={"degree": 0}))
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
+@pytest.mark.parametrize("what", BAD["refused"])
+def test_an_fmu_that_cannot_be_used_is_refused_before_the_run(fmu, what):
+    made = dict(BAD["refused"][what].get("fmu", {}))
+    if "units" in made:
+        made["edits"] = oscillator.in_units("s", made.pop("units"), made.pop("bases", {}))
+    case = scenes.without_false(BAD["refused"][what])
+    case.pop("fmu", None)
+    if "lie" in case:
+        case["spring"] = {"parameters": {"m": M2, "k": K, "lie": oscillator.LIES[case.pop("lie")]}}
+    said = case.pop("said")
+    with pytest.raises((FmuError, SceneError)) as caught:
+        simulate(pair(fmu(**made), **case))
+    assert any(all(text in line for text in said) for line in str(caught.value).splitlines())
 
 
 def test_an_fmu_that_refuses_short_steps_is_used_with_long_ones(fmu):
@@ -250,7 +246,7 @@ def test_an_fmu_that_refuses_short_steps_is_used_with_long_ones(fmu):
 def test_an_fmu_knows_when_the_run_ends(fmu, version):
     """It refuses steps beyond its stop time, and all if it has none."""
     spring = {"parameters": {"m": M2, "k": K, "lie": oscillator.LIES["past"]}}
-    run = simulate(pair(fmu(f"ends{version}", version=version), spring=spring, coupling={"degree": 0}))
+    run = simulate(pair(fmu(version=version), spring=spring, coupling={"degree": 0}))
     assert (run.summary["status"], run.time[-1]) == ("done", 1.0)
 
 
@@ -258,20 +254,7 @@ def test_a_guess_is_set(fmu):
     before = 'name="x0" valueReference="14" causality="'
     edit = (f'{before}parameter" variability="fixed"', f'{before}local" variability="continuous" initial="approx"')
     spring = {"parameters": {"m": M2, "k": 0.0, "x0": -0.5}}
-    assert simulate(pair(fmu("guessed", edits=(edit,)), spring=spring)).y[0] == -0.5
-    constant = (f'{before}parameter" variability="fixed"', f'{before}local" variability="constant" initial="exact"')
-    with pytest.raises(FmuError, match="variable 'x0' is constant, not a parameter"):
-        simulate(pair(fmu("constant", edits=(constant,)), spring=spring))
-
-
-ONCE = ('modelIdentifier="oscillator"', 'modelIdentifier="oscillator" canBeInstantiatedOnlyOncePerProcess="true"')
-
-
-def test_an_fmu_that_a_process_instantiates_once_has_a_process_for_each_instance(fmu):
-    path = fmu("once", edits=(ONCE, ('guid="oscillator"', 'guid="once"')))
-    scene = pair(path, coupling={"degree": 0, "macro_step": 1e-3}, time={"t_end": 0.01})
-    first, second = simulate(scene), simulate(scene)
-    assert first.y.tobytes() == second.y.tobytes()
+    assert simulate(pair(fmu(edits=(edit,)), spring=spring)).y[0] == -0.5
 
 
 #: Units of an FMU that counts in mm, ms and kN, its masses in kg: SI units of each.
@@ -299,11 +282,10 @@ UNITS = {
 
 def test_units_that_an_fmu_declares_are_converted(fmu, tmp_path):
     """F [kN] = m [kg] a [mm/ms²], k [kN/mm] and c [kN ms/mm]: 1e-6 and 1e-3 of their values in SI units."""
-    path = fmu("millimetres", edits=oscillator.in_units("ms", UNITS, BASES))
+    path = fmu(edits=oscillator.in_units("ms", UNITS, BASES))
     scene = pair(path, spring={"parameters": {"m": M2, "k": 1e-6 * K, "c": 1e-3 * C}})
     run = simulate(scene)
     assert error(run, linked) < 1e-9
-    assert run["e_spring"] == pytest.approx(simulate(pair(fmu())).e_spring, rel=1e-9, abs=1e-12)
     tie = {"spring": {"parameters": {"m": M2, "k": 1e-6 * K, "c": 1e-3 * C}}, "contact": TIE}
     assert error(simulate(pair(path, **tie)), tied) < 1e-12  # by an impulse
     file = tmp_path / "scene.toml"
@@ -312,16 +294,12 @@ def test_units_that_an_fmu_declares_are_converted(fmu, tmp_path):
     assert "the time is in ms, that is 0.001 s" in shown
     assert "x is in mm, that is 0.001 m" in shown
     assert "SI units are assumed" not in shown
+    assert run["e_spring"] == pytest.approx(simulate(pair(fmu())).e_spring, rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.parametrize("what", BAD["units"])
-def test_a_unit_of_something_else_is_refused(fmu, what):
-    case = BAD["units"][what]
-    edits = oscillator.in_units(
-        "s", {case["name"]: case["unit"]}, {case["unit"]: case["base"]} if "base" in case else {}
-    )
-    with pytest.raises(FmuError, match=re.escape(case["said"])) if "said" in case else nullcontext():
-        simulate(pair(fmu(what, edits=edits)))
+def test_si_units_are_known_by_their_names(fmu):
+    path = fmu(edits=oscillator.in_units("s", {"ix": "m.s", "F": "kg.m/s^2"}, {}))
+    assert error(simulate(pair(path)), linked) < 1e-9
 
 
 def test_the_body_that_the_page_builds_by_python_fmu_is_the_element(tmp_path, monkeypatch):
@@ -331,18 +309,9 @@ def test_the_body_that_the_page_builds_by_python_fmu_is_the_element(tmp_path, mo
     python = page.built(tmp_path)
     below = page.body(python, m=1.0, k=30.0, c=0.5)
     above = page.body(python, m=2.0, k=30.0, c=0.5, v0=-0.5)
-    for upper in ({"element": "point_mass", "mass": 2.0, "velocity": -0.5}, above):
-        run, _, apart = page.compared(upper, below, page.LINK)
-        assert apart < 1e-11
-        assert run.summary["max_interface_residual"] < 1e-11
-
-
-@pytest.mark.parametrize(("version", "lacks"), [("2.0", "fmi2DoStep"), ("3.0", "fmi3SetFMUState")])
-def test_a_function_that_is_needed_and_missing_is_named(fmu, version, lacks):
-    """Functions that no run needs are missing in every FMU of these tests."""
-    path = fmu(f"without {lacks}", version=version, lacks=lacks)
-    with pytest.raises(FmuError, match=f"its library lacks {lacks}; export it"):
-        simulate(pair(path, coupling={"degree": 0}))
+    run, _, apart = page.compared(above, below, page.LINK)
+    assert apart < 1e-11
+    assert run.summary["max_interface_residual"] < 1e-11
 
 
 @pytest.fixture
@@ -369,17 +338,16 @@ def hanging(monkeypatch):
     return hangs
 
 
-@pytest.mark.usefixtures("hanging")
-def test_an_fmu_that_hangs_is_given_up(fmu):
-    said = r"has not returned within 20 s from its step at t = 0\.\d+ s of the check before the run"
-    with pytest.raises(FmuError, match=said):
-        simulate(pair(fmu(), spring={"parameters": {"lie": oscillator.LIES["hang"]}}))
-
-
 def test_a_process_waits_for_the_next_body_of_its_file(fmu, monkeypatch):
-    """One that has crashed does not, and the one that has waited longest makes room for another."""
+    """The one that has waited longest makes room for another.
+
+    One that has crashed does not wait, nor one that may have one instance only.
+    """
+    monkeypatch.setattr(isolated, "_MOST_IDLE", 1)
+    monkeypatch.setattr(isolated.FmuProcess, "_idle", [])
 
     def used(path, lie="none"):
+        """Make a step of a body and return the process it was in."""
         spec = pair(path, spring={"parameters": {"lie": oscillator.LIES[lie]}}).lower
         body = ForeignBody(spec, False, (0.0, 2.0), None)
         process = body._port._process
@@ -389,15 +357,14 @@ def test_a_process_waits_for_the_next_body_of_its_file(fmu, monkeypatch):
         return process
 
     first = used(fmu())
-    assert used(fmu("another")) is not first
-    assert used(fmu(), "late crash") is first
-    assert used(fmu()) is not first
-    monkeypatch.setattr(isolated, "_MOST_IDLE", 1)
-    monkeypatch.setattr(isolated.FmuProcess, "_idle", [])
-    waiting = used(fmu())
-    last = used(fmu("another"))
-    assert used(fmu("another")) is last
-    assert waiting._process.poll() is not None
+    assert used(fmu()) is first
+    another = used(fmu("another"))
+    assert first._process.poll() is not None
+    assert used(fmu("another"), "late crash") is another
+    assert used(fmu("another")) is not another
+    guid = ('guid="oscillator"', 'guid="once"')  # the second instance in a process fails
+    once = ('modelIdentifier="oscillator"', 'modelIdentifier="oscillator" canBeInstantiatedOnlyOncePerProcess="true"')
+    assert used(fmu(edits=(guid, once))) is not used(fmu(edits=(guid, once)))
 
 
 def test_ctrl_c_names_an_fmu_that_does_not_return(fmu, monkeypatch, hanging):
@@ -443,14 +410,14 @@ ANSWERING = {
 }
 
 
-def struck(below, macro_step, **changes):
+@functools.cache
+def struck(below, macro_step):
     """Run 2 kg that strike what is ``below`` with 1 m/s, on a soft contact of 1e5 N/m."""
     tables = {
         "time": {"t_end": 1.5},
         "beam": {"element": "point_mass", "mass": 2.0, "velocity": -1.0},
         "contact": {"law": "compliance", "stiffness": 1e5, "exponent": 1.0},
         "coupling": {"degree": 2, "macro_step": macro_step},
-        **changes,
     }
     own = {"lower": SpringDamper(2.0, 200.0)} if below == "the caller's" else {}
     return simulate(scene_from_dict({**tables, **ANSWERING[below]}), **own)
@@ -468,8 +435,7 @@ def test_bodies_of_every_kind_are_judged_by_what_they_say(below):
     assert run.summary["contact_force_max"] == pytest.approx(np.sqrt(1e5), rel=2e-3)
     assert run.summary["misplaced_ends"] == pytest.approx(struck("our own", 1e-3).summary["misplaced_ends"], rel=1e-3)
     assert run.summary["resolved"]
-    blind = struck(below, 0.2 * np.pi)
-    assert not blind.summary["resolved"]
+    assert not struck(below, 0.2 * np.pi).summary["resolved"]
 
 
 def test_what_a_foreign_body_does_not_say_is_not_judged(fmu):
@@ -477,15 +443,6 @@ def test_what_a_foreign_body_does_not_say_is_not_judged(fmu):
     assert "misplaced_ends" not in run.summary
     (said,) = [warning for warning in run.summary["warnings"] if "does not say its stiffness" in warning]
     assert said.startswith("the body in [spring]")
-
-
-@pytest.mark.parametrize("what", BAD["names"])
-def test_wrong_names_are_one_error(fmu, what):
-    change = dict(BAD["names"][what])
-    said = change.pop("said")
-    with pytest.raises(FmuError) as caught:
-        simulate(pair(fmu(), spring=change))
-    assert said in str(caught.value)
 
 
 def test_events_are_those_of_the_element(fmu):
@@ -511,10 +468,7 @@ def test_commands(fmu, tmp_path, unpainted):
     scene = pair(fmu(), spring=names, contact={"damping": 0.0}, coupling={"degree": 0}, time={"t_end": 0.2})
     file = tmp_path / "linked.toml"
     file.write_text(tomli_w.dumps(scene.model_dump(exclude_none=True)), encoding="utf-8")
-    shown = printed("doctor", file)
-    assert "the ledger of the interface" in shown
-    assert "the scene can be run" in shown
-    printed("run", file, "--out", tmp_path / "run", "--quiet")
+    assert "the scene can be run" in printed("doctor", file)
+    printed("run", file, "--accuracy", "1e-2", "--out", tmp_path / "run", "--quiet")
     printed("report", tmp_path / "run")
     assert "no reference knows this body" in refused("crosscheck", file)
-    printed("run", file, "--accuracy", "1e-4", "--out", tmp_path / "accurate", "--quiet")

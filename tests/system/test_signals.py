@@ -48,7 +48,7 @@ def test_the_settled_amplitude_is_that_of_the_frequency_response(driven):
 
 def test_an_oscillator_driven_at_its_resonance_without_damping_never_settles():
     """Its amplitude grows linearly, F t/2mω."""
-    t_end = 200.0
+    t_end = 100.0
     rate = sqrt(STIFFNESS / MASS)
     scene = with_changes(oscillator(t_end, frequency=rate / (2.0 * pi)), spring={"damping": 0.0})
     run = simulate(with_changes(scene, coupling={"macro_step": 0.02}))
@@ -67,10 +67,10 @@ def test_what_is_not_driven_or_too_short_has_not_settled():
 def test_contacts_are_counted_and_bouncing_ends_with_the_last_closing():
     """A tip on a soft stop under a load that holds it there: told by the sign of the gap on the dense curve."""
     scene = load_scene(
-        "vibro-impact", ["time.t_end=0.6", "beam.alpha_b=2e-3", "loads.0.amplitude=8", "loads.0.frequency=0.5"]
+        "vibro-impact", ["time.t_end=0.3", "beam.alpha_b=2e-3", "loads.0.amplitude=8", "loads.0.frequency=0.5"]
     )
     run = simulate(with_changes(scene, **{"loads.0": {"signal": "constant", "frequency": None}}))
-    times = np.linspace(run.time[0], run.time[-1], 200_001)
+    times = np.linspace(run.time[0], run.time[-1], 100_001)
     touching = run.at(times)["gap"] < 0.0
     closings = times[1:][touching[1:] & ~touching[:-1]]
     assert touching[-1]
@@ -127,7 +127,7 @@ def highest_in_space(run):
     return np.abs(run["a_y"] + run["load_0"]).max()
 
 
-@pytest.mark.parametrize(("signal", "more"), [("half_sine", {}), ("sawtooth", {}), ("trapezoid", {"rise": 1e-3})])
+@pytest.mark.parametrize(("signal", "more"), [("half_sine", {}), ("trapezoid", {"rise": 1e-3})])
 def test_the_damage_boundary_of_an_oscillator_is_that_of_its_shock_spectrum(
     signal, more, unpainted, importable, tmp_path
 ):
@@ -231,7 +231,7 @@ def test_a_rigid_impact_has_no_peak_acceleration_and_a_soft_one_has():
     assert not any("no peak acceleration" in words for _, words in soft.in_words())
 
 
-def swept(first, last, seconds, cubic=0.0, **spring):
+def swept(first, last, seconds, size, cubic=0.0):
     """The oscillator under a chirp up and one down, which goes on in phase."""
     common = {"on": "spring", "amplitude": 0.3, "signal": "chirp", "duration": seconds}
     turned = np.pi * (first + last) * seconds  # by the first
@@ -239,12 +239,12 @@ def swept(first, last, seconds, cubic=0.0, **spring):
         {**common, "frequency": first, "frequency_end": last},
         {**common, "frequency": last, "frequency_end": first, "start": seconds, "phase": float(turned % (2.0 * pi))},
     ]
-    changes = {"spring": {"cubic_stiffness": cubic, **spring}, "coupling": {"macro_step": 5e-3}}
+    changes = {"spring": {"cubic_stiffness": cubic, "initial_velocity": 0.0}, "coupling": {"macro_step": size}}
     return simulate(with_changes(oscillator(t_end=2.0 * seconds), loads=loads, **changes))
 
 
 def test_a_slow_sweep_of_a_linear_oscillator_is_its_frequency_response():
-    run = swept(6.0, 8.5, 25.0, initial_velocity=0.0)
+    run = swept(6.0, 8.5, 25.0, 5e-3)
     for found in responses(run, "y"):
         assert len(found.frequency) == 90  # pairs of its 181.25 turns
         rate = 2.0 * pi * found.frequency
@@ -255,7 +255,7 @@ def test_a_slow_sweep_of_a_linear_oscillator_is_its_frequency_response():
 
 
 def test_up_and_down_are_different_motions_of_a_hardening_spring():
-    up, down = responses(swept(9.0, 16.0, 20.0, cubic=5e7, initial_velocity=0.0), "y")
+    up, down = responses(swept(9.0, 16.0, 20.0, 1e-2, cubic=5e7), "y")
     high = np.interp(12.0, up.frequency, up.amplitude)
     low = np.interp(12.0, down.frequency[::-1], down.amplitude[::-1])
     assert high > 2.0 * low

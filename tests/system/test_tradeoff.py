@@ -83,6 +83,7 @@ def test_every_axis_is_swept_that_the_law_has(law, there, absent):
     assert absent not in families
 
 
+@pytest.mark.usefixtures("kept_references")
 def test_bounces_that_die_out_end_no_comparison():
     """The last of them are microseconds apart: another one comes first if the initial velocity changes a little."""
     scene = with_changes(load_scene("beam-on-stop"), beam={"n_elements": 4})
