@@ -8,6 +8,7 @@ from math import inf
 from pathlib import Path
 
 from ..scene import Beam, Scene, SceneError, Spring
+from ..scene.linearised import hilltop
 from ..scene.loads import TableLoad
 from ..scene.partners import ForeignFmu, Partner, RigidWallElement, SpringDamperElement
 from ..scene.statics import resting_height, tip_compliance, tip_load_deflection
@@ -107,6 +108,12 @@ def top_at_rest(scene: Scene, contact_force: float) -> float:
     force = spring.external_force + load
     height = resting_height(spring, force)
     if scene.stop is not None and (height is None or height < floor) and spring.force(floor) > load:
+        if spring.softens and abs(floor - spring.unloaded) > hilltop(spring):
+            raise SceneError(
+                f'[time] initial_state = "static": under {force:.6g} N the softening spring would rest on [stop] '
+                f"position = {floor:g}, beyond |y - unloaded| = √(linear_stiffness/|cubic_stiffness|) = "
+                f"{hilltop(spring):.6g} m, where it cannot start; use a smaller load, or leave initial_state out"
+            )
         return floor
     if height is None:
         raise SceneError(

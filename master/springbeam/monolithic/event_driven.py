@@ -226,7 +226,7 @@ def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
 def _at_rest(s: HybridSystem) -> np.ndarray:
     """Return the state in which everything is at rest under the loads of t = 0 and the force between the ends.
 
-    Raises ReferenceFailure where the spring rests nowhere near Ψ.
+    A spring that has no stable equilibrium above the stop rests on it. Raises ReferenceFailure where it rests nowhere.
     """
     from scipy.optimize import brentq, newton  # only for a start at rest
 
@@ -244,15 +244,19 @@ def _at_rest(s: HybridSystem) -> np.ndarray:
         k1 = p.linear_stiffness
         k2 = p.cubic_stiffness
         y0 = p.unloaded  # on_spring has k1 y0
-        try:
-            y = newton(
-                lambda y: k1 * y + k2 * (y - y0) ** 3 - on_spring + C,
-                p.equilibrium,
-                lambda y: k1 + 3.0 * k2 * (y - y0) ** 2,
-            )
-        except RuntimeError as error:
-            raise ReferenceFailure(f"the spring rests nowhere: {error}") from error
-        return max(float(y), s.stop.position) if s.scene.stop is not None else float(y)
+
+        def pull(y: float) -> float:
+            return k1 * y + k2 * (y - y0) ** 3 - on_spring + C
+
+        def stiffness(y: float) -> float:
+            return k1 + 3.0 * k2 * (y - y0) ** 2
+
+        y, found = newton(pull, p.equilibrium, stiffness, full_output=True, disp=False)
+        if found.converged and stiffness(y) > 0.0:
+            return max(float(y), s.stop.position) if s.scene.stop is not None else float(y)
+        if s.scene.stop is not None and pull(s.stop.position) > 0.0:  # the stop pushes
+            return s.stop.position
+        raise ReferenceFailure("the spring rests nowhere near its start")
 
     def mismatch(C: float) -> float:
         p = top(C) - float(b @ (bent + b * C / k))
