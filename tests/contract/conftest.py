@@ -178,6 +178,10 @@ class Instance:
         """Set an input's derivative."""
         self.slave.setRealInputDerivatives(self.fmu.numbers(name), [order], [value])
 
+    def derive_at_once(self, name, first, second):
+        """Set both derivatives of an input in one call."""
+        self.slave.setRealInputDerivatives(self.fmu.numbers(name, name), [1, 2], [first, second])
+
     def derivative(self, name, order=1):
         derivatives = {"2.0": "getRealOutputDerivatives", "3.0": "getOutputDerivatives"}[self.fmu.version]
         return getattr(self.slave, derivatives)(self.fmu.numbers(name), [order])[0]
@@ -245,6 +249,9 @@ class Instance3(Instance):
 
     def derive(self, name, order, value):
         self.set(f"der({name}{'' if order == 1 else f',{order}'})", value)
+
+    def derive_at_once(self, name, first, second):
+        self.slave.setFloat64(self.fmu.numbers(f"der({name})", f"der({name},2)"), [first, second])
 
     def try_step(self, time, size):
         self.last.value = math.nan  # it is told by steps that are discarded, too

@@ -11,7 +11,6 @@ from pathlib import Path
 from zipfile import ZipFile, ZipInfo
 
 import pytest
-from commands import ran
 
 import springbeam
 from springbeam.bodies import archive
@@ -212,16 +211,6 @@ def test_a_size_that_is_declared_too_small_is_not_exceeded(tmp_path):
     assert sum(file.stat().st_size for file in (tmp_path / "in").rglob("zeros")) <= 1000
 
 
-@pytest.mark.parametrize("name", ["beam", "spring"])
-def test_what_our_own_need_is_unpacked_to_the_last_byte(fmu_folder, tmp_path, name):
-    unpack(fmu_folder / f"{name}.fmu", tmp_path, HERE)
-    with ZipFile(fmu_folder / f"{name}.fmu") as file:
-        files = {info.filename: file.read(info) for info in file.infolist() if not info.is_dir()}
-    unused = ("documentation/", "extra/", "model.png", "sources/")
-    files = {name: content for name, content in files.items() if not name.startswith(unused)}
-    assert {str(p.relative_to(tmp_path)): p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == files
-
-
 # -- the cache ---------------------------------------------------------------------------------------------------------
 
 
@@ -247,7 +236,7 @@ print(unpacked(Path({str(fmu_folder / "spring.fmu")!r}), {HERE!r}, lambda folder
     assert [found] == [{str(path)} for path in cache.iterdir()]
     changed = [(path, path.stat().st_mtime_ns) for path in cache.rglob("*") if path.is_file()]
     assert changed
-    assert {ran(*words).strip()} == found
+    assert {str(unpacked(fmu_folder / "spring.fmu", HERE, nothing_to_check))} == found
     assert [(path, path.stat().st_mtime_ns) for path in cache.rglob("*") if path.is_file()] == changed
 
 
@@ -291,10 +280,7 @@ def test_without_a_cache_the_folder_is_a_temporary_one(fmu_folder, tmp_path, mon
 
 
 def test_a_process_that_must_have_its_own_copy_gets_it(fmu_folder, cache):
-    first, second = (
-        unpacked(fmu_folder / "spring.fmu", HERE, nothing_to_check, alone=alone) for alone in (False, True)
-    )
-    assert [cache in folder.parents for folder in (first, second)] == [True, False]
+    assert cache not in unpacked(fmu_folder / "spring.fmu", HERE, nothing_to_check, alone=True).parents
 
 
 def test_entries_that_nobody_uses_go(fmu_folder, cache):

@@ -124,14 +124,14 @@ def test_directional_derivatives_are_those_of_the_outputs(case):
 
 
 def test_a_direction_is_the_sum_of_its_inputs(case):
-    k, names = case.running(**COMMON[case.name]), {"beam": ("tip_force", "tip_load"), "spring": FORCES}[case.name]
-    output = {"beam": "tip_acceleration", "spring": "acceleration"}[case.name]
+    k = case.running(**COMMON[case.name])
+    output, *names = {
+        "beam": ("tip_acceleration", "tip_force", "tip_load"),
+        "spring": ("acceleration", "contact_force", "external_force"),
+    }[case.name]
     (found,) = k.partials([output], *names, seed=(2.0, -3.0))
     a, b = (k.partials([output], name)[0] for name in names)
     assert found == 2.0 * a - 3.0 * b != 0.0
-    told, seed = (ct.c_double * 1)(7.0), (ct.c_double * 2)(2.0, -3.0)  # over what was there before
-    direction = (case.references(output), 1, case.references(*names), 2, seed, *k.counted(2), told, *k.counted(1))
-    assert (k.call("GetDirectionalDerivative", *direction), told[0]) == (0, found)
 
 
 def test_derivatives_at_a_limit_of_a_parameter_are_one_sided(beam):
@@ -141,9 +141,6 @@ def test_derivatives_at_a_limit_of_a_parameter_are_one_sided(beam):
         k = beam.instance().enter(**{**COMMON["beam"], "alpha_b": damping})
         slopes += k.partials(["tip_acceleration"], "alpha_b")
     assert slopes[0] == pytest.approx(slopes[1], rel=1e-6) != 0.0
-
-
-FORCES = ("contact_force", "external_force")
 
 
 @pytest.mark.parametrize("version", ["3.0"])

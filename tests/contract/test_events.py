@@ -3,9 +3,7 @@
 import ctypes as ct
 import math
 
-import numpy as np
 import pytest
-from fmpy import simulate_fmu
 
 OK = 0
 #: A top that falls on its foundation: y = -t - t² meets -0.1 at FALL with the velocity -1 - 2 FALL, and loses half.
@@ -149,25 +147,6 @@ def test_a_held_force_asks_for_whole_steps(spring):
     k.step(0.0, 0.2)
     assert told(k) == (False, False, False)
     assert k.get("number_of_impacts") > 0
-
-
-def test_fmpy_handles_the_event(spring):
-    """Two rows at the impact, before and after it, where steps may end early."""
-    names = ["velocity", "number_of_impacts"]
-    runs = {
-        early: simulate_fmu(
-            str(spring.path), stop_time=0.2, output_interval=0.05, start_values=FALLING, output=names,
-            use_event_mode=True, early_return_allowed=early,
-        )
-        for early in (True, False)
-    }  # fmt: skip
-    at = np.flatnonzero(np.isclose(runs[True]["time"], FALL, rtol=1e-12))
-    assert len(at) == 2
-    before, after = runs[True][at]
-    assert after["velocity"] == pytest.approx(-0.5 * before["velocity"], rel=1e-12)
-    assert (before["number_of_impacts"], after["number_of_impacts"]) == (0, 1)
-    assert len(runs[True]) == len(runs[False]) + 2 * runs[True]["number_of_impacts"][-1]
-    assert runs[True]["velocity"][-1] == pytest.approx(runs[False]["velocity"][-1], rel=1e-10)
 
 
 def test_a_state_saved_in_event_mode_is_one_between_steps_where_there_is_no_event_mode(case):

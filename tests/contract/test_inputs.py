@@ -1,6 +1,5 @@
 """Inputs over a step, and the inner forces of the beam: derivatives hold for one step, impulses act once."""
 
-import ctypes as ct
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +8,6 @@ import pytest
 from springbeam.scene.files import tomllib
 
 # -- inputs over a step: derivatives hold for one step, impulses act once; output derivatives -------------------------
-
-
-OK = 0
 
 
 def polynomial(k, name, f, t=0.0):
@@ -23,34 +19,18 @@ def polynomial(k, name, f, t=0.0):
 
 @pytest.mark.parametrize("f", [(0.8, 5.0, -7.0), (0.8, 0.0, -7.0)], ids=["both", "second"])
 def test_derivatives_hold_for_one_step_the_value_stays(case, f):
-    once, told = case.moving(), case.moving()
-    for k in (once, told):
-        polynomial(k, case.force, f)
+    """One sets them one by one, the other in one call."""
+    once, again = case.moving(), case.moving()
+    polynomial(once, case.force, f)
+    again.set(case.force, f[0])
+    again.derive_at_once(case.force, *f[1:])
+    for k in (once, again):
         k.step(0.0, 0.05)
     assert once.get(case.force) == 0.8
-    polynomial(told, case.force, (0.8, 0.0, 0.0))
-    for k in (once, told):
+    polynomial(again, case.force, (0.8, 0.0, 0.0))
+    for k in (once, again):
         k.step(0.05, 0.05)
-    assert once.outputs() == told.outputs()
-
-
-def test_derivatives_that_are_set_in_one_call(case):
-    """They are as one by one."""
-    together, apart = case.moving(), case.moving()
-    values = (ct.c_double * 2)(5.0, -7.0)
-    if case.version == "2.0":
-        force = case.references(case.force, case.force)
-        assert together.call("SetRealInputDerivatives", force, ct.c_size_t(2), (ct.c_int * 2)(1, 2), values) == OK
-    else:
-        names = case.references(f"der({case.force})", f"der({case.force},2)")
-        found = (ct.c_double * 2)()
-        assert together.access("SetFloat64", names, 2, values) == OK
-        assert together.access("GetFloat64", names, 2, found) == OK
-        assert list(found) == list(values)
-    polynomial(apart, case.force, (0.0, 5.0, -7.0))
-    for k in (together, apart):
-        k.step(0.0, 0.05)
-    assert together.outputs() == apart.outputs()
+    assert once.outputs() == again.outputs()
 
 
 def test_an_impulse_acts_once_at_the_start_of_the_next_step(case):

@@ -1,6 +1,5 @@
 """Steps and states: which steps are refused, and a step repeated from its state, here or in another instance."""
 
-import ctypes as ct
 import math
 from pathlib import Path
 
@@ -26,8 +25,10 @@ def test_times_may_be_multiplied_or_summed_and_sizes_be_differences(case):
         time += size
 
 
-def test_no_step_past_the_stop_time(case):
-    k = case.running(stop_time=0.3)
+def test_no_step_past_the_stop_time_nor_from_another_time(case):
+    k, other = (case.running(stop_time=0.3) for _ in range(2))
+    assert other.try_step(1e-9, 0.1) == ERROR
+    assert "the slave is at 0" in other.message
     # 0.1 + 0.1 + 0.1 > 0.3 in floating point: rounding is no reason to refuse.
     time = 0.0
     for _ in range(3):
@@ -36,13 +37,6 @@ def test_no_step_past_the_stop_time(case):
     assert time > 0.3
     assert k.try_step(time, 0.1) == ERROR
     assert "past the stop time 0.3" in k.message
-
-
-@pytest.mark.parametrize(("time", "size", "why"), [(1e-9, 0.1, "the slave is at 0"), (0.0, 0.30001, "the stop time")])
-def test_what_is_more_than_rounding_is_refused(case, time, size, why):
-    k = case.running(stop_time=0.3)
-    assert k.try_step(time, size) == ERROR
-    assert why in k.message
 
 
 AHEAD = {"contact_law": 2, "communication_step": 1e-3, "tip_response": 1e-4}
@@ -82,15 +76,16 @@ def test_after_any_refusal_a_master_goes_on(loaded, step):
 
 def test_a_step_that_fails_twice_alike_ends_the_simulation(spring):
     """FMPy repeats a discarded step until the FMU asks to end. With another size or other inputs it may go on."""
-    k = spring.running(linear_stiffness=1e6)
-    k.set("contact_force", 1.0)
-    for size, ends in ((1e6, False), (2e6, False), (2e6, True), (1e6, False), (1e6, True)):
+    k = spring.running(linear_stiffness=3.0)
+    k.set("contact_force", 1e308)
+    for size, ends in ((0.1, False), (0.2, False), (0.2, True), (0.1, False), (0.1, True)):
         assert k.try_step(0.0, size) == DISCARD
         assert k.ends() is ends
-    k.set("contact_force", 2.0)
-    assert k.try_step(0.0, 1e6) == DISCARD
+    k.set("contact_force", -1e308)
+    assert k.try_step(0.0, 0.1) == DISCARD
     assert not k.ends()
-    k.step(0.0, 1e-3)
+    k.set("contact_force", 1.0)
+    k.step(0.0, 0.1)
     assert not k.ends()
 
 
@@ -156,21 +151,6 @@ def test_the_bytes_of_a_state_are_all_that_another_instance_needs(case):
     assert fresh.outputs() == told
     assert advance(case, fresh, time, 7, 0.2) == first
     assert fresh.serialized() != blob
-
-
-@pytest.mark.parametrize("overwritten", [False, True])
-def test_inputs_that_were_not_set_yet_belong_to_the_state(case, overwritten):
-    """A state from outside may know a force, or come from an instance that does not."""
-    k, other = case.moving(), case.moving()
-    other.set(case.force, 0.7)
-    token = k.deserialized(other.serialized())
-    if overwritten:
-        before = token.value
-        assert k.call("GetFMUState", ct.byref(token)) == OK
-        assert token.value == before
-    k.set(case.force, 0.2)
-    k.restore(token)
-    assert k.get(case.force) == (0.0 if overwritten else 0.7)
 
 
 @pytest.mark.parametrize("entered", [False, True], ids=["instantiated", "initialization"])

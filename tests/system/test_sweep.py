@@ -52,9 +52,6 @@ def test_a_latin_hypercube_has_one_sample_in_each_of_its_rows():
     assert sorted(v[2] for v in values) == [1] * 10 + [2] * 10 + [4] * 10
     assert design(axes, 30, 7, "latin_hypercube") == values
     assert design(axes, 30, 8, "latin_hypercube") != values
-    by_chance = design(axes, 300, 7, "random")
-    assert by_chance == design(axes, 300, 7, "random")
-    assert np.mean([v[1] for v in by_chance]) == pytest.approx(0.5, abs=3.0 / np.sqrt(12.0 * 300.0))
 
 
 def test_each_metric_is_the_number_that_it_names():
@@ -108,7 +105,7 @@ def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
         assert rows["first_stop_impact"][k] == next(e.time for e in run.events if e.kind == "stop_impact")
 
 
-def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_doubled_period(tmp_path):
+def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_doubled_period():
     """A damped oscillator: A sin(2πft) at phase 0 is −A sin φ, its peak A; the bumper doubles the period at 45 Hz."""
     drive = {"on": "spring", "signal": "harmonic", "frequency": 2.0, "amplitude": 3.0, "start": 0.05}
     spring = {"mass": 1.0, "linear_stiffness": 40.0, "damping": 4.0}
@@ -124,11 +121,6 @@ def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_dou
     todo = sweep.Sweep(
         scene=load_scene("vibro-impact"), vary=("loads.0.frequency=35,45",), metric=("stroboscopic", "u_tip_max")
     )
-    records = todo.computed()
-    found = todo.findings(records).written(tmp_path, pictures=False)
-    columns = swept(tmp_path)
-    once, doubled = (np.unique(np.round(np.array(points), 5)) for points in columns["stroboscopic"])
+    rows = todo.computed().values()
+    once, doubled = (np.unique(np.round(row["stroboscopic"], 5)) for row in rows)
     assert (len(once), len(doubled)) == (1, 2)
-    dots = found.pictures["sweep"]().axes[0].lines[0]
-    assert dots.get_linestyle() == "None"
-    assert dots.get_ydata().tolist() == [x for points in columns["stroboscopic"] for x in points]

@@ -105,11 +105,6 @@ def test_a_preloaded_spring_rests_on_its_stop_with_its_force():
     assert np.ptp(run.y) == 0.0
 
 
-def test_the_frequency_of_a_spring_is_the_root_of_its_stiffness_over_its_mass():
-    slow = with_changes(scene_from_dict(ALONE), spring={"linear_stiffness": 0.125, "cubic_stiffness": 0.0})
-    assert spring_frequency(slow) == pytest.approx(0.5, rel=1e-14)
-
-
 def test_what_is_known_before_a_run_moves_with_the_spring():
     for k2, load in ((900.0, 0.0), (-100.0, 0.3)):
         scene = with_changes(scene_from_dict(ALONE), spring={"cubic_stiffness": k2, "external_force": load})
@@ -134,25 +129,16 @@ def with_gap(**tables):
     return with_changes(scene_from_dict(PAIR), stop={"position": -0.03}, **tables)
 
 
-def test_a_gap_is_equilibrium_and_unloaded_below_the_unbent_beam():
-    named = with_gap(contact={"gap": GAP})
-    assert (named.spring.equilibrium, named.spring.unloaded) == (-GAP, -GAP)
-    run = simulate(named)
-    keys = simulate(with_gap(spring={"equilibrium": -GAP, "unloaded": -GAP}))
-    assert run.time[0] == keys.time[0] == GAP  # at 1 m/s
-    for column in run.columns:
-        np.testing.assert_array_equal(run[column], keys[column])
-
-
 @pytest.mark.parametrize(
     ("body", "where"),
     [
+        ({"mass": 1.0, "linear_stiffness": LOWER}, {"equilibrium": -GAP, "unloaded": -GAP}),
         ({"element": "point_mass", "mass": 1.0}, {"displacement": -GAP}),
         ({"element": "spring_damper", "mass": 1.0, "stiffness": 3.0}, {"displacement": -GAP, "rest": -GAP}),
         ({"element": "rigid_wall"}, {"position": -GAP}),
     ],
 )
-def test_an_element_is_below_the_gap(body, where):
+def test_what_is_below_the_gap_is_placed_by_it(body, where):
     tables = {name: table for name, table in PAIR.items() if name != "stop"} | {"spring": body}
     run = simulate(scene_from_dict(tables | {"contact": {"gap": GAP}}))
     keys = simulate(scene_from_dict(tables | {"spring": body | where}))
