@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -282,39 +282,10 @@ def at(scene: Scene, place: str) -> str:
     return f"[{table}] {key} = {toml_of(getattr(content, key))}"
 
 
-def filled(scene: Scene, text: str, **numbers: Any) -> str:
-    """Return ``text`` with keys and their values in place of ``{table.key}``, and ``numbers`` of ``{name:format}``."""
+def filled(scene: Scene, text: str, number: int = 0) -> str:
+    """Return ``text`` with each ``[table.key]`` replaced by `at`; ``[load.key]`` is of the load of this ``number``."""
 
     def value(found: re.Match[str]) -> str:
-        name, form = found.groups()
-        return at(scene, name) if "." in name else format(numbers[name], form)
+        return at(scene, re.sub(r"^load\.", f"loads.{number}.", found[1]))
 
-    return re.sub(r"\{([\w.]+):?([^}]*)\}", value, text)
-
-
-class Rule(NamedTuple):
-    """Condition and text of a message about a scene; `filled` explains ``text``.
-
-    ``when`` and ``numbers`` get the scene, and the load that the rule is for. If ``when`` returns a dict, these are the
-    numbers. ``{load.key}`` is a key of that load.
-    """
-
-    when: Callable[..., object]
-    text: str
-    numbers: Callable[..., Mapping[str, Any]] = lambda *of: {}
-
-
-def texts_of(scene: Scene, rules: Iterable[Rule], *of: Any) -> Iterator[str]:
-    """Yield the messages of the ``rules`` that ``scene`` violates."""
-    for rule in rules:
-        if found := rule.when(scene, *of):
-            yield filled(scene, rule.text, **(found if isinstance(found, dict) else rule.numbers(scene, *of)))
-
-
-def texts_of_loads(scene: Scene, rules: Sequence[Rule]) -> Iterator[str]:
-    """Yield the messages of the ``rules`` that loads of ``scene`` violate; ``[load]`` in their texts is the load."""
-    for number, load in enumerate(scene.loads):
-        name = f"loads.{number}"
-        texts = [rule.text.replace("{load.", f"{{{name}.").replace("[load]", f"[{name}]") for rule in rules]
-        here = [rule._replace(text=text) for rule, text in zip(rules, texts, strict=True)]
-        yield from texts_of(scene, here, load)
+    return re.sub(r"\[(\w+\.\w+)\]", value, text)

@@ -1,16 +1,20 @@
-"""Warnings about scenes that can be run: probable mistakes, and keys without effect."""
+"""Warnings about scenes that can be run: probable mistakes, and keys without effect.
+
+``[table.key]`` in a text stands for the key with its value (`springbeam.scene.messages.filled`).
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterator
 
 from .laws import LAW
 from .linearised import beam_energy, spring_energy, well_depth
-from .messages import Rule, texts_of, texts_of_loads
+from .loads import Load
+from .messages import filled
 from .scene import TABLES, Scene
 from .statics import initial_kinetic_energy, locking, tip_compliance, tip_inertia
+from .tables import Beam, Spring
 
 #: E/G: 2 to 3 of isotropic solids, up to some 100 of laminates.
 _YOUNG_OVER_SHEAR = (0.5, 200.0)
@@ -22,15 +26,21 @@ _FREQUENCIES = (1e-2, 1e7)
 _MASS_RATIO = (1e-6, 1e6)
 #: Speed of the tip over that of sound in the beam, about its largest strain: no solid stays elastic beyond.
 _MOST_STRAIN = 0.05
+#: Properties of solids, from gels to diamond and from foam to heavy metals: key, unit, range, examples, and the
+#: probable unit with its factor.
+_MATERIALS = (
+    ("young_modulus", "Pa", (1e4, 2e12), "rubber about 1e6, aluminium 7e10, steel 2.1e11", "GPa", 1e9),
+    ("density", "kg/m³", (10.0, 25e3), "aluminium 2700, steel 7850", "g/cm³", 1e3),
+)
 
 
 def suspicions(scene: Scene) -> list[str]:
     """Return warnings about values that can be run but are probably mistakes, or have no effect."""
-    return [
-        *implausible(scene),
-        *texts_of(scene, (*SUSPICIOUS, *EFFECTS)),
-        *texts_of_loads(scene, SUSPICIOUS_LOADS),
-    ]
+    found = [*implausible(scene)]
+    found += [filled(scene, text) for subject in (_spring, _beam, _without_effect) for text in subject(scene)]
+    for number, load in enumerate(scene.loads):
+        found += [filled(scene, text, number) for text in _load(scene, load)]
+    return found
 
 
 def implausible(scene: Scene) -> Iterator[str]:
@@ -39,7 +49,9 @@ def implausible(scene: Scene) -> Iterator[str]:
     A beam with area = 1 or density = 1 is taken to be dimensionless, without warnings.
     """
     beam = scene.beam
-    return texts_of(scene, IMPLAUSIBLE if beam is not None and 1.0 not in (beam.area, beam.density) else ())
+    if beam is not None and 1.0 not in (beam.area, beam.density):
+        for text in _improbable(beam, scene.spring):
+            yield filled(scene, text)
 
 
 # -- improbable values ----------------------------------------------------------------------------------------------
@@ -49,213 +61,155 @@ def _beyond(value: float, bounds: tuple[float, float]) -> bool:
     return not bounds[0] <= value <= bounds[1]
 
 
-def _material(key: str, unit: str, bounds: tuple[float, float], known: str, other: str, factor: float) -> Rule:
-    """Return the rule for a property that no solid has; ``factor`` is that of the probable unit."""
-
-    def meant(scene: Scene) -> Mapping[str, str]:
-        value = factor * getattr(scene.beam, key)
-        return {"meant": "" if _beyond(value, bounds) else f"; in {other} it would be {value:.3g} {unit}"}
-
-    text = f"{{beam.{key}}}: in {unit}, no solid has it ({known}){{meant}}"
-    return Rule(lambda s: _beyond(getattr(s.beam, key), bounds), text, meant)
-
-
-def _of_beam(scene: Scene) -> dict[str, Any]:
-    """Return properties of our beam, for the texts of rules."""
-    beam = scene.beam
-    spring = scene.spring
-    assert beam is not None
-    mass = beam.density * beam.area * beam.length
+def _improbable(beam: Beam, spring: Spring | None) -> Iterator[str]:
+    for key, unit, bounds, known, other, factor in _MATERIALS:
+        if _beyond(getattr(beam, key), bounds):
+            meant = factor * getattr(beam, key)
+            said = "" if _beyond(meant, bounds) else f"; in {other} it would be {meant:.3g} {unit}"
+            yield f"[beam.{key}]: in {unit}, no solid has it ({known}){said}"
+    ratio = beam.young_modulus / beam.shear_modulus
+    if beam.poisson_ratio is None and _beyond(ratio, _YOUNG_OVER_SHEAR):
+        yield (
+            f"[beam.shear_modulus]: young_modulus is {ratio:.3g} times as large; for an isotropic solid it is 2 to 3 "
+            "times, and poisson_ratio gives it"
+        )
     slenderness = beam.length / math.sqrt(beam.second_moment_of_area / beam.area)
-    milli = f"; in mm it would be {1e-3 * beam.length:g} m long, of {1e-9 * mass:.3g} kg"
-    return {
-        "ratio": beam.young_modulus / beam.shear_modulus,
-        "slenderness": slenderness,
-        "looks": "thicker than long" if slenderness < _SLENDERNESS[0] else "a thread",
-        # Rayleigh's quotient for the static shape of a tip force: within 2 % if slender, 10 % if not.
-        "frequency": 0.5 / math.pi / math.sqrt(tip_compliance(beam) * tip_inertia(beam)),
-        "mass": mass,
-        "masses": 1.0 if spring is None else mass / spring.mass,
-        "milli": milli if beam.length >= 10.0 else "",
-        "speed": (speed := abs(beam.initial_velocity_slope) * beam.length),
-        "sound": (sound := math.sqrt(beam.young_modulus / beam.density)),
-        "strain": speed / sound,
-    }
-
-
-#: Rules for improbable values of our beam.
-IMPLAUSIBLE = (
-    _material(
-        "young_modulus", "Pa", (1e4, 2e12), "rubber about 1e6, aluminium 7e10, steel 2.1e11", "GPa", 1e9
-    ),  # from gels to diamond
-    _material("density", "kg/m³", (10.0, 25e3), "aluminium 2700, steel 7850", "g/cm³", 1e3),  # foam to heavy metals
-    Rule(
-        lambda s: s.beam.poisson_ratio is None and _beyond(_of_beam(s)["ratio"], _YOUNG_OVER_SHEAR),
-        "{beam.shear_modulus}: young_modulus is {ratio:.3g} times as large; for an isotropic solid it is 2 to 3 times, "
-        "and poisson_ratio gives it",
-        _of_beam,
-    ),
-    Rule(
-        lambda s: _beyond(_of_beam(s)["slenderness"], _SLENDERNESS),
-        "{beam.length}: with this section the beam is {looks} (length over radius of gyration {slenderness:.2g}); is a "
-        "length in mm?",
-        _of_beam,
-    ),
-    Rule(
-        lambda s: s.beam.fidelity == "dynamic" and _beyond(_of_beam(s)["frequency"], _FREQUENCIES),
-        "[beam]: its lowest frequency is {frequency:.2g} Hz; check length, section, density and young_modulus",
-        _of_beam,
-    ),
-    Rule(
-        lambda s: _beyond(_of_beam(s)["masses"], _MASS_RATIO),
-        "{beam.length}: the beam has {mass:.3g} kg, with {spring.mass}{milli}; lengths are in m",
-        _of_beam,
-    ),
-    Rule(
-        lambda s: _of_beam(s)["strain"] > _MOST_STRAIN,
-        "[beam] the tip starts with {speed:.3g} m/s, {strain:.2g} times the speed of sound in the beam ({sound:.3g} "
-        "m/s): bending would strain it as much, which no solid does elastically",
-        _of_beam,
-    ),
-)
+    if _beyond(slenderness, _SLENDERNESS):
+        looks = "thicker than long" if slenderness < _SLENDERNESS[0] else "a thread"
+        yield (
+            f"[beam.length]: with this section the beam is {looks} (length over radius of gyration {slenderness:.2g}); "
+            "is a length in mm?"
+        )
+    # Rayleigh's quotient for the static shape of a tip force: within 2 % if slender, 10 % if not.
+    frequency = 0.5 / math.pi / math.sqrt(tip_compliance(beam) * tip_inertia(beam))
+    if beam.fidelity == "dynamic" and _beyond(frequency, _FREQUENCIES):
+        yield f"[beam]: its lowest frequency is {frequency:.2g} Hz; check length, section, density and young_modulus"
+    mass = beam.density * beam.area * beam.length
+    if spring is not None and _beyond(mass / spring.mass, _MASS_RATIO):
+        milli = f"; in mm it would be {1e-3 * beam.length:g} m long, of {1e-9 * mass:.3g} kg"
+        yield (
+            f"[beam.length]: the beam has {mass:.3g} kg, with [spring.mass]{milli if beam.length >= 10.0 else ''}; "
+            "lengths are in m"
+        )
+    speed = abs(beam.initial_velocity_slope) * beam.length
+    sound = math.sqrt(beam.young_modulus / beam.density)
+    if speed / sound > _MOST_STRAIN:
+        yield (
+            f"[beam] the tip starts with {speed:.3g} m/s, {speed / sound:.2g} times the speed of sound in the beam "
+            f"({sound:.3g} m/s): bending would strain it as much, which no solid does elastically"
+        )
 
 
 # -- probable mistakes ----------------------------------------------------------------------------------------------
 
 
-def _well(scene: Scene) -> dict[str, Any]:
-    """Return the energy at the start and the depth of a softening spring's well, for the texts of rules."""
-    assert scene.spring is not None
-    depth = well_depth(scene)
-    return {
-        "energy": spring_energy(scene.spring) + (0.0 if scene.massless else beam_energy(scene)),
-        "depth": depth,
-        "well": f"well is {depth:.3g} J deep" if depth > -math.inf else "well is gone under external_force",
-    }
-
-
-def _pull(scene: Scene) -> float:
-    """Return the force on the spring's top at the start [N], 0 if it is negligible."""
+def _spring(scene: Scene) -> Iterator[str]:
     spring = scene.spring
-    assert spring is not None
+    if spring is None:
+        return
+    arrives = scene.contact_time or 0.0
     pull = -spring.force(spring.equilibrium)
-    return 0.0 if abs(pull) <= 1e-9 * abs(spring.external_force) else pull
+    if 0.0 < arrives <= scene.time.t_end and abs(pull) > 1e-9 * abs(spring.external_force):
+        yield (
+            f"[spring.equilibrium]: {pull:.3g} N act on it there, and the top is held until the tip arrives at "
+            f't = {arrives:.3g} s; [beam] approach = "elastic" lets it move'
+        )
+    if spring.softens and not scene.static:
+        depth = well_depth(scene)
+        energy = spring_energy(spring) + (0.0 if scene.massless else beam_energy(scene))
+        well = f"well is {depth:.3g} J deep" if depth > -math.inf else "well is gone under external_force"
+        if energy > depth:
+            yield (
+                f"[spring.cubic_stiffness]: the motion starts with {energy:.3g} J, the softening spring's {well}; the "
+                "run stops if it escapes"
+            )
 
 
-def _share(scene: Scene) -> float:
-    """Return the inertia at the tip that a quasi-static beam neglects, over the mass of our spring."""
-    return tip_inertia(scene.beam) / scene.spring.mass if scene.massless and scene.beam and scene.spring else 0.0
+def _beam(scene: Scene) -> Iterator[str]:
+    beam = scene.beam
+    if beam is None:
+        return
+    if (factor := locking(beam)) > 1.05:
+        yield (
+            f"[beam.n_elements]: full integration locks, the beam is {factor:.3g} times too stiff; use "
+            "reduced_integration = true, element_degree = 3, or more elements"
+        )
+    if scene.spring is None or not scene.massless:
+        return
+    share = tip_inertia(beam) / scene.spring.mass  # which a quasi-static beam neglects
+    if share > 0.05 and scene.contact.rigid:
+        yield (
+            f"[beam.fidelity]: neglects an inertia that at the tip is {share:.2g} of the spring's mass; the joined "
+            f"motion is about {math.sqrt(1.0 + share) - 1.0:.0%} too fast"
+        )
+    if beam.approach == "undeformed" and beam.initial_velocity_slope != 0.0:
+        yield (
+            f"[beam.fidelity]: the beam arrives without its kinetic energy, {initial_kinetic_energy(beam):.3g} J; the "
+            "result lacks its impact and the vibration that follows"
+        )
 
 
-SUSPICIOUS: tuple[Rule, ...] = (
-    Rule(
-        lambda s: s.spring and 0.0 < (s.contact_time or 0.0) <= s.time.t_end and _pull(s) != 0.0,
-        "{spring.equilibrium}: {pull:.3g} N act on it there, and the top is held until the tip arrives at "
-        't = {t_c:.3g} s; [beam] approach = "elastic" lets it move',
-        lambda s: {"pull": _pull(s), "t_c": s.contact_time},
-    ),
-    Rule(
-        lambda s: s.spring and s.spring.softens and not s.static and _well(s)["energy"] > _well(s)["depth"],
-        "{spring.cubic_stiffness}: the motion starts with {energy:.3g} J, the softening spring's {well}; the run stops "
-        "if it escapes",
-        _well,
-    ),
-    Rule(
-        lambda s: s.beam and locking(s.beam) > 1.05,
-        "{beam.n_elements}: full integration locks, the beam is {factor:.3g} times too stiff; use "
-        "reduced_integration = true, element_degree = 3, or more elements",
-        lambda s: {"factor": locking(s.beam)},
-    ),
-    Rule(
-        lambda s: _share(s) > 0.05 and s.contact.rigid,
-        "{beam.fidelity}: neglects an inertia that at the tip is {share:.2g} of the spring's mass; the joined motion "
-        "is about {faster:.0%} too fast",
-        lambda s: {"share": _share(s), "faster": math.sqrt(1.0 + _share(s)) - 1.0},
-    ),
-    Rule(
-        lambda s: s.massless and s.spring and s.beam.approach == "undeformed" and s.beam.initial_velocity_slope != 0.0,
-        "{beam.fidelity}: the beam arrives without its kinetic energy, {energy:.3g} J; the result lacks its impact and "
-        "the vibration that follows",
-        lambda s: {"energy": initial_kinetic_energy(s.beam)},
-    ),
-)
-SUSPICIOUS_LOADS = (
-    Rule(
-        lambda s, load: load.is_finer_than(s.coupling.macro_step),
-        "{load.file}: its lines are closer than a quarter of {coupling.macro_step}, so steps do not end on them and "
-        'errors fall slowly with the step; take a smaller macro_step, or interpolation = "cubic"',
-    ),
-    Rule(
-        lambda s, load: bool(load.notes),
-        "{load.file}: {notes}",
-        lambda s, load: {"notes": "; ".join(load.notes)},
-    ),
-    Rule(
-        lambda s, load: load.begins >= s.time.t_end,
-        "{load.start}: plays no part here; the run ends at {time.t_end}",
-    ),
-)
+def _load(scene: Scene, load: Load) -> Iterator[str]:
+    """Yield the warnings about one ``load``; ``[load.key]`` in a text is a key of it."""
+    if load.is_finer_than(scene.coupling.macro_step):
+        yield (
+            "[load.file]: its lines are closer than a quarter of [coupling.macro_step], so steps do not end on them "
+            "and "
+            'errors fall slowly with the step; take a smaller macro_step, or interpolation = "cubic"'
+        )
+    if load.notes:
+        yield f"[load.file]: {'; '.join(load.notes)}"
+    if load.begins >= scene.time.t_end:
+        yield "[load.start]: plays no part here; the run ends at [time.t_end]"
 
 
 # -- keys without effect --------------------------------------------------------------------------------------------
-
-
-def _counts(
-    places: str,
-    counts: Callable[[Any], bool],
-    where: str,
-    numbers: Callable[[Scene], Mapping[str, Any]] = lambda s: {},
-) -> list[Rule]:
-    """Return rules for keys that are given, and not as their default, in scenes where they have no effect."""
-
-    def rule(table: str, key: str) -> Rule:
-        def idle(scene: Scene) -> bool:
-            content = scene.under(table)
-            return (
-                isinstance(content, TABLES[table])
-                and key in (fields := type(content).model_fields)
-                and getattr(content, key) != fields[key].default
-                and not counts(scene)
-            )
-
-        return Rule(idle, f"{{{table}.{key}}}: plays no part here; {where}", numbers)
-
-    return [rule(*place.split(".")) for place in places.split()]
 
 
 def _dynamic(scene: Scene) -> bool:
     return scene.beam is not None and not scene.massless
 
 
+def _has_elements(scene: Scene) -> bool:
+    return _dynamic(scene) or (scene.beam is not None and scene.beam.tip_load_coefficient != 0.0)
+
+
+def _has_modes(scene: Scene) -> bool:
+    return scene.beam is not None and not scene.massless and scene.beam.integrator == "modal"
+
+
+def _is_coupled(scene: Scene) -> bool:
+    return scene.coupled
+
+
+def _has_peak_force(scene: Scene) -> bool:
+    return scene.coupled or (scene.upper is not None and scene.stop is not None)
+
+
+_IN_DYNAMICS = 'it counts with fidelity = "dynamic"'
 _JOINS = "it counts between two bodies, or a beam and a stop"
-#: Conditions under which keys have an effect. Loads reject such keys; here a warning suffices, so that ``--set`` can
-#: change a key that removes the effect of another.
-EFFECTS: tuple[Rule, ...] = (
-    *_counts(
-        "beam.element_degree beam.reduced_integration beam.mass_matrix",
+#: Keys, when they have an effect, and that in words. Loads reject such keys; here a warning suffices, so that ``--set``
+#: can change a key that removes the effect of another.
+EFFECTS: tuple[tuple[tuple[str, ...], Callable[[Scene], bool], str], ...] = (
+    (
+        ("beam.element_degree", "beam.reduced_integration", "beam.mass_matrix", "beam.integrator"),
         _dynamic,
-        'it counts with fidelity = "dynamic"',
+        _IN_DYNAMICS,
     ),
-    *_counts(
-        "beam.n_elements",
-        lambda s: _dynamic(s) or (s.beam is not None and s.beam.tip_load_coefficient != 0.0),
-        'it counts with fidelity = "dynamic", or for a tip_load_coefficient',
-    ),
-    *_counts(
-        "beam.integrator",
-        _dynamic,
-        'it counts with fidelity = "dynamic"',
-    ),
-    *_counts(
-        "beam.n_modes",
-        lambda s: _dynamic(s) and s.beam.integrator == "modal",
-        'it counts with fidelity = "dynamic" and integrator = "modal", the midpoint rule keeps all modes',
-    ),
-    Rule(lambda s: not s.coupled and s.contact.law != LAW.default, f"{{contact.law}}: plays no part here; {_JOINS}"),
-    *_counts("contact.stiffness contact.exponent contact.damping", lambda s: s.coupled, _JOINS),
-    *_counts(
-        "contact.force_window",
-        lambda s: s.coupled or (s.upper is not None and s.stop is not None),
-        "it counts where the run has a peak contact force",
-    ),
+    (("beam.n_elements",), _has_elements, f"{_IN_DYNAMICS}, or for a tip_load_coefficient"),
+    (("beam.n_modes",), _has_modes, f'{_IN_DYNAMICS} and integrator = "modal", the midpoint rule keeps all modes'),
+    (("contact.stiffness", "contact.exponent", "contact.damping"), _is_coupled, _JOINS),
+    (("contact.force_window",), _has_peak_force, "it counts where the run has a peak contact force"),
 )
+
+
+def _without_effect(scene: Scene) -> Iterator[str]:
+    if not scene.coupled and scene.contact.law != LAW.default:
+        yield f"[contact.law]: plays no part here; {_JOINS}"
+    for places, counts, where in EFFECTS:
+        for place in () if counts(scene) else places:
+            table, key = place.split(".")
+            content = scene.under(table)
+            fields = type(content).model_fields if isinstance(content, TABLES[table]) else {}
+            if key in fields and getattr(content, key) != fields[key].default:
+                yield f"[{place}]: plays no part here; {where}"
