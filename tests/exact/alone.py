@@ -5,7 +5,7 @@ The beam has ρA = ρI = L = 1, EI = KAG = κ, unless a function says otherwise;
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,7 +22,7 @@ from springbeam.bodies.fmu_bodies import FmuBeam
 from springbeam.bodies.protocol import NO_FORCE, StepRefused
 from springbeam.run.outcome import RunStopped
 from springbeam.run.runner import run_in_memory
-from springbeam.scene import Beam, Scene, Spring, scene_from_dict
+from springbeam.scene import Beam, Spring, scene_from_dict
 from springbeam.studies.tables import difference
 
 EPS = float(np.finfo(float).eps)
@@ -51,12 +51,12 @@ class Check:
     reason: str
 
     @property
-    def error(self) -> float | None:
+    def error(self):
         """computed − exact."""
         return difference(self.computed, self.exact)
 
     @property
-    def passed(self) -> bool:
+    def passed(self):
         """Whether the error is within the bound; NaN is not."""
         return self.error is not None and abs(self.error) <= self.bound
 
@@ -69,7 +69,7 @@ class Section:
     solution: Callable[..., Iterator[Check]]
     cases: tuple[tuple[Any, ...], ...]  #: what the solution is called with
 
-    def __call__(self) -> Iterator[Check]:
+    def __call__(self):
         """Yield the checks of all cases; a case that cannot be computed is a failed check."""
         for case in self.cases:
             try:
@@ -79,7 +79,7 @@ class Section:
                 yield Check("not computed", None, None, 0.0, f"{given}{error}")
 
 
-def section(title: str, *cases: tuple[Any, ...]) -> Callable[[Callable[..., Iterator[Check]]], Section]:
+def section(title, *cases):
     """Return what makes a `Section` of an exact solution; without ``cases`` it is called once."""
     return lambda solution: Section(title, solution, cases or ((),))
 
@@ -88,7 +88,7 @@ def section(title: str, *cases: tuple[Any, ...]) -> Callable[[Callable[..., Iter
 
 #: Half the rows in which frequencies are looked for, and what of them is rounding.
 _SAMPLES, _ROUNDING = 300, 1e-11
-_VARIANTS: dict[str, dict[str, Any]] = {
+_VARIANTS = {
     "full, all modes": {},
     "full, 1 mode": {"n_modes": 1},
     "reduced, all modes": {"reduced_integration": True},
@@ -97,7 +97,7 @@ _VARIANTS: dict[str, dict[str, Any]] = {
 
 
 @section("Beam: static deflection of the tip, locking", *product((1.0, 1e6), _VARIANTS))
-def static_deflection(kag: float, variant: str) -> Iterator[Check]:
+def static_deflection(kag, variant):
     """Tip deflection under a tip load of 1 N, of the mesh of n elements (h = L/n) and of the beam it stands for.
 
     Full integration: (1/3EI + 1/KAG)/(1 + KAG h²/12EI), which locks; reduced: (1 − h²/4)/3EI + 1/KAG; the beam:
@@ -120,7 +120,7 @@ def static_deflection(kag: float, variant: str) -> Iterator[Check]:
     yield Check(name, share, deflection / true, (2 * n) ** 2 * EPS * share, reason)
 
 
-def _bar(unknowns: int, mass_matrix: str, dispersed: Callable[[float], float]) -> tuple[Any, ...]:
+def _bar(unknowns, mass_matrix, dispersed):
     """Return a case of `frequencies`: a bar of c = 1 (θ kept at rest by a huge ρI) on linear elements.
 
     ``dispersed`` is the ω h of a wave that turns by kh over h; k = (j − ½)π.
@@ -130,7 +130,7 @@ def _bar(unknowns: int, mass_matrix: str, dispersed: Callable[[float], float]) -
     return f"bar, {mass_matrix} mass", {**mesh, "second_moment_of_area": 1e14, "young_modulus": 1e3}, 0.1, exact
 
 
-def _stiff(kappa: float) -> tuple[Any, ...]:
+def _stiff(kappa):
     """Return a case of `frequencies`: EI = KAG = κ on 8 elements of degree 8, exact to rounding."""
     exact = {i: sqrt(kappa) * w for i, w in enumerate(clamped_free_frequencies()[:6], 1)}
     mesh = {"n_elements": 8, "element_degree": 8, "young_modulus": kappa, "shear_modulus": kappa}
@@ -138,10 +138,10 @@ def _stiff(kappa: float) -> tuple[Any, ...]:
 
 
 @lru_cache(maxsize=1)
-def clamped_free_frequencies() -> tuple[float, ...]:
+def clamped_free_frequencies():
     """Return those up to 30 rad/s of EI = KAG = ρA = ρI = L = 1: zeros of det X, X of `free_end`."""
 
-    def determinant(w: float) -> float:
+    def determinant(w):
         return float(np.linalg.det(free_end(expm(transfer_rate(w)))))
 
     grid = np.arange(0.05, 30.0, 0.05)
@@ -153,7 +153,7 @@ def clamped_free_frequencies() -> tuple[float, ...]:
     )
 
 
-def free_end(across: np.ndarray) -> np.ndarray:
+def free_end(across):
     """Return the part of a transfer matrix from (M, Q) at the clamp to (M, Q) at the tip, (2, 2).
 
     It is singular at a natural frequency.
@@ -161,7 +161,7 @@ def free_end(across: np.ndarray) -> np.ndarray:
     return across[np.ix_([1, 3], [1, 3])]
 
 
-def transfer_rate(w: float, softer: complex = 1.0) -> np.ndarray:
+def transfer_rate(w, softer=1.0):
     """Return A of (θ, M, u, Q)' = A (θ, M, u, Q) at the frequency ``w`` [rad/s]; shape (4, 4).
 
     θ' = M/EI,  M' = −Q − ρI ω² θ,  u' = Q/KAG + θ,  Q' = −ρA ω² u; EI = KAG = 1/``softer``, ρA = ρI = 1.
@@ -169,7 +169,7 @@ def transfer_rate(w: float, softer: complex = 1.0) -> np.ndarray:
     return np.array([[0, softer, 0, 0], [-w * w, 0, 0, -1], [1, 0, 0, softer], [0, 0, -w * w, 0]])
 
 
-def _measured_frequencies(beam: Beam, size: float) -> np.ndarray:
+def _measured_frequencies(beam, size):
     """Return the frequencies [rad/s] in the tip's velocity after an impulse, from rows at steps of ``size`` [s].
 
     By ESPRIT (Roy & Kailath 1989): shifted by a row, the space that the rows span turns by the angles ωH.
@@ -192,7 +192,7 @@ def _measured_frequencies(beam: Beam, size: float) -> np.ndarray:
     _bar(100, "consistent", lambda kh: sqrt(6.0 * (1.0 - cos(kh)) / (2.0 + cos(kh)))),
     _bar(100, "averaged", lambda kh: sqrt(12.0 * (1.0 - cos(kh)) / (5.0 + cos(kh)))),
 )
-def frequencies(name: str, beam: dict[str, Any], size: float, exact: dict[int, float]) -> Iterator[Check]:
+def frequencies(name, beam, size, exact):
     """Clamped–free frequencies of the beam, and of a bar, whose waves the mesh disperses.
 
     Consistent mass: ω h/c = √(6(1 − cos kh)/(2 + cos kh)), too fast by (kh)²/24 of it; averaged mass:
@@ -210,7 +210,7 @@ IDA = "IDA: BDF of order ≤ 5 takes some ε^(−1/6) internal steps a radian, e
 _SPRINGS = ((3.0, -0.2, 0.5), (3.0, -0.2, 1.0), (150.0, 67.0, 0.5), (150.0, 67.0, 1.0))
 
 
-def duffing_period(k1: float, k2: float, amplitude: float) -> float:
+def duffing_period(k1, k2, amplitude):
     """Return the period [s] of the undamped ÿ + k1 y + k2 y³ = 0 of a unit mass, from rest at ``amplitude`` [m].
 
     Hardening: y = A cn(ωt|μ), ω² = k1 + k2A², μ = k2A²/2ω². Softening: y = A sn(ωt + K|μ), ω² = k1 + k2A²/2,
@@ -221,7 +221,7 @@ def duffing_period(k1: float, k2: float, amplitude: float) -> float:
 
 
 @section("Spring: Duffing (k1, k2, A), from rest", *_SPRINGS)
-def duffing(k1: float, k2: float, amplitude: float) -> Iterator[Check]:
+def duffing(k1, k2, amplitude):
     """Undamped Duffing spring, m = 1, from rest at A: where it is, at rest again, after `duffing_period`.
 
     A period that is off by δT leaves it with ẏ = (k1 A + k2 A³) δT.
@@ -234,12 +234,12 @@ def duffing(k1: float, k2: float, amplitude: float) -> Iterator[Check]:
     yield Check(f"{name}: ẏ(T) [m/s]", 0.0, float(run.z[-1]), relative * amplitude * 2.0 * pi / period, IDA)
 
 
-def ida_error(radians: float) -> float:
+def ida_error(radians):
     """Return the relative error that IDA's tolerance ε, the default of scenes, leaves over an angle ωT: `IDA`."""
     return float(radians * Spring.with_ones().relative_tolerance ** (5.0 / 6.0))
 
 
-def scene_of(t_end: float, macro_step: float, loads: Sequence[dict[str, Any]] = (), **bodies: Beam | Spring) -> Scene:
+def scene_of(t_end, macro_step, loads=(), **bodies):
     """Return a scene of ``bodies`` under ``loads`` in steps of ``macro_step`` [s], of degree 2 if it may."""
     tables = {name: body.model_dump(exclude_none=True) for name, body in bodies.items()}
     degree = 2 if all(table.get("integrator") != "midpoint" for table in tables.values()) else 0

@@ -49,8 +49,7 @@ def test_a_wild_guess_does_not_loosen_the_conditions(degree):
 
 
 @pytest.mark.parametrize("degree", DEGREES)
-@pytest.mark.parametrize("frequency", [0.5, 5.0, 1000.0])
-@pytest.mark.parametrize(("mass", "k2"), [(0.01, 0.3), (1.0, 0.0), (1.0, 3e3), (100.0, 3e3)])
+@pytest.mark.parametrize(("frequency", "mass", "k2"), [(0.5, 1.0, 0.0), (5.0, 0.01, 3e3), (1000.0, 100.0, 3e3)])
 def test_energy_schemes_conserve_energy(degree, frequency, mass, k2):
     """60 steps. A gap of the tolerance costs C·1e-12·(motion), at most 1e-11 of the energy where C is the image of
     mismatched velocities, and up to 1000 times that is accepted where the bodies' rounding is."""
@@ -88,20 +87,12 @@ def test_a_body_may_be_rounded_by_a_thousand_tolerances_and_no_more(grain, found
 # -- soft laws on bodies exact to rounding: energy at any stiffness, orders 2, 4 and 6, cost --------------------------
 
 
-def couple_by(law, degree, size, steps, upper, lower):
-    """The rows; their energies are conserved to 1e-11, through whatever is dissipated."""
-    coupling = SoftSolver(law, degree, 1e-13)
-    rows = couple(coupling, size, steps, upper, lower)
-    assert max(abs(row.energy - rows[0].energy) for row in rows) < 1e-11 * rows[0].energy
-    return rows, coupling
-
-
 @pytest.mark.parametrize("law", [Compliance(1e4, 1.5, 0.5), Compliance(1e6, 1.0, 5.0), Link(1e4, 3.0)], ids=repr)
-@pytest.mark.parametrize("degree", DEGREES)
-@pytest.mark.parametrize("size", [1e-3, 2e-2])
+@pytest.mark.parametrize(("degree", "size"), [(0, 1e-3), (1, 2e-2), (2, 2e-2)])
 def test_what_damping_takes_is_booked(law, degree, size):
     """The bodies' and the law's energies and what the law dissipated: constant to rounding, at any step."""
-    rows, coupling = couple_by(law, degree, size, 100, unit_beam(4), DuffingBody(k1=3.0, k2=-0.2))
+    coupling = SoftSolver(law, degree, 1e-13)
+    rows = couple(coupling, size, 60, unit_beam(4), DuffingBody(k1=3.0, k2=-0.2))
     assert coupling.state.dissipated > 1e-4
     assert max(abs(row.energy - rows[0].energy) for row in rows) < 1e-12 * rows[0].energy
 
@@ -120,8 +111,7 @@ class Affine(Body):
         return Motion(self.state, 0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("response", [1e-12, 1.0, 1e4])
-@pytest.mark.parametrize("depth", [1e-9, 10.0])
+@pytest.mark.parametrize(("response", "depth"), [(1e-12, 10.0), (1.0, 1e-9), (1e4, 10.0)])
 def test_forces_are_found_however_far_they_move_the_ends(depth, response):
     """λ = 1e12 N/m, q = 1, contact from the start of the step: C = λ p⁺/2 with p⁺ = depth − 2·response·C. The force at
     C = 0 is up to 1e16 times the one that is looked for."""
@@ -182,7 +172,7 @@ def test_damping_never_gives_energy(start, end, mean, skew, degree, q, chi):
 
 
 @pytest.mark.parametrize("chi", [0.0, 0.2])
-@pytest.mark.parametrize("end", [1.0 + 2e-9, 0.95, 0.4, 0.2, -0.3])
+@pytest.mark.parametrize("end", [1.0 + 2e-9, 0.95, 0.2, -0.3])
 @pytest.mark.parametrize("degree", DEGREES)
 def test_the_force_is_the_projection_of_the_law(degree, end, chi):
     """Beside Gauss points between the zeros of p; the projection's own are off by 2e-8 where p nearly touches 0."""

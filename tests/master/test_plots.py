@@ -13,41 +13,40 @@ from runs import EVERY_EVENT, ODD_COLUMNS, PAIR, SCENES, a_trajectory
 
 from springbeam import Event, with_changes
 from springbeam.pictures import plots
-from springbeam.pictures.drawing import (
-    EVENT_LOOKS,
-    NOT_RESOLVED,
-    decimated,
-)
+from springbeam.pictures.drawing import EVENT_LOOKS, NOT_RESOLVED, decimated
 from springbeam.pictures.plots import figure_of, plot_run
 from springbeam.results.directory import PICTURES
 
-OVERVIEW, A, B, C, D, E, F, G = PICTURES.values()
-DRAWN = {
-    **dict.fromkeys(("all", "no stop", "no spring", "beam"), (OVERVIEW, A, B, C, D, E, F, G)),
-    **dict.fromkeys(("no beam", "spring"), (OVERVIEW, C, D, E, F)),
-}  # fmt: skip
+#: Which are not drawn: of a run without a beam, and of one that stopped before its tip met anything.
+OF_A_BEAM = {"shapes_after_contact", "shapes_later", "moments"}
+AFTER_CONTACT = {"shapes_later", "moments"}
 
 
-@pytest.mark.parametrize("has", SCENES)
-def test_a_scene_gets_the_pictures_of_what_it_has(tmp_path, unpainted, has):
+@pytest.mark.parametrize(
+    ("has", "rows", "missing"),
+    [
+        ("no spring", 400, set()),
+        ("spring", 400, OF_A_BEAM),
+        ("all", 1, set(PICTURES)),
+        ("all", 2, AFTER_CONTACT),
+    ],
+)
+def test_a_run_gets_the_pictures_of_what_it_has(tmp_path, unpainted, has, rows, missing):
+    """From its second row on."""
     style = dict(matplotlib.rcParams)
-    written = plot_run(a_trajectory(SCENES[has]), tmp_path, PICTURES)
+    whole = a_trajectory(SCENES[has])
+    columns = {name: values[:rows] for name, values in whole.columns.items()}
+    shapes = None if whole.shape_table is None else whole.shape_table[:rows]
+    written = plot_run(dataclasses.replace(whole, columns=columns, shape_table=shapes), tmp_path, PICTURES)
     assert dict(matplotlib.rcParams) == style  # none is left behind
     assert sorted(written) == sorted(tmp_path.iterdir())
-    assert tuple(path.name for path in written) == DRAWN[has]
-
-
-@pytest.mark.parametrize(("rows", "drawn"), [(0, []), (1, []), (2, [OVERVIEW, A, C, D, E, F])])
-def test_a_run_that_stopped_at_once_is_drawn_from_its_second_row_on(tmp_path, unpainted, rows, drawn):
-    whole = a_trajectory()
-    columns = {name: values[:rows] for name, values in whole.columns.items()}
-    short = dataclasses.replace(whole, columns=columns, shape_table=whole.shape_table[:rows])
-    assert [path.name for path in plot_run(short, tmp_path, PICTURES)] == drawn
+    assert [path.name for path in written] == [file for name, file in PICTURES.items() if name not in missing]
 
 
 def test_odd_columns_are_drawn_without_a_warning(tmp_path, recwarn, monkeypatch):
     monkeypatch.setattr(plots, "DPI", 40)
-    for path in plot_run(a_trajectory(events=EVERY_EVENT, **ODD_COLUMNS), tmp_path, PICTURES):
+    drawn = ("shapes_after_contact", "velocities_and_forces", "gap_and_energy")
+    for path in plot_run(a_trajectory(events=EVERY_EVENT, **ODD_COLUMNS), tmp_path, drawn):
         assert imread(path)[..., :3].std() > 0.02  # not blank
     assert [str(warning.message) for warning in recwarn] == []
 
@@ -62,21 +61,25 @@ def texts(figure):
 @pytest.mark.parametrize("picture", PICTURES)
 def test_axes_have_quantities_and_units_and_the_key_names_phases_and_events(picture):
     run = a_trajectory(events=EVERY_EVENT)
+    run.summary["resolved"] = False
     figure = figure_of(run, picture)
-    along = picture.startswith("shapes") or picture == "moments"
-    axes = figure.axes
-    assert all(ax.get_ylabel().endswith("]") for ax in axes)
-    if along:
-        *axes, key = axes
+    assert all(ax.get_ylabel().endswith("]") for ax in figure.axes)
+    if picture in OF_A_BEAM:
+        *axes, key = figure.axes
         assert {ax.get_xlabel() for ax in axes} == {"position along the beam x [m]"}
         assert key.get_ylabel().startswith("time t [")
     else:
-        assert axes[-1].get_xlabel() == "time t [s]"
+        assert figure.axes[-1].get_xlabel() == "time t [s]"
         key = {text.get_text() for text in figure.legends[0].get_texts()}
         assert {"free", "tied (u = y < Ψ)", *(f"{look.words} (1)" for look in EVENT_LOOKS.values())} <= key
-    for summary in ({"resolved": True}, {"resolved": False}, {}):
-        marked = figure_of(dataclasses.replace(run, summary=summary), picture)
-        assert (NOT_RESOLVED in texts(marked)) is not summary.get("resolved", True)
+    assert NOT_RESOLVED in texts(figure)
+
+
+@pytest.mark.parametrize("summary", [{"resolved": True}, {}])
+def test_a_run_that_is_resolved_has_no_mark(summary):
+    run = dataclasses.replace(a_trajectory(), summary=summary)
+    for picture in ("positions", "moments"):
+        assert NOT_RESOLVED not in texts(figure_of(run, picture))
 
 
 def written(figure):
@@ -102,19 +105,22 @@ def assert_nothing_collides(figure):
 LONG = "A dropped package with a long name, which is wrapped where the picture ends, and goes on for more than a line"
 
 
-@pytest.mark.parametrize("picture", plots._OVER_TIME)
-@pytest.mark.parametrize("law", ["transmission", "compliance"])
-def test_nothing_written_over_time_is_cut_off_or_lies_on_anything_else(picture, law):
-    scene = with_changes(PAIR, contact={"law": law, **({"damping": 0.5} if law == "compliance" else {})})
+@pytest.mark.parametrize(
+    ("picture", "contact"),
+    [
+        ("overview", {}),
+        ("velocities_and_forces", {"law": "compliance", "damping": 0.5}),
+        ("gap_and_energy", {"law": "compliance", "damping": 0.5}),
+        ("loads_and_clamp", {}),
+    ],
+)
+def test_nothing_written_over_time_is_cut_off_or_lies_on_anything_else(picture, contact):
+    scene = with_changes(PAIR, contact=contact)
     events = [Event(0.3 + 1e-3 * k, kind, 0, 0, 0, 0, 1e-3, 0.6, 0.1) for k in range(40) for kind in EVENT_LOOKS]
     run = a_trajectory(scene.model_copy(update={"title": LONG}), events=events)
     run.summary |= {"resolved": False, "contact_force_max": 9.98, "contact_force_window": 3.28e-4}
     run.summary |= {"contact_force_max_time": 0.3}
-    figure = figure_of(run, picture)
-    assert_nothing_collides(figure)
-
-
-# -- panels: what plots and report draw over time ---------------------------------------------------------------------
+    assert_nothing_collides(figure_of(run, picture))
 
 
 # -- thinning -----------------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from exact import coupled, laws
 from exact.alone import clamped_free_frequencies
 from references import dips
 from scenes import kinds, soft
+from scipy.linalg import block_diag, expm
 
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
@@ -51,7 +52,7 @@ def test_rows_cost_no_steps_and_lie_on_the_motion_of_a_run_that_ends_there(chang
                 assert abs(column[-1] - many[name][row]) <= 1e-11 * scale, name
 
 
-LAWS = [exact.compliant_impact, exact.hunt_crossley, exact.link, exact.damped_link, exact.tie]
+LAWS = [exact.compliant_impact, exact.hunt_crossley, exact.link, exact.tie]
 
 
 @pytest.mark.parametrize(
@@ -72,8 +73,26 @@ def test_the_reference_of_a_bar_on_a_stop_approaches_the_exact_impact(monkeypatc
     assert [check.quantity for check in exact.bar_impact.solution(10) if not check.passed] == []
 
 
+def linked(scene, M, K, q, v, times):
+    """Return (u, y) [m] at ``times`` [s], shape (len(times), 2), of a beam on a linear spring and a link.
+
+    ``M``, ``K`` are the matrices of the beam, whose last unknown is the tip; ``q``, ``v`` its state at the start.
+    Exact: M q̈ + (α_b K + c gᵀg) q̇ + (K + λ gᵀg) q = F with the spring's unknown added, p = g q.
+    """
+    spring, law, n = scene.spring, scene.contact, len(M) + 1
+    joint = np.pad([[1.0, -1.0], [-1.0, 1.0]], (n - 2, 0))  # gᵀg
+    mass = block_diag(M, spring.mass)
+    damping = block_diag(scene.beam.alpha_b * K, spring.damping) + law.damping * joint
+    stiffness = block_diag(K, spring.linear_stiffness) + law.stiffness * joint
+    load = np.append(np.zeros(n - 1), spring.external_force)[:, None]
+    rates = np.linalg.solve(mass, np.hstack([-stiffness, -damping, load]))
+    A = np.vstack([np.eye(n, 2 * n + 1, n), rates, np.zeros(2 * n + 1)])  # of displacements, velocities and 1
+    start = np.concatenate([q, [spring.equilibrium], v, [spring.initial_velocity, 1.0]])
+    return np.array([(expm(A * t) @ start)[[n - 2, n - 1]] for t in times])
+
+
 @pytest.mark.parametrize("alpha", [0.0, 1e-3])
-@pytest.mark.parametrize(("stiffness", "damping"), [(0.0, 3.0), (1e2, 0.0), (1e4, 3.0)])
+@pytest.mark.parametrize(("stiffness", "damping"), [(0.0, 3.0), (1e4, 3.0)])
 def test_a_beam_on_a_link_is_the_matrix_exponential(stiffness, damping, alpha):
     contact = {"law": "link", "stiffness": stiffness, "damping": damping}
     spring = {"damping": 0.4, "external_force": -0.5}
@@ -82,7 +101,7 @@ def test_a_beam_on_a_link_is_the_matrix_exponential(stiffness, damping, alpha):
     result = event_driven.integrate(scene, sample_times=times, t_end=0.2)
     mesh = assemble(scene.beam)
     x = mesh.slope_shape
-    expected = laws.linked(scene, mesh.M.toarray(), mesh.K.toarray(), 0.02 * x, -x, times)
+    expected = linked(scene, mesh.M.toarray(), mesh.K.toarray(), 0.02 * x, -x, times)
     found = np.column_stack([result.u_tip, result.y])
     np.testing.assert_allclose(found, expected, atol=2e-13)
 

@@ -50,7 +50,6 @@ def changed(monkeypatch):
         (exact.compliant_impact, FmuSpring, "mass", 1.01),
         (exact.link, FmuBeam, "shear_modulus", 1.01),
         (exact.resonance, FmuBeam, "alpha_b", 1.01),
-        (exact.pulse, FmuSpring, "linear_stiffness", 1.01),
     ],
     ids=lambda given: getattr(given, "solution", given).__name__ if callable(given) else str(given),
 )

@@ -94,7 +94,8 @@ class LinearForm:
         self.unresolved = f"no step resolves the interface force in phase {phase.name}"
         (omega2, c, load) = s.oscillating(phase)
         held = s.held(phase)
-        self.offset = held.levels @ held.along
+        soft = held.rows / np.where(omega2 > 0.0, omega2, 1.0)
+        self.offset = np.linalg.solve(soft @ held.rows.T, held.levels) @ soft
         self.omega2, self.basis = _modes(omega2, s.space(phase))
         self.inverse = self.basis / np.sum(self.basis**2, axis=0)  # its columns are at right angles
         self.c = c @ self.basis**2  # where nothing is joined a mode is a coordinate
