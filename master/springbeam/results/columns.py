@@ -50,7 +50,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     phase = PHASE_NAMES[steps["phase"].astype(int)]
     if rigid:  # ends that touch and part at once: a pulling force is no contact force
         contact = np.where(phase == "touch", np.maximum(contact, 0.0), contact)
-    inside = contact
+    inside = zeros if rigid else contact
     if scene.coupled and scene.contact.strikes:
         inside = np.minimum(normal_compliance(scene, u, first), MOST_SHOWN)
     energies = ledger(steps)
