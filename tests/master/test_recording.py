@@ -166,7 +166,7 @@ def test_a_kill_at_any_byte_leaves_all_blocks_but_the_last(tmp_path, monkeypatch
     whole, killed = load_trajectory(tmp_path / "whole"), Path(shutil.copytree(tmp_path / "whole", tmp_path / "killed"))
     borders = {*done, *np.cumsum([len(content) for _, content in writes])}
     for at in sorted(
-        at for at in borders.union(np.random.default_rng(1).integers(*done[:: len(kept)], size=200)) if at >= done[0]
+        at for at in borders.union(np.random.default_rng(1).integers(*done[:: len(kept)], size=60)) if at >= done[0]
     ):
         files, left = dict.fromkeys(headers, b""), at
         for name, content in writes:
@@ -188,8 +188,10 @@ def test_a_kill_at_any_byte_leaves_all_blocks_but_the_last(tmp_path, monkeypatch
 # -- damaged files ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("cut", [1, 40, 10_000])
-@pytest.mark.parametrize("name", ["steps.bin", "trajectory.csv", "shapes.csv", "events.csv"])
+@pytest.mark.parametrize(
+    ("name", "cut"),
+    [("steps.bin", 1), ("steps.bin", 10_000), ("trajectory.csv", 40), ("shapes.csv", 1), ("events.csv", 1)],
+)
 def test_a_run_that_is_done_and_lacks_a_part_does_not_pass_as_whole(tmp_path, name, cut):
     filed(tmp_path / "run")
     path = tmp_path / "run" / name
@@ -253,16 +255,12 @@ def test_tables_are_exported_as_parquet(tmp_path, scene):
 
 DAMAGE = {
     "nan in the records": ("steps.bin", lambda content: np.full(len(STEP_COLUMNS), np.nan).tobytes() + content),
-    "records that are cut": ("steps.bin", lambda content: content[8:]),
     "records out of order": ("steps.bin", lambda content: content[52_800:] + content[:52_800]),
     "too few events": ("events.csv", lambda content: b"\n".join(content.split(b"\n")[:-3]) + b"\n"),
-    "an unknown event": ("events.csv", lambda content: content.replace(b"impact", b"bang", 1)),
     "a word for a number": ("events.csv", lambda content: content.replace(b"0.5", b"five", 1)),
-    "no events": ("events.csv", lambda content: b""),
     "another column of shapes": ("shapes.csv", lambda content: content.replace(b"u_0", b"w_0", 1)),
     "a row of shapes too long": ("shapes.csv", lambda content: content.replace(b"\n0.0,", b"\n0.0,0.5,", 1)),
     "half a summary": ("summary.json", lambda content: content[:-20]),
-    "no scene": ("summary.json", lambda content: b"[]"),
 }
 
 

@@ -13,11 +13,11 @@ from springbeam.results.steps import STEP
 from springbeam.run.resolution import curve_error, peak_force_doubt, why_not_resolved
 from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair
-from springbeam.scene import load_scene, shipped_scenes, with_changes
+from springbeam.scene import load_scene, with_changes
 from springbeam.scene.frequencies import fastest_frequency, impact_frequency, mesh_frequency, slowest_frequency
 from springbeam.scene.statics import lowest_frequency, tip_compliance
 
-BEAMS = [name for name in shipped_scenes() if load_scene(name).beam is not None]
+BEAMS = ["soft", "steel-bumper", "vibro-impact", "bar-impact"]
 PAIR = load_scene("soft")
 
 
@@ -62,7 +62,7 @@ def judged(scene, misplaced=0.0, between=0.0, steps=None):
     return why_not_resolved(pair, records() if steps is None else steps, misplaced, between)
 
 
-@pytest.mark.parametrize("turn", [1.0, 2.0, 3.0, 4.0, 2.0 * np.pi, 8.0])
+@pytest.mark.parametrize("turn", [1.0, 3.0, 2.0 * np.pi, 8.0])
 def test_the_curve_of_an_oscillation_is_as_wrong_as_is_said(turn):
     """A mass on a spring, which rows show exactly: in 40 steps that are no whole period every phase comes by."""
     omega, H = 10.0, turn / 10.0
@@ -187,7 +187,7 @@ def test_what_rows_that_are_right_hide_between_them_is_said():
     beam = {**PAIR.beam.model_dump(), "n_elements": 8, "approach": "elastic", "initial_velocity_slope": 0.0}
     period = 2.0 * np.pi / slowest_frequency(PAIR.beam)
     free = scene_from_dict({"time": {"t_end": 2.0 * period}, "beam": {**beam, "initial_deflection_slope": 0.03}})
-    exact = simulate(with_changes(free, coupling={"macro_step": period / 5000.0}))
+    exact = simulate(with_changes(free, coupling={"macro_step": period / 1000.0}))
     times = np.linspace(0.0, exact.time[-1], 401)
 
     def off(size):
@@ -205,8 +205,7 @@ def test_what_rows_that_are_right_hide_between_them_is_said():
     assert far < 0.01
 
 
-@pytest.mark.parametrize("on", ["tip", "base"])
-@pytest.mark.parametrize("coupling", [{}, {"relative_tolerance": 1e-2}])
+@pytest.mark.parametrize(("on", "coupling"), [("base", {}), ("tip", {"relative_tolerance": 1e-2})])
 def test_a_table_in_resonance_with_a_mode_that_turns_far_in_a_step_is_said(tmp_path, on, coupling):
     """The third mode turns 9 rad in each of 12 steps to a period: what drives it is not in their polynomials."""
     sizes = {"density": 1e3, "area": 0.01, "second_moment_of_area": 8.3e-6, "young_modulus": 1e7, "shear_modulus": 4e6}
@@ -214,7 +213,7 @@ def test_a_table_in_resonance_with_a_mode_that_turns_far_in_a_step_is_said(tmp_p
     beam = scene_from_dict({"time": {"t_end": 1.0}, "beam": slender}).beam
     first, _, third = modal_beam(beam).omega[:3]
     end, file = 4.0 * np.pi / first, tmp_path / "table.csv"
-    times = np.linspace(0.0, end, 2000)
+    times = np.linspace(0.0, end, 800)
     np.savetxt(file, np.column_stack([times, np.sin(third * times)]), delimiter=",")
     load = {"on": on, "signal": "table", "file": str(file), "interpolation": "cubic"}
     scene = scene_from_dict({"time": {"t_end": end}, "beam": slender, "loads": [load]})
@@ -222,7 +221,7 @@ def test_a_table_in_resonance_with_a_mode_that_turns_far_in_a_step_is_said(tmp_p
     def run(**coupling):
         return simulate(with_changes(scene, coupling=coupling))
 
-    exact = run(macro_step=end / 1000.0)
+    exact = run(macro_step=end / 400.0)
     coarse = run(**coupling or {"macro_step": end / 24.0})
     off = np.abs(coarse.u_tip - exact.at(coarse.time).u_tip).max() / np.abs(exact.u_tip).max()
     told = [text for text in coarse.summary["warnings"] if "and the loads" in text]
@@ -261,10 +260,6 @@ def test_a_peak_force_that_depends_on_the_mesh_is_told(factor, told):
     assert (said is not None) == told
     assert not told or "contact.force_window >= 0.0095 s" in said
     assert doubt(window, contact={"law": "compliance"}) is None  # it has a peak of its own
-    # Waves that are not kept settle nothing: of 5 modes the fastest counts.
-    few = {"n_modes": 5}
-    slow = 2.5 * 2.0 * np.pi / fastest_frequency(with_changes(load_scene("soft"), beam=few).beam)
-    assert (doubt(factor * slow, beam=few) is not None) == told
 
 
 def test_ends_move_with_both_masses_unless_the_lower_one_is_held():

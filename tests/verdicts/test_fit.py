@@ -2,23 +2,18 @@
 
 import json
 import re
-import signal
-import subprocess
-import sys
-import time
-from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from commands import HANGS, Interrupt, command, printed, refused
+from commands import Interrupt, command, printed, refused
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 from scenes import scene_from_dict
 from scipy.stats import t as student
 
-from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
+from springbeam import SceneError, load_scene, simulate, with_changes
 from springbeam.signals.measured import read_measured, residuals
 from springbeam.studies import fit
 
@@ -47,9 +42,15 @@ def written(path, header, *columns):
     return path
 
 
+#: Most runs that judge a minimum: two rounds of a finer run and one beside a repeated measurement.
+JUDGING = 4
+
+
 def fitted(path, vary=GUESSES, scene=OSCILLATOR, **options):
     study = fit.Fit(scene=scene, file=path, vary=tuple(vary), **options)
-    found = study.findings(study.computed())
+    records = study.computed()
+    assert len(records) <= study.expected(len(records)) <= study.most + JUDGING  # for a progress bar that ends
+    found = study.findings(records)
     assert found.code == bool(found.document["undetermined"])
     return {**found.document, "runs": found.tables["fit"]}
 
@@ -89,59 +90,39 @@ def test_residuals_are_those_of_each_curve(tmp_path):
         residuals(run, read_measured(path, OSCILLATOR), 9.0)
 
 
-BAD = {
-    "time,y\n0,1": "1 lines with numbers; there must be two at least",
-    "0,1\n1,2": "the first line must name the columns",
-    "time,y\n0,1\n0,2": "is not after that of the line before",
-    "time,y\n0,1\n1,x": "line 3, column y: 'x' is not a finite number",
-    "time,y\n0,1\n1,nan": 'line 3, column y: the value is missing; missing = "drop" leaves',
-    "time,y\n0,1\n1,2,3": "line 3: 3 columns; there must be as many as",
-    "time,w\n0,1\n1,2": "no column is called as one of the run (time, y",
-    "time,y [kg]\n0,1\n1,2": "column y: [kg] is no unit of what a run has in m",
-    "time,y [wurst]\n0,1\n1,2": "[wurst] is no unit",
-}
-
-
-@pytest.mark.parametrize("text", BAD)
-def test_a_bad_file_is_refused_with_its_line_and_column(tmp_path, text):
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("0,1\n1,2", "the first line must name the columns"),
+        ("time,w\n0,1\n1,2", "no column is called as one of the run (time, y"),
+        ("time,y [kg]\n0,1\n1,2", "column y: [kg] is no unit of what a run has in m"),
+    ],
+)
+def test_a_file_without_a_column_of_the_run_is_refused(tmp_path, text, why):
+    """Others are those of master/recorded.toml."""
     path = tmp_path / "m.csv"
     path.write_text(text)
-    with pytest.raises(SceneError) as error:
+    with pytest.raises(SceneError, match=re.escape(why)):
         read_measured(path, OSCILLATOR)
-    assert BAD[text] in str(error.value)
 
 
 def test_the_command_compare_takes_a_measurement(here):
     simulate(OSCILLATOR).save("run")
     written(here / "m.csv", "time [s],position [mm]", TIMES + 0.2, 1e3 * exact())
-    shown = printed("compare", "run", "m.csv", "--map", "position=y")
-    assert "shift" in shown
-    told = json.loads(printed("compare", "run", "m.csv", "--map", "position=y", "--json", "--no-plots"))
-    assert told["shift"] == pytest.approx(-0.2, abs=1e-6)
-    assert told["residuals"][0]["relative"] < 1e-4
-    assert json.loads(printed("compare", "run", "m.csv", "--map", "position=y", "--shift", "-0.2", "--json",
-                              "--no-plots"))["residuals"][0]["relative"] < 1e-8  # fmt: skip
+    compare = ("compare", "run", "m.csv", "--json", "--map")
+    for clock, shift, apart in (([], pytest.approx(-0.2, abs=1e-6), 1e-4), (["--shift", "-0.2"], -0.2, 1e-8)):
+        found = json.loads(printed(*compare, "position=y", *clock))
+        assert found["shift"] == shift
+        assert found["residuals"][0]["relative"] < apart
     assert (here / "results" / "comparison.png").stat().st_size > 10_000
-    assert "m.csv: --map CH1: there are the columns position" in refused("compare", "run", "m.csv", "--map", "CH1=y")
+    assert "m.csv: --map CH1: there are the columns position" in refused(*compare, "CH1=y")
 
 
 # -- keys found ---------------------------------------------------------------------------------------------------
 
 
-def test_a_contact_is_found_by_the_acceleration_of_the_tip_through_impacts(tmp_path):
-    scene = load_scene("vibro-impact", ["time.t_end=0.06", "beam.n_elements=6", "beam.n_modes=3"])
-    run = simulate(scene)
-    times = np.linspace(1e-3, 0.059, 150)
-    found = run.at(times)
-    path = written(tmp_path / "m.csv", "time,u_tip,acc [g]", times, found["u_tip"], found["a_tip"] / 9.80665)
-    guess = 1.2 * scene.contact.stiffness
-    names = ("u_tip=u_tip", "acc=a_tip")
-    (key,) = fitted(path, [f"contact.stiffness={guess!r}"], scene, names=names, shift=0.0)["keys"]
-    assert key["value"] == pytest.approx(scene.contact.stiffness, rel=1e-6)
-
-
-@pytest.mark.parametrize("late", [3.7e-3, 13.0])
-def test_keys_and_a_clock_that_is_off_are_found_to_1e_6_without_noise(tmp_path, late):
+def test_keys_and_a_clock_that_is_late_are_found_to_1e_6_without_noise(tmp_path):
+    late = 13.0
     path = written(tmp_path / "m.csv", "time,y", TIMES + late, exact())
     found = fitted(path)
     assert found["undetermined"] == []
@@ -164,22 +145,6 @@ def test_a_clock_that_the_data_does_not_tell_is_named(tmp_path):
     place, speed = fitted(path, begins, scene, shift=5e-3)["keys"]
     assert place["value"] == pytest.approx(5e-3, rel=1e-6)
     assert speed["value"] == pytest.approx(0.4, rel=1e-6)
-
-
-def test_a_trial_that_cannot_be_run_turns_the_search_back(tmp_path, monkeypatch):
-    """The first run of a search: after those all over the ranges, and two for the first derivatives."""
-    right, runs = fit.simulate, count()
-
-    def stops_once(scene):
-        if next(runs) == 18:
-            raise RunStopped("diverges", 0.1)
-        return right(scene)
-
-    monkeypatch.setattr(fit, "simulate", stops_once)
-    found = fitted(written(tmp_path / "m.csv", "time,y", TIMES, exact()), shift=0.0)
-    (error,) = [row["error"] for row in found["runs"] if row["error"]]
-    assert "diverges" in error
-    assert {row["key"]: row["value"] for row in found["keys"]} == pytest.approx(TRUE, rel=1e-6)
 
 
 def test_curves_weigh_by_what_is_left_of_them(tmp_path):
@@ -221,29 +186,18 @@ def test_keys_that_the_data_does_not_determine_are_named(tmp_path, vary, why):
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")  # of means of nothing, where the clock has left the run
 def test_the_command_ends_with_1_where_the_data_does_not_tell(here):
+    """And with 2 where there are too few points; invalid options are in bad_inputs.toml."""
     written(here / "m.csv", "time,y", TIMES, exact())
-    line = ["fit", "duffing", "m.csv", "--set", "time.t_end=0.6", "--vary"]
-    told = command(*line, "spring.cubic_stiffness=-1e-12", "--out", "f")
-    assert told.exit_code == 1
-    assert isinstance(told.exception, SystemExit)
-    assert "not determined: spring.cubic_stiffness does not change the curves" in " ".join(told.stdout.split())
-    for vary, why in {
-        "spring.mass": "TABLE.KEY=VALUES",
-        "mass=1": "TABLE.KEY=VALUES",
-        "spring.mass=1:2:3": "a guess is one value",
-        "spring.cubic_stiffness=-1:2": "a range of one sign",
-        "spring.mass=0": "0 has no size",
-        "beam.n_elements=4": "takes no real numbers",
-    }.items():
-        assert why in refused(*line, vary)
-    assert "must be a finite number greater than 0" in refused(*line, "spring.mass=-1")
     written(here / "few.csv", "time,y", TIMES[:2], exact()[:2])
-    few = command("fit", "duffing", "few.csv", "--vary", "spring.mass=1", "--out", "few")
-    assert few.exit_code == 2
-    assert "fewer of its points lie in the run" in few.stderr
-    away = command(*line, "spring.mass=1", "--shift", "9", "--out", "few")
-    assert away.exit_code == 2
-    assert "fewer of its points lie in the run than are needed to find spring.mass; make" in away.stderr
+    line = ["fit", "duffing", "m.csv", "--set", "time.t_end=0.6", "--vary"]
+    found = command(*line, "spring.cubic_stiffness=-1e-12", "--out", "f")
+    assert found.exit_code == 1
+    assert "not determined: spring.cubic_stiffness does not change the curves" in " ".join(found.stdout.split())
+    for few in (
+        ["fit", "duffing", "few.csv", "--vary", "spring.mass=1"],
+        [*line, "spring.mass=1", "--shift", "9"],
+    ):
+        assert "fewer of its points lie in the run" in command(*few, "--out", "few").stderr
 
 
 FIT = ["fit", "duffing", "m.csv", "--vary", "spring.linear_stiffness=3.2", "--set", "time.t_end=0.6", "--out", "f"]
@@ -262,32 +216,6 @@ def test_an_interrupted_fit_goes_on_where_it_was(here, monkeypatch):
     assert len(made) == (here / "f" / "fit.csv").read_text().count("\n") - 1
     assert json.loads(printed(*FIT, "--json"))["keys"] == found["keys"]
     assert json.loads(printed(*FIT[:-1], "once", "--json"))["keys"] == found["keys"]
-
-
-def test_a_fit_that_sigterm_ends_keeps_its_runs(here):
-    """A process ends with exit code 3 within a few runs, and keeps what it has computed."""
-    written(here / "m.csv", "time,y", TIMES, simulate(load_scene("duffing")).at(TIMES)["y"])
-    line = [*FIT[:5], "--set", "time.t_end=0.6", "--set", "coupling.macro_step=2e-4", "--out", "f"]
-    process = subprocess.Popen([sys.executable, "-m", "springbeam", *line], stderr=subprocess.PIPE, text=True)
-    records = here / "f" / "study.jsonl"
-    while process.poll() is None and not (records.exists() and records.read_bytes().count(b"\n") > 2):
-        time.sleep(0.02)
-    process.send_signal(signal.SIGTERM)
-    _, error = process.communicate(timeout=HANGS)
-    assert process.returncode == 3
-    assert "error: interrupted; " in error
-    assert records.read_bytes().count(b"\n") > 2
-
-
-def test_results_of_another_fit_are_not_overwritten_unasked(here):
-    """Another measurement in the same file is another fit."""
-    written(here / "m.csv", "time,y", TIMES, simulate(load_scene("duffing")).at(TIMES)["y"])
-    first = json.loads(printed(*FIT, "--json"))
-    assert first["keys"][0]["value"] == pytest.approx(3.0, rel=1e-6)
-    written(here / "m.csv", "time,y", TIMES, 1.01 * simulate(load_scene("duffing")).at(TIMES)["y"])
-    assert "f: holds another study" in refused(*FIT)
-    assert command(*FIT, "--force").exit_code == 1
-    assert (here / "f" / "fit.csv").read_text().count("\n") > 5
 
 
 # -- the verdict, and what has tried to make it false ------------------------------------------------------------
@@ -315,8 +243,7 @@ def test_a_wrong_minimum_is_left_and_never_certified(here):
 COARSE = ["coupling.macro_step=0.05"]
 
 
-@pytest.mark.parametrize("start", [(3.5, 0.9), (2.4, 1.3)])
-def test_a_search_follows_a_valley_to_its_end(tmp_path, start):
+def test_a_search_follows_a_valley_to_its_end(tmp_path):
     """Along stiffness over mass the curves hardly change: 2.738 and 0.882 leave 1e-4 of their spread.
 
     That was certified, by derivatives of another place; the way on from there took 206 runs.
@@ -324,8 +251,7 @@ def test_a_search_follows_a_valley_to_its_end(tmp_path, start):
     scene = load_scene("duffing", COARSE)
     run = simulate(with_changes(scene, spring={"linear_stiffness": 3.1}))
     path = written(tmp_path / "m.csv", "time,y", run.time, run["y"])
-    vary = [f"spring.{name}={value}" for name, value in zip(("linear_stiffness", "mass"), start, strict=True)]
-    found = fitted(path, vary, scene)
+    found = fitted(path, ["spring.linear_stiffness=3.5", "spring.mass=0.9"], scene)
     assert found["undetermined"] == []
     assert [row["value"] for row in found["keys"]] == pytest.approx([3.1, 1.0, 0.0], rel=1e-6, abs=1e-6)
     assert len(found["runs"]) <= 80
@@ -335,15 +261,14 @@ def test_of_equal_shifts_of_the_clock_the_smallest_is_found(tmp_path):
     """A motion that repeats itself fits as well a period later or earlier: -3.59 s was found."""
     scene = load_scene("duffing", COARSE)
     run = simulate(with_changes(scene, spring={"linear_stiffness": 3.1}))
-    for last in (201, 401):  # of 401 points: the record as long as half of the run, and as all of it
-        path = written(tmp_path / "m.csv", "time,y", run.time[:last], noisy(run["y"][:last], 0.02))
-        *_, shift = fitted(path, ["spring.linear_stiffness=3.5"], scene)["keys"]
-        assert abs(shift["value"]) < 0.05
+    path = written(tmp_path / "m.csv", "time,y", run.time, noisy(run["y"], 0.02))
+    *_, shift = fitted(path, ["spring.linear_stiffness=3.5"], scene)["keys"]
+    assert abs(shift["value"]) < 0.05
 
 
-@pytest.mark.parametrize(("cubic", "clock"), [(6e6, None), (6e6, 0.0), (6e3, 0.0)])
+@pytest.mark.parametrize(("cubic", "clock"), [(6e6, None), (6e3, 0.0)])
 def test_a_rest_that_is_no_error_of_the_run_is_no_noise_however_small(tmp_path, cubic, clock):
-    """A cubic stiffness in the measurement, none in the scene: 5e-2, 8e-2 and 9e-5 of the spread are left, no noise."""
+    """A cubic stiffness in the measurement, none in the scene: 5e-2 and 9e-5 of the spread are left, no noise."""
     run = simulate(with_changes(OSCILLATOR, spring={"cubic_stiffness": cubic}))
     path = written(tmp_path / "m.csv", "time,y", TIMES, run.at(TIMES)["y"])
     found = fitted(path, shift=clock)
@@ -363,36 +288,6 @@ def test_what_the_run_itself_is_wrong_by_is_in_the_interval(tmp_path):
     assert key["low"] < scene.contact.stiffness < key["high"] < 1.3 * key["low"]
 
 
-def test_a_search_that_may_make_no_more_runs_has_not_ended(tmp_path, monkeypatch):
-    """It makes as many as it says at most, and does not call the place determined where it is."""
-    monkeypatch.setattr(fit, "_STARTS", (6, 6))
-    monkeypatch.setattr(fit, "_MOST_RUNS", 4)
-    path = written(tmp_path / "m.csv", "time,y", TIMES, exact())
-    study = fit.Fit(scene=OSCILLATOR, file=path, vary=GUESSES, shift=0.0)
-    found = study.findings(study.computed())
-    assert study.most == 14
-    assert len(found.tables["fit"]) == 14 + 1
-    assert "the search has not ended in a minimum; give a narrower range" in found.document["undetermined"]
-
-
-def test_progress_has_an_end_in_sight(tmp_path):
-    """There are never more runs than are expected by then; "206 of 36" was said."""
-    judging = 4  # two rounds, each with a finer run and one beside a repeated measurement
-    for shape in (exact(), exact() + 0.3 * np.std(exact()) * np.sign(exact(1.3 * TIMES))):
-        path = written(tmp_path / "m.csv", "time,y", TIMES, shape)
-        study = fit.Fit(scene=OSCILLATOR, file=path, vary=GUESSES, shift=0.0)
-        done = len(study.computed())
-        assert done <= study.expected(done) <= study.most + judging
-
-
-def test_a_residual_with_structure_is_no_noise(tmp_path):
-    """The damping is held 20 % too large."""
-    scene = with_changes(OSCILLATOR, spring={"damping": 1.44})
-    path = written(tmp_path / "m.csv", "time,y", TIMES, noisy(exact(), 0.01))
-    (why,) = fitted(path, ["spring.linear_stiffness=700"], scene, shift=0.0)["undetermined"]
-    assert "is no noise: it remembers its past" in why
-
-
 def test_noise_that_remembers_its_past_is_known_by_a_repeated_measurement(tmp_path):
     """The mean of five points of white noise; the interval is wider than one that takes points for independent."""
     times = np.linspace(0.01, 0.29, 300)
@@ -410,7 +305,7 @@ def test_noise_that_remembers_its_past_is_known_by_a_repeated_measurement(tmp_pa
     assert "times the noise of the repeated measurement" in why
 
 
-@pytest.mark.parametrize(("most", "inside"), [(800.5, False), (830.0, True), (1200.0, True)])
+@pytest.mark.parametrize(("most", "inside"), [(800.5, False), (830.0, True)])
 def test_an_interval_that_reaches_the_end_of_the_range_determines_nothing(tmp_path, most, inside):
     """The right value is within the range each time, at its edge; its interval is some 3 to each side."""
     path = written(tmp_path / "m.csv", "time,y", TIMES, noisy(exact()))
@@ -437,7 +332,7 @@ def test_values_that_fit_as_well_are_named(tmp_path):
     assert key["low"] < 800.0 < key["high"]
 
 
-@settings(max_examples=6, deadline=None, phases=(Phase.explicit, Phase.generate))
+@settings(max_examples=5, deadline=None, phases=(Phase.explicit, Phase.generate))
 @given(
     stiffness=st.floats(300.0, 2000.0),
     damping=st.floats(0.5, 4.0),

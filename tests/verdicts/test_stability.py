@@ -4,6 +4,7 @@ import itertools
 import pickle
 from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,12 +21,13 @@ from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.run.ledger import APPROXIMATE, EXACT
 from springbeam.run.master import Master
 from springbeam.scene import Beam, scene_from_dict
+from springbeam.scene.files import tomllib
 from springbeam.scene.frequencies import slowest_frequency
 from springbeam.scene.laws import LAW
 from springbeam.scene.linearised import hilltop, spring_frequency
 from springbeam.scene.statics import bending_stiffness, shear_stiffness, tip_compliance, tip_inertia, tip_reach
 from springbeam.studies.stability import judge
-from springbeam.studies.stability.draw import AT_REST, EXTREME, SLICES, USUAL, drawn, scene_dict, slice_cells
+from springbeam.studies.stability.draw import AT_REST, EXTREME, SLICES, drawn, scene_dict, slice_cells
 from springbeam.studies.stability.grid import Grid
 from springbeam.studies.stability.judge import CLASSES, Reference, ended, judged
 from springbeam.studies.stability.predict import THRESHOLD, critical_step, linear_pair
@@ -54,35 +56,23 @@ def changed(run, warnings=None, **columns):
 # -- classes --------------------------------------------------------------------------------------------------------
 
 
-SAID, CAUSE = ("something has changed the energy",), "energy of degree 1 has changed the energy by 1 %"
+TABLE = tomllib.loads(Path(__file__).with_name("judged.toml").read_text(encoding="utf-8"))
+#: What `energy`, which creates none, and an exchange may change.
+BOUNDS = {"energy": EXACT, "jacobi": APPROXIMATE}
 
 
 @pytest.mark.parametrize(
-    ("scheme", "beam", "share", "warnings", "cause", "kind"),
-    [
-        # The bound is 1e-8 for a coupling that creates none, 1e-3 for one that does.
-        ("energy", {}, 0.9 * EXACT, (), "", "dissipative"),
-        ("energy", {}, 1.1 * EXACT, (), "", "garbage"),
-        ("energy", {}, 1.1 * EXACT, ("not resolved",), "", "garbage"),
-        ("energy", {}, 1.1 * EXACT, SAID, "", "approximate"),
-        ("jacobi", {}, 0.9 * APPROXIMATE, (), "", "approximate"),
-        ("jacobi", {}, 1.1 * APPROXIMATE, (), "", "garbage"),
-        ("jacobi", {}, 1.1 * APPROXIMATE, ("not resolved",), "", "garbage"),
-        ("jacobi", {}, 1.1 * APPROXIMATE, SAID, "", "approximate"),
-        # A warning or a stop excuses `jacobi`, whose error it is; of `energy` a hundredth of it is a fault.
-        ("energy", {}, 1e-2, SAID, "", "garbage"),
-        ("energy", {}, 1e-2, SAID, CAUSE, "garbage"),
-        ("jacobi", {}, 1e-2, SAID, "", "approximate"),
-        ("jacobi", {}, 1e-2, SAID, CAUSE, "stopped"),
-    ],
+    "case", TABLE["energy"], ids=lambda case: f"{case['scheme']}-{case['bounds']:g}-{case['kind']}"
 )
-def test_energy_that_changes_is_judged_by_the_scheme_and_by_what_is_said(scheme, beam, share, warnings, cause, kind):
-    run = done(scheme, 1, **beam)
-    outcome = judged(changed(run, warnings, energy_residual=share * np.linspace(0.0, run.e_total[0], len(run))), cause)
-    assert outcome["kind"] == kind
-    if kind != "stopped":
+def test_energy_that_changes_is_judged_by_the_scheme_and_by_what_is_said(case):
+    run = done(case["scheme"], 1)
+    share = case["bounds"] * BOUNDS[case["scheme"]]
+    residual = share * np.linspace(0.0, run.e_total[0], len(run))
+    outcome = judged(changed(run, case["warnings"], energy_residual=residual), case.get("cause", ""))
+    assert outcome["kind"] == case["kind"]
+    if case["kind"] != "stopped":
         # Over the largest energy of the run, which an exchange has changed by less than 1e-4 of it.
-        assert outcome["residual"] == pytest.approx(abs(share), rel=1e-6 if scheme == "energy" else 1e-4)
+        assert outcome["residual"] == pytest.approx(share, rel=1e-6 if case["scheme"] == "energy" else 1e-4)
 
 
 def test_a_cell_is_stopped_by_what_its_last_steps_show_when_it_is_cut(monkeypatch):
@@ -94,39 +84,14 @@ def test_a_cell_is_stopped_by_what_its_last_steps_show_when_it_is_cut(monkeypatc
     assert "jacobi of degree 0 has changed the energy" in outcome["reason"]
 
 
-def test_a_dip_at_an_end_of_the_step_to_rounding_is_looked_at_once():
-    """A soft beam without inertia in steps of 0.1 s: between the dip and the end of the step there was no time."""
-    tables = {
-        "beam": {"young_modulus": 1.0, "shear_modulus": 1.0, "n_elements": 20, "fidelity": "quasi_static"},
-        "spring": {"external_force": 1.0, "cubic_stiffness": -0.601},
-        "coupling": {"macro_step": 0.1, "degree": 0},
-        "time": {"t_end": 20.0},
-    }
-    assert judge.judge(with_changes(load_scene("soft"), **tables))["kind"] != "garbage"
-
-
-def test_a_spring_that_escapes_is_stopped_and_has_kept_its_energy():
-    """Its potential and its kinetic energy are 1e31 J and cancel to 1e23: beside that IDA's tolerance was 6e-5."""
-    beam = {
-        "young_modulus": 29.4699, "shear_modulus": 1792.83, "alpha_b": 0.000775345, "n_elements": 1,
-        "element_degree": 12, "n_modes": 1, "reduced_integration": True, "approach": "elastic",
-        "initial_deflection_slope": -0.0408615, "initial_velocity_slope": -305.781,
-    }  # fmt: skip
-    spring = {
-        "mass": 0.0253634, "damping": 1.71442, "linear_stiffness": 86799.6, "cubic_stiffness": -1058230.0,
-        "equilibrium": -0.0408615,
-    }  # fmt: skip
-    escaping = {
-        "time": {"t_end": 0.0604153},
-        "beam": Beam.ones() | beam,
-        "spring": spring,
-        "stop": {"position": -0.0410372},
-        "contact": {"law": "link", "stiffness": 967955.0},
-        "coupling": {"degree": 1, "macro_step": 0.000268513},
-    }
-    outcome = judge.judge(scene_from_dict(escaping))
-    assert outcome["kind"] == "stopped"
-    assert "past its hilltop" in outcome["reason"]
+@pytest.mark.parametrize("name", TABLE["found"])
+def test_a_scene_that_was_found_garbage_is_none(name):
+    found = dict(TABLE["found"][name])
+    kinds = found.pop("kinds")
+    reason = found.pop("reason")
+    outcome = judge.judge(scene_from_dict({**found, "beam": Beam.ones() | found["beam"]}))
+    assert outcome["kind"] in kinds
+    assert reason in outcome["reason"]
     assert outcome["residual"] < EXACT
 
 
@@ -146,8 +111,7 @@ def short(**coupling):
     return {"slice": "", **AT_REST, "n_elements": 4, "macro_step": 0.02, "steps": 40, **coupling}
 
 
-@pytest.mark.parametrize("law", ["transmission", "compliance"])
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize(("law", "fault"), [("transmission", "half of it"), *(("compliance", name) for name in FAULTS)])
 def test_a_beam_that_is_given_another_force_is_garbage(monkeypatch, fault, law):
     """With half of it 116 cells had said "0 garbage": they warned, and the bound was that of the warning."""
     cell = short(coupling=(law, "energy", 2))
@@ -167,7 +131,7 @@ def test_a_beam_that_is_given_another_force_is_garbage(monkeypatch, fault, law):
     assert judge_cell(cell)["kind"] == "garbage"
 
 
-@pytest.mark.parametrize(("moved", "kind"), [(0.0, "dissipative"), (0.009, "dissipative"), (0.011, "garbage")])
+@pytest.mark.parametrize(("moved", "kind"), [(0.009, "dissipative"), (0.011, "garbage")])
 def test_a_record_that_was_made_wrong_is_wrong_and_a_right_one_right(moved, kind):
     """Energy, overlap and what the run says are those of a right run; u_tip is moved by a share of its change."""
     run = simulate(with_changes(load_scene("soft"), **{**SMALL, "coupling": {"macro_step": 1e-3}}))
@@ -209,28 +173,28 @@ def test_an_ill_conditioned_scene_excuses_a_run(monkeypatch):
     assert judged(run, reference=reference)["factor"] is None
 
 
-MOTION = np.abs(done().shapes[1]).max() + 2e-3 * max(np.abs(done().v_tip).max(), np.abs(done().z).max())
-
-
 @pytest.mark.parametrize(
-    ("column", "last", "phase", "scene", "reason"),
+    ("column", "last", "phase", "reason"),
     [
-        ("z", np.nan, "tied", {}, "z is not finite"),
-        *(("gap", gap, phase, {}, "overlap or part by 2.0e-09")
-          for gap, phase in ((2e-9, "tied"), (-2e-9, "touch"), (-2e-9, "free"))),
-        ("gap", 1.0, "free", {}, None),
-        ("e_dissipated", -1e-6, "tied", {}, "energy lost by damping returns"),
-        ("e_impact_loss", -1e-6, "tied", {}, "energy lost by impacts returns"),
+        ("z", np.nan, "tied", "z is not finite"),
+        ("gap", 2e-9, "tied", "overlap or part by 2.0e-09"),
+        ("gap", -2e-9, "free", "overlap or part by 2.0e-09"),
+        ("gap", 1.0, "free", ""),
+        ("e_dissipated", -1e-6, "tied", "energy lost by damping returns"),
+        ("e_impact_loss", -1e-6, "tied", "energy lost by impacts returns"),
     ],
-)  # fmt: skip
-def test_what_must_not_be_is_garbage_whatever_the_energy(column, last, phase, scene, reason):
-    """A gap is told over the motion."""
+)
+def test_what_must_not_be_is_garbage_whatever_the_energy(column, last, phase, reason):
+    """A gap is judged over the motion: the largest deflection and the way of a macro step."""
     run = done()
-    values, phases = run[column].copy(), run.phase.copy()
-    values[-1], phases[-1] = last * MOTION if column == "gap" else values[-1] + last, phase
-    outcome = judged(changed(replace(run, scene=with_changes(run.scene, **scene)), phase=phases, **{column: values}))
-    assert (outcome["kind"] == "garbage") is (reason is not None)
-    assert (reason or "") in outcome["reason"]
+    motion = np.abs(run.shapes[1]).max() + 2e-3 * max(np.abs(run.v_tip).max(), np.abs(run.z).max())
+    values = run[column].copy()
+    phases = run.phase.copy()
+    values[-1] = last * motion if column == "gap" else values[-1] + last
+    phases[-1] = phase
+    outcome = judged(changed(run, phase=phases, **{column: values}))
+    assert (outcome["kind"] == "garbage") is bool(reason)
+    assert reason in outcome["reason"]
 
 
 def test_a_run_that_ends_early_is_stopped_for_its_cause():
@@ -275,20 +239,16 @@ def test_a_cell_is_the_scene_that_its_parameters_tell():
     assert scene.contact.stiffness * (0.1 * reach) ** 1.5 == pytest.approx(k * reach, rel=1e-14)
     steps = 200 * 0.01 / max(slowest_frequency(scene.beam), np.sqrt(scene.spring.linear_stiffness / 6.0))
     assert (scene.contact_time, scene.duration) == pytest.approx((0.3 * reach / 2.0, steps), rel=1e-12)
-    for elasticity, e in (("given", 0.3), ("plastic", 0.0), ("elastic", 1.0)):
-        stop = scene_dict(cell | {"elasticity": elasticity})["stop"]
-        assert stop == {"position": pytest.approx(-0.12 * reach, rel=1e-14), "restitution": e}
     near = scene_from_dict(scene_dict(cell | {"approach": "elastic"}))
     assert near.initial_clearance == pytest.approx(0.1 * 2.0 * steps, rel=1e-12)  # a tenth of the run is so high
     light = scene_from_dict(scene_dict(AT_REST | {"mass": 1e-6, "k2_kind": "hardening", "k2": 1e4, "macro_step": 1e3}))
     assert spring_frequency(light) * light.coupling.H <= 30.0  # radians in a macro step
 
 
-@pytest.mark.parametrize("axes", [EXTREME, USUAL])
-def test_a_hypercube_covers_its_range(axes):
+def test_a_hypercube_covers_its_range():
     """Each stratum holds one cell, so the range is covered to 1/300 of its length."""
-    cells = drawn(axes, 300, 1)
-    for axis in axes:
+    cells = drawn(EXTREME, 300, 1)
+    for axis in EXTREME:
         if axis.zero:
             assert axis.grid(6)[0] == 0.0 < axis.low < axis.grid(6)[1] < axis.grid(6)[-1] == axis.high
         if axis.values:
@@ -299,7 +259,7 @@ def test_a_hypercube_covers_its_range(axes):
         low, high = place([axis.low, axis.high])
         assert values[0] == pytest.approx(low, abs=0.02 * (high - low))
         assert values[-1] == pytest.approx(high, abs=0.02 * (high - low))
-    assert drawn(axes, 300, 1) == cells != drawn(axes, 300, 2)
+    assert drawn(EXTREME, 300, 1) == cells != drawn(EXTREME, 300, 2)
     assert cells[0].keys() == AT_REST.keys()
 
 
@@ -326,23 +286,15 @@ def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else():
 def test_command(tmp_path, monkeypatch, unpainted, kinds, code):
     ends = itertools.cycle(kinds)
     monkeypatch.setattr(Grid, "parallel", False)
-
-    def end_of(cell):
-        kind = next(ends)
-        return ended(kind, "y = 1.5 m") | {"residual": 1.0 if kind in ("refused", "stopped") else 1e-9}
-
-    monkeypatch.setattr(Grid, "record", lambda self, case: end_of(case))
-    out = tmp_path / "grid"
-    result = command("stability", "--samples", "30", "--resolution", "2", "--out", out)
+    monkeypatch.setattr(Grid, "record", lambda self, case: ended(next(ends)) | {"residual": 1e-9})
+    result = command("stability", "--samples", "30", "--resolution", "2", "--out", tmp_path)
+    cases = 30 + 4 * len(SLICES)
     assert result.exit_code == code, result.output
-    assert "garb." in result.stdout
-    table = result.stdout[: result.stdout.index("garbage  " if code else "results  ")]
-    assert max(map(len, table.splitlines())) <= 80
-    assert ("1e-09" in table, "1e+00" in table) == (True, False)
-    assert len((out / "stability.csv").read_text().splitlines()) == 1 + 30 + 4 * len(SLICES)
-    assert all((out / f"stability-{name}.png").is_file() for name in ("classes", "residuals"))
-    scenes = sorted(out.glob("stability-garbage-*.toml"))
-    assert len(scenes) == (0 if code == 0 else (30 + 4 * len(SLICES)) // len(CLASSES))
+    assert max(map(len, result.stdout[: result.stdout.index("results  ")].splitlines())) <= 80
+    assert len((tmp_path / "stability.csv").read_text().splitlines()) == 1 + cases
+    assert all((tmp_path / f"stability-{name}.png").is_file() for name in ("classes", "residuals"))
+    scenes = sorted(tmp_path.glob("stability-garbage-*.toml"))
+    assert len(scenes) == code * (cases // len(CLASSES))
     for path in scenes[-3:]:  # of slices, which all can be run
         assert load_scene(path).time.t_end > 0.0
 
@@ -367,17 +319,11 @@ def linear_scene(law, stiffness, scheme, degree, H=4e-3):
 def growth(scene, steps=2000):
     """The factor by which amplitudes grow per macro step, of the second half of the steps."""
     beam, top = load_bodies(scene, 0.0, scene.degree)
-    # Tied ends start with one velocity; in contact it is their relative motion that grows.
-    if scene.contact.rigid:
-        impulses = beam.mass, top.mass
-    else:
-        reduced = 1.0 / (1.0 / beam.mass + 1.0 / top.mass)
-        impulses = -reduced, reduced
-    for body, impulse in zip((beam, top), impulses, strict=True):
-        body.apply_impulse(impulse)
+    reduced = 1.0 / (1.0 / beam.mass + 1.0 / top.mass)
+    beam.apply_impulse(-reduced)
+    top.apply_impulse(reduced)
     asked = scene.coupling
-    tied = tip_reach(scene.beam)
-    coupling = coupling_of(asked.scheme, scene.degree, asked.tolerance, scene.soft_law, tied)
+    coupling = coupling_of(asked.scheme, scene.degree, asked.tolerance, scene.soft_law, tip_reach(scene.beam))
     rows = couple(coupling, asked.H, steps, beam, top)
     beam.close()
     top.close()
@@ -388,15 +334,7 @@ def pair_of(scene):
     return linear_pair(scene, modal_beam(scene.beam))
 
 
-@pytest.mark.parametrize(
-    "case",
-    [
-        ("link", 1e8, "jacobi", 0),
-        ("link", 1e8, "gauss_seidel", 0),
-        ("link", 1e4, "jacobi", 1),
-        ("link", 1e4, "gauss_seidel", 1),
-    ],
-)
+@pytest.mark.parametrize("case", [("link", 1e8, "jacobi", 0), ("link", 1e4, "gauss_seidel", 1)])
 def test_measured_as_predicted(case):
     """Within 1 %."""
     _, _, scheme, degree = case
@@ -405,7 +343,7 @@ def test_measured_as_predicted(case):
     assert below < THRESHOLD < max(above)
 
 
-@pytest.mark.parametrize(("scheme", "degree"), [("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)])
+@pytest.mark.parametrize(("scheme", "degree"), [("jacobi", 1), ("gauss_seidel", 0)])
 def test_a_stiff_contact_gains_energy_and_the_run_says_so(scheme, degree):
     """The error can pass from one process to another, as from the workers of a study."""
     law = {"law": "compliance", "stiffness": 1e8, "exponent": 1.0}
