@@ -76,8 +76,8 @@ def test_normal_compliance_above_another_body_counts_from_where_that_has_started
         PAIR, beam={"approach": "elastic"}, spring=another, contact={"stiffness": 7.0, "exponent": 1.0}
     )
     steps, _, _ = block(20)
-    steps["y_after"][0] = 0.0
-    deep = np.maximum(-steps["u_tip_after"][5:], 0.0)
+    steps["y_after"][0] = -0.1
+    deep = np.maximum(-0.1 - steps["u_tip_after"][5:], 0.0)
     assert deep.any()
     assert columns(scene, steps[5:], steps[:1])["compliance_force"] == pytest.approx(7.0 * deep, rel=1e-14)
 

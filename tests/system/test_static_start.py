@@ -99,8 +99,7 @@ def test_a_spring_that_would_rest_below_its_stop_rests_on_it(lower, law):
     assert np.abs(run.energy_residual).max() < 1e-13
     if what.spring is not None:
         beside = reference(what)
-        # Its forces follow from accelerations, whose rounding is ε (ω_max/ω₁)² of them at most, here 4e-6.
-        assert beside.foundation_force[-1] == pytest.approx(run.foundation_force[-1], rel=1e-7)
+        assert beside.foundation_force[-1] == pytest.approx(run.foundation_force[-1], rel=1e-8)
         assert {event.kind for event in beside.events} <= {EventKind.IMPACT}
 
 
