@@ -22,8 +22,7 @@ def instant(phase, ends, contact=0.0, tolerance=1e-17, start=None, elapsed=0.0):
     return Instant(phase, ends, start or ends, elapsed, contact, tolerance, tolerance, 3.0)
 
 
-@pytest.mark.parametrize("kind", [EventKind.RELEASE, EventKind.SEPARATION])
-@pytest.mark.parametrize("v", [0.5, 3.0, -3.0])
+@pytest.mark.parametrize(("kind", "v"), [(EventKind.RELEASE, 3.0), (EventKind.SEPARATION, -3.0)])
 def test_ends_that_part_have_one_velocity(kind, v):
     """That of their momentum."""
     z, tip_mass, mass = 0.5, 0.01, 1.0
@@ -52,8 +51,7 @@ def test_a_massless_tip_whose_force_vanishes_at_equilibrium_is_tied_again_if_it_
 
 
 @pytest.mark.parametrize(("height", "v", "z", "joint"), [
-    (-1e-9, 1.0, 1.0, "tied"), (1e-9, -1.0, -1.0, "touch"), (-1e-14, 1.0, 1.0, "touch"), (1e-14, -1.0, -1.0, "tied"),
-    (1e-14, -1.0, 0.009, "tied"),
+    (-1e-9, 1.0, 1.0, "tied"), (1e-9, -1.0, -1.0, "touch"), (-1e-14, 1.0, 1.0, "touch"), (1e-14, -1.0, 0.009, "tied"),
 ])  # fmt: skip
 def test_where_they_go_tells_what_ends_are_that_meet_at_equilibrium_to_rounding(height, v, z, joint):
     """Together: a hundredth of the mass that falls by 1 m/s stops a top that rises by 1 cm/s."""
@@ -73,8 +71,7 @@ def test_what_a_heavier_tip_takes_up_at_once_has_struck_for_the_last_time_unless
     assert found == kind
 
 
-@pytest.mark.parametrize("e", [0.0, 0.9, 1.0])
-@pytest.mark.parametrize(("scene", "joint"), [("beam-on-stop", Joint.TIED), ("soft", Joint.FREE)])
+@pytest.mark.parametrize(("scene", "joint", "e"), [("beam-on-stop", Joint.TIED, 0.9), ("soft", Joint.FREE, 1.0)])
 def test_what_lies_on_the_foundation_at_rest_is_held_there(scene, joint, e):
     """A tip alone by a contact force, a spring top by the foundation; nothing takes an impulse, not even one of −0."""
     automaton = automaton_of(scene, stop={"restitution": e, "position": -0.015})
@@ -83,14 +80,15 @@ def test_what_lies_on_the_foundation_at_rest_is_held_there(scene, joint, e):
     assert repr(found) == repr(Outcome(EventKind.SEATED, Phase(joint, seated=True)))
 
 
-@pytest.mark.parametrize("v", [0.19, -3.0])
 @pytest.mark.parametrize(("kind", "mass"), [("separation", inf), ("separation", 1.0), ("unseated", 1.0)])
-def test_a_tip_that_leaves_the_foundation_leaves_at_rest(kind, mass, v):
+def test_a_tip_that_leaves_the_foundation_leaves_at_rest(kind, mass):
     """It rests on the stop, or on a seated spring top, which stays or leaves with it: the foundation gives the impulse.
 
     A tip that leaves tied to the top with another velocity would strike the foundation at once, or fly higher.
     """
-    tip_mass, held = 0.01, Phase(Joint.TIED if mass == inf else Joint.TOUCH, seated=True)
+    tip_mass = 0.01
+    v = -3.0
+    held = Phase(Joint.TIED if mass == inf else Joint.TOUCH, seated=True)
     automaton = automaton_of("beam-on-stop" if mass == inf else "soft", mass=mass)
     ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, 0.0, 0.0, 0.0)
     found, phase, impact = automaton.after(EventKind(kind), instant(held, ends, contact=-1.0))

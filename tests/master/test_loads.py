@@ -36,7 +36,7 @@ def soft(*loads, t_end=0.07, **coupling):
 
 
 @pytest.mark.parametrize("name", SIGNALS)
-@pytest.mark.parametrize(("start", "size"), [(0.001, 1e-3), (0.013, 1e-3), (0.0, 0.06), (0.0499, 4e-3)])
+@pytest.mark.parametrize(("start", "size"), [(0.013, 1e-3), (0.0, 0.06), (0.0499, 4e-3)])
 def test_the_projection_is_that_of_the_signal(name, start, size):
     """The moments against 1, s, s² are those of the signal, by quadrature between all points where it is not smooth."""
     load = load_of(**SIGNALS[name])

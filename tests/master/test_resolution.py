@@ -107,18 +107,6 @@ def test_ends_that_the_law_would_have_elsewhere_are_said(degree, share, resolved
         assert resolved or ("a higher coupling.degree" in told) is (degree < 2)
 
 
-def test_what_resolves_ends_that_are_elsewhere_is_said():
-    adaptive, off = {"coupling": {"relative_tolerance": 1e-3}}, 0.012
-    for scene in (STIFF, PAIR):
-        assert judged(with_changes(scene, **adaptive), off).endswith("; smaller tolerances resolve it")
-    low = with_changes(STIFF, coupling={"degree": 0})
-    for seen in ({"misplaced": 4.0 * 0.006}, {"between": 0.01}):
-        told = judged(low, **seen)
-        named = float(told.split("coupling.macro_step <= ")[1].split()[0])
-        assert named == pytest.approx(0.95 * 0.25 * STIFF.coupling.H, rel=0.03)
-        assert told.endswith("a higher coupling.degree allows longer ones") is ("misplaced" in seen)
-
-
 @pytest.mark.parametrize("share", [0.99, 1.01])
 @pytest.mark.parametrize(("alpha", "strikes", "limit"), [(0.0, True, 1.0), (0.01, True, 1.0), (0.0, False, 0.01)])
 def test_waves_that_the_midpoint_rule_makes_late_have_a_limit(share, alpha, strikes, limit):

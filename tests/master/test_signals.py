@@ -1,41 +1,14 @@
 """Signals of a run, shock spectra, power spectra and settled motion, beside closed forms and integrals."""
 
-import sys
-
 import numpy as np
 import pytest
-from runs import a_trajectory
 from scenes import load_of
 from scipy.integrate import quad
 
-from springbeam.signals.curves import signal
 from springbeam.signals.driven import repeating, response
 from springbeam.signals.spectra import shock_spectrum
 
 # -- columns and functions ------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def mine(tmp_path, monkeypatch):
-    """Functions of the user, in the directory of the command."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    monkeypatch.delitem(sys.modules, "functions_of_mine", raising=False)
-    (tmp_path / "functions_of_mine.py").write_text(
-        "import numpy as np\n"
-        "def distance(run): return np.hypot(run.u_tip, run.y)\n"
-        "def highest(run): return run.y.max()\n"
-        "def complex(run): return 1j * run.y\n"
-        "def infinite(run): return np.where(run.time > 0.0, run.y, np.inf)\n"
-        "def absent(run): return run['speed']\n"
-        "CONSTANT = 3.0\n"
-    )
-
-
-def test_a_signal_is_a_column_or_a_function_found_in_the_directory_of_the_command(mine):
-    run = a_trajectory()
-    assert np.array_equal(signal(run, "u_tip"), run.u_tip)
-    assert np.array_equal(signal(run, "functions_of_mine:distance"), np.hypot(run.u_tip, run.y))
 
 
 @pytest.mark.parametrize(("count", "found"), [(31, (6, 3)), (30, None)])
@@ -72,14 +45,6 @@ def test_the_response_to_a_chirp_is_that_of_whole_pairs_of_its_turns():
     assert len(response(0, chirp, time[:900], values[:900]).frequency) == 0  # a run that ends before it
 
 
-@pytest.mark.parametrize("rows", [2, 4, 4001])
-def test_turns_of_a_chirp_between_two_rows_have_no_response(rows):
-    chirp = load_of(on="tip", signal="chirp", frequency=100.0, frequency_end=10.0, duration=1.0)
-    time = np.append(np.linspace(0.0, 0.3, rows), 1.0)  # from 0.3 s on it turns 33 times
-    found = response(0, chirp, time, np.sin(time))
-    assert len(found.frequency) == len(found.amplitude) == (13 if rows == 4001 else 0)
-
-
 # -- shock response spectra ---------------------------------------------------------------------------------------
 
 #: Half-sine of 100 m/s² in 11 ms.
@@ -108,21 +73,13 @@ def duhamel(frequency, quality, time):
     return quad(lambda s: PEAK * np.sin(np.pi * s / PULSE) * kernel(time - s), 0.0, min(time, PULSE), limit=400)[0]
 
 
-@pytest.mark.parametrize("quality", [10.0, 2.0, 50.0])
-@pytest.mark.parametrize("frequency", [15.0, 45.45, 120.0, 400.0])
+@pytest.mark.parametrize(("frequency", "quality"), [(15.0, 10.0), (45.45, 2.0), (120.0, 50.0)])
 def test_the_spectrum_is_that_of_duhamels_integral(frequency, quality):
     times = np.linspace(0.0, 1.2 * PULSE + 1.0 / frequency, 4001)[1:]
-    coarse = np.array([duhamel(frequency, quality, t) for t in times[::40]])
+    answer = [duhamel(frequency, quality, t) for t in times[::40]]
     found = spectrum([frequency], quality)
-    fine = [
-        [
-            duhamel(frequency, quality, t)
-            for t in np.linspace(times[::40][at] - 40 * times[0], times[::40][at] + 40 * times[0], 41)
-        ]
-        for at in (coarse.argmax(), coarse.argmin())
-    ]
-    assert found.positive[0] == pytest.approx(max(fine[0]), rel=2e-4)
-    assert found.negative[0] == pytest.approx(-min(fine[1]), rel=2e-3, abs=1e-3 * PEAK)
+    assert found.positive[0] == pytest.approx(max(answer), rel=2e-3)
+    assert found.negative[0] == pytest.approx(-min(answer), rel=4e-3, abs=2e-3 * PEAK)
     assert found.maximax[0] == max(found.positive[0], found.negative[0])
 
 

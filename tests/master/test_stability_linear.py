@@ -45,12 +45,9 @@ def omega_max(p):
 @pytest.mark.parametrize(
     ("omega", "c", "h", "bound"),
     [
-        (3.0, 0.0, 0.1, 1e-14),
         (3.0, 0.0, 5.0, 1e-12),
         (3.0, 1.0, 0.2, 1e-14),
         (3.0, 6.0, 0.5, 1e-8),  # critical: the roots are moved apart by 1e-6
-        (3.0, 100.0, 0.5, 1e-13),
-        (0.0, 0.0, 0.3, 1e-14),
         (0.0, 2.0, 0.3, 1e-13),
         (1e4, 1e6, 0.01, 1e-11),
     ],
@@ -96,47 +93,24 @@ def radius(matrix):
 
 
 @pytest.mark.parametrize(("scheme", "degree"), EXCHANGES)
-@pytest.mark.parametrize("mass", [0.01, 100.0])
-def test_the_matrix_is_that_of_the_solvers(scheme, degree, mass):
-    """Column by column; the solvers' tolerances are 1e-13 of a motion."""
-    p = pair(2, mass, 1e4)
-    h = 3.0 / omega_max(p)
-    ours, theirs = amplification(p, scheme, degree, h), solved(p, scheme, degree, h)
-    assert np.abs(ours - theirs).max() < 1e-9 * np.abs(ours).max()
-    assert np.abs(ours).max() > 0.5
-
-
-@pytest.mark.parametrize(("scheme", "degree"), EXCHANGES)
-@pytest.mark.parametrize("stiffness", [0.0, 1e4])
-def test_the_matrix_of_a_damped_link_is_that_of_the_solvers(scheme, degree, stiffness):
-    """C = k p + c ṗ, also without k."""
-    p = pair(2, 1.0, stiffness, damping=2.0)
-    h = 0.5 / omega_max(p)
-    ours, theirs = amplification(p, scheme, degree, h), solved(p, scheme, degree, h)
+@pytest.mark.parametrize(("mass", "stiffness", "damping", "turn"), [(100.0, 1e4, 0.0, 3.0), (0.5, 0.0, 2.0, 0.5)])
+def test_the_matrix_is_that_of_the_solvers(scheme, degree, mass, stiffness, damping, turn):
+    """Column by column; the solvers' tolerances are 1e-13 of a motion. C = k p + c ṗ, also without k."""
+    p = pair(2, mass, stiffness, damping=damping)
+    h = turn / omega_max(p)
+    ours = amplification(p, scheme, degree, h)
+    theirs = solved(p, scheme, degree, h)
     assert np.abs(ours - theirs).max() < 1e-9 * np.abs(ours).max()
     assert spectral_radius(p, scheme, degree, h) == pytest.approx(radius(theirs), rel=1e-8)
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])
-@pytest.mark.parametrize("stiffness", [0.0, 1e4])
-@pytest.mark.parametrize("turn", [0.5, 3.0, 30.0])
+@pytest.mark.parametrize(("stiffness", "turn"), [(0.0, 3.0), (1e4, 30.0)])
 def test_energy_is_stable_at_any_step_so_that_nothing_is_predicted(degree, stiffness, turn):
     """The matrix of its solvers has no eigenvalue outside of the unit circle, for light and heavy springs."""
     for mass in (0.01, 100.0):
         p = pair(2, mass, stiffness)
         assert radius(solved(p, "energy", degree, turn / omega_max(p))) == pytest.approx(1.0, abs=1e-9)
-
-
-@pytest.mark.parametrize("degree", [0, 1, 2])
-@pytest.mark.parametrize("stiffness", [0.0, 1e4])
-def test_what_a_damped_link_takes_is_not_given_back(degree, stiffness):
-    """Volumes of states shrink, as exp(−cH/μ) where the step resolves the link (√(k/μ) H is 2.4, or 0)."""
-    p = pair(2, 1.0, stiffness, damping=2.0)
-    h = 0.5 / omega_max(p)
-    matrix = solved(p, "energy", degree, h)
-    assert radius(matrix) < 1.0 + 1e-9
-    shrinks = np.exp(-2.0 * h * (1.0 / p.beam.mass + 1.0 / p.spring.mass))
-    assert abs(np.linalg.det(matrix)) == pytest.approx(shrinks, rel=0.1 / (1 + degree) ** 2)
 
 
 # -- scenes ---------------------------------------------------------------------------------------------------------
@@ -188,11 +162,10 @@ def test_a_motion_that_is_not_resolved_is_told_with_what_would_resolve_it():
     assert [" lowest mode turns 1.27 rad " in told[1], "; H <= 0.0785 s " in told[1]] == [True, True]
 
 
-@pytest.mark.parametrize(("scheme", "degree"), EXCHANGES)
-def test_a_length_in_mm_for_m_is_said_plainly(scheme, degree):
+def test_a_length_in_mm_for_m_is_said_plainly():
     """The damping of such a contact takes 1.8e8/s: the smallest step tried was unstable, which
     had been a traceback of brentq."""
-    given = {"scheme": scheme, "degree": degree}
+    given = {"scheme": "gauss_seidel", "degree": 1}
     found = predict(with_changes(load_scene("vibro-impact"), beam={"length": 1000.0}, coupling=given))
     assert any("[beam] length = 1000.0" in note and "is a length in mm?" in note for note in found["notes"])
     assert 0.0 < found["exchange"]["critical_step"] < found["macro_step"]

@@ -34,7 +34,7 @@ def test_ends_are_as_far_off_as_is_said(case):
     """Both fall with H² at degree 0. Three are known less well (`WITHIN`), all else within a tenth."""
     scene, rel = scenes.named(f"misplaced/{case}"), WITHIN.get(case, 0.1)
     exact = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": 5e-4}))
-    for degree, size in ((0, 2e-3), (0, 1e-3), (1, 2e-3)):
+    for degree, size in ((0, 2e-3), (1, 2e-3)):
         said, off = both_ends(simulate(with_changes(scene, coupling={"degree": degree, "macro_step": size})), exact)
         assert said == pytest.approx(off, rel=rel, abs=1e-9 if degree == 0 else 1e-5)
 
@@ -89,7 +89,7 @@ def test_a_run_that_has_made_no_step_misplaces_nothing(law):
 
 
 #: Steps of a tip alone on a stop, as degree and share of 1.5 ms: it rests there twice for a few ms, and bounces.
-BOUNCES = [(0, 1.0), (0, 0.5), (0, 0.25), (1, 1.0), (2, 1.0)]
+BOUNCES = [(0, 1.0), (0, 0.25), (2, 1.0)]
 
 
 @pytest.mark.parametrize(("degree", "share"), BOUNCES)
