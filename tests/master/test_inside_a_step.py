@@ -23,7 +23,7 @@ def through(p, size=SIZE):
     return Path.through(*samples, size, (float(q(1.0)), float(q0(1.0))))
 
 
-@pytest.mark.parametrize(("even", "odd"), [(1.0, 0.0), (0.0, -1.0), (0.7, 0.4)])
+@pytest.mark.parametrize(("even", "odd"), [(0.0, -1.0), (0.7, 0.4)])
 def test_path_and_cubic_are_apart_by_no_more_than_they_say(even, odd):
     """s²(1 − s)² [even + odd (2s − 1)] beside a cubic; one part alone is met."""
     s, one = Polynomial((0.0, 1.0)), Polynomial((1.0,))
@@ -48,20 +48,6 @@ def test_the_last_moment_tells_how_far_an_end_may_be_off_between_rows_but_of_a_t
     assert found == pytest.approx(seen * 420e-5 / (25.0 * 5.0**0.5), rel=1e-7, abs=1e-15)
 
 
-def test_a_quartic_is_beside_the_cubic_through_its_ends_and_a_cubic_is_not():
-    """s⁴ lies s²(1 − s)² above it: 1/30 in the mean, and 1/30 as twice the moment ∫(1 − s) s²(1 − s)² ds = 1/60."""
-    assert through(Polynomial((0.0, 0.0, 0.0, 0.0, 1.0))).moments_beside_cubic == pytest.approx(1.0 / 30.0, rel=1e-12)
-    assert through(Polynomial((0.3, -1.0, 2.0, 7.0))).moments_beside_cubic < 1e-15
-
-
-@pytest.mark.parametrize("x", [1e-6, 0.25, 0.5, 0.999])
-@pytest.mark.parametrize("bend", [0.0, 2.0, -0.5])
-def test_it_falls_through_zero_at_its_root(x, bend):
-    """(x* − s)(1 + bend s²) falls through zero once in (0, 1); 40 bisections find it to 1e-12."""
-    path = through(Polynomial((x, -1.0)) * Polynomial((1.0, 0.0, bend)))
-    assert path.falls_through_zero() == pytest.approx(x, abs=1e-12)
-
-
 def test_of_two_falls_the_last_one_counts_and_a_dip_before_it_is_asked_for():
     """(s − 0.2)(s − 0.4)(0.9 − s): a path that rounding makes fall at its start as well is through where it ends so."""
     path = through(Polynomial.fromroots([0.2, 0.4]) * Polynomial((0.9, -1.0)))
@@ -73,8 +59,8 @@ def test_of_two_falls_the_last_one_counts_and_a_dip_before_it_is_asked_for():
 # -- where polynomials change their sign: their roots, to rounding ----------------------------------------------------
 
 
-INSIDE = [(), (0.2,), (0.2, 0.9), (1e-9, 0.5, 1.0 - 1e-9), (0.1, 0.11, 0.5, 0.7, 0.9)]
-OUTSIDE = [(), (-0.3,), (1.7,), (-0.3, 1.7)]
+INSIDE = [(0.2,), (1e-12, 1.0 - 1e-9), (1e-9, 0.5, 1.0 - 1e-9), (0.1, 0.11, 0.5, 0.7, 0.9)]
+OUTSIDE = [(), (-0.3, 1.7)]
 
 
 @pytest.mark.parametrize("outside", OUTSIDE)
@@ -92,11 +78,6 @@ def test_sign_changes_are_the_roots_inside(size, inside, outside):
         assert x == pytest.approx(size * root, abs=rounding / abs(p.deriv()(size * root)), rel=1e-15)
 
 
-def test_sign_changes_near_the_start_do_not_cancel():
-    """Roots 1e-12 and 1: the naive quadratic formula leaves four digits of the small one."""
-    assert sign_changes((1e-12, -(1.0 + 1e-12), 1.0), 0.0, 2.0) == pytest.approx([1e-12, 1.0], rel=1e-15)
-
-
 @pytest.mark.parametrize(
     "p", [(1.0,), (1.0, -2.0, 1.0), (1.0, -2.0, 2.0), (0.0, 1.0), (0.0, 0.0, 1.0), (0.0,), (-5.0, 1.0)]
 )
@@ -112,16 +93,14 @@ def test_values_too_small_to_be_multiplied_have_signs():
 # -- the polynomial contact force of one step against numpy's polynomials and closed forms ----------------------------
 
 
-#: Degrees 0, 1 and 2, with coefficients of both signs.
-COEFFICIENTS = [(0.7,), (0.7, -2.3), (0.7, -2.3, 1.9), (1e-6, 40.0, -3e3)]
-
-
 @pytest.mark.parametrize("size", [1e-4, 0.5])
 def test_the_work_on_an_end_is_of_its_motion_from_wherever_it_starts(size):
     """∫ C ẇ over w = 0.3 + 0.4 s − 0.7 s² + 0.2 s³, s = τ/H."""
-    w, a = np.polynomial.Polynomial([0.3, 0.4, -0.7, 0.2]), COEFFICIENTS[2]
-    once, twice = w.integ(), w.integ(2)
+    w = Polynomial([0.3, 0.4, -0.7, 0.2])
+    a = (0.7, -2.3, 1.9)
+    once = w.integ()
+    twice = w.integ(2)
     start = Motion(w(0.0), w.deriv()(0.0) / size, 0.0, 0.0)
     end = Motion(w(1.0), w.deriv()(1.0) / size, size * once(1.0), size**2 * twice(1.0))
-    exact = (Legendre(a, domain=(0.0, 1.0)).convert(kind=np.polynomial.Polynomial) * w.deriv()).integ()(1.0)
+    exact = (Legendre(a, domain=(0.0, 1.0)).convert(kind=Polynomial) * w.deriv()).integ()(1.0)
     assert force.work_on(force.derivatives(a, size), start, end, size) == pytest.approx(exact, rel=1e-13)

@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from bodies import bodies, simulate
-from references import reference
+from bodies import simulate
 from scenes import scene_from_dict
 from scipy.sparse.linalg import spsolve
 
-from springbeam.bodies.protocol import Motion
 from springbeam.bodies.quasi_static import QuasiStaticBeam
-from springbeam.contact.events import Holding
 from springbeam.monolithic.semi_discrete import assemble, constant_forces
 from springbeam.scene import Beam, statics
 from springbeam.scene.schemes import EnergyCoupling
@@ -46,7 +43,7 @@ def test_statics_are_those_of_a_mesh_that_holds_them():
     assert statics.tip_inertia(BEAM) == pytest.approx(shape @ d.M @ shape, rel=1e-12)
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3])
+@pytest.mark.parametrize("degree", [1, 2])
 def test_locking_is_the_stiffness_of_the_mesh_over_that_of_the_beam(degree):
     mesh = {"element_degree": degree, "n_elements": 2, "shear_modulus": 4e3, "fidelity": "dynamic"}
     beam = BEAM.model_copy(update=mesh)
@@ -55,7 +52,7 @@ def test_locking_is_the_stiffness_of_the_mesh_over_that_of_the_beam(degree):
     assert statics.locking(beam) == pytest.approx(ratio, rel=1e-11)
 
 
-@pytest.mark.parametrize("alpha", [1e-3, 0.2, 4.0])
+@pytest.mark.parametrize("alpha", [1e-3, 4.0])
 def test_let_go_it_relaxes_exponentially(alpha):
     rest, size = statics.tip_load_deflection(BEAM), 0.5
     beam = QuasiStaticBeam(BEAM.model_copy(update={"alpha_b": alpha}), 0, 0.1, 0.0)
@@ -93,7 +90,7 @@ def scene(**tables):
 
 @pytest.mark.parametrize(
     "coupling",
-    [{"macro_step": 0.02, "degree": 0}, {"macro_step": 0.02, "degree": 1}, {"relative_tolerance": 1e-4, "degree": 2}],
+    [{"macro_step": 0.02, "degree": 0}, {"relative_tolerance": 1e-4, "degree": 2}],
 )
 def test_where_the_force_vanishes_as_the_spring_falls_through_its_equilibrium_the_ends_stay_joined(coupling):
     """Without loads C = k u_tip vanishes at Ψ = 0: rounding decided whether the tip stayed up there, free."""
@@ -106,14 +103,3 @@ def test_where_the_force_vanishes_as_the_spring_falls_through_its_equilibrium_th
     lags = coupling == {"macro_step": 0.02, "degree": 0}
     assert off < (0.03 if lags else 1e-3)
     assert run.summary["resolved"] is not lags
-
-
-def test_what_holds_the_ends_is_the_force_of_the_reference_over_the_stiffness():
-    """C/k and its rate, by the accelerations of the reference."""
-    given = scene(stop={"position": -0.05}, beam={"alpha_b": 0.02})
-    exact = reference(given)
-    compliance, alpha = statics.tip_compliance(given.beam), given.beam.alpha_b
-    joined = np.isin(exact.phase, ("tied", "touch"))
-    y, z, force, acceleration = (exact[name][joined] for name in ("y", "z", "contact_force", "a_y"))
-    found = Holding(*bodies(given))((None, Motion(y, z, 0.0, 0.0)))
-    np.testing.assert_allclose(found, [compliance * force, z + alpha * acceleration], rtol=1e-9, atol=1e-12)
