@@ -19,7 +19,7 @@ from springbeam.bodies.force import shifted, work_on
 from springbeam.bodies.protocol import NO_FORCE, Body, Energies, Force, Motion
 from springbeam.contact.interface import Interface
 from springbeam.coupling.protocol import Step
-from springbeam.monolithic.semi_discrete import ModalLoads, modal_beam
+from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
 from springbeam.run.outcome import RunStopped
@@ -77,19 +77,11 @@ class ModalBody(Double):
         self._damping, self._sampler = alpha * self.omega**2, sampler
         self._responses = cache(partial(impulse_integrals, self.omega**2, self._damping))
         self.mass = 1.0 / float(self.b @ self.b)
-        self._load = np.zeros((3, len(self.omega)))
-        self.patterns = []  #: what a unit of each load is in the modes
-
-    def expect_loads(self, loads):
-        assert len(loads) == len(self.patterns)
-
-    def set_loads(self, forces):
-        self._load = sum(np.outer(f, pattern) for f, pattern in zip(forces, self.patterns, strict=True))
 
     def advance(self, time, size, contact, foundation=NO_FORCE):
         self.steps_made += 1
         a, v, S = self.a, self.v, self._responses(size)
-        f = np.outer(contact, self.b) + self._load
+        f = np.outer(contact, self.b)
         f[0] += self.f
         stored = sum(self.energies()[:2])
 
@@ -101,16 +93,13 @@ class ModalBody(Double):
         self.v = S[0] * v - self.omega**2 * S[1] * a + (f * S[1:4]).sum(axis=0)
         self._integrals = (float(self.b @ i1), float(self.b @ i2))
         self._acting = f[0] + size * (f[1] + 0.5 * size * f[2])
-        once, twice = i1 - a * size, i2 - a * (0.5 * size * size)
-
-        def work(force):
-            """Return that of a force on all modes, by parts as `springbeam.bodies.force.work_on`."""
-            end = force[0] + size * (force[1] + 0.5 * size * force[2])
-            return float(end @ (self.a - a) - force[1] @ once - force[2] @ (size * once - twice))
-
-        self._work += work(self._load)
-        if self._damping.any():
-            self._dissipated += work(f) - (sum(self.energies()[:2]) - stored)
+        if (
+            self._damping.any()
+        ):  # the work of all forces, by parts as `springbeam.bodies.force.work_on`, that is not kept
+            once = i1 - a * size
+            twice = i2 - a * (0.5 * size * size)
+            work = float(self._acting @ (self.a - a) - f[1] @ once - f[2] @ (size * once - twice))
+            self._dissipated += work - (sum(self.energies()[:2]) - stored)
         return self.motion()
 
     @property
@@ -135,8 +124,8 @@ class ModalBody(Double):
 
     def energies(self):
         stretch = self.omega * self.a
-        load = -float(self.f @ self.a) - self._work
-        return Energies(0.5 * float(self.v @ self.v), 0.5 * float(stretch @ stretch), self._dissipated, load)
+        kinetic = 0.5 * float(self.v @ self.v)
+        return Energies(kinetic, 0.5 * float(stretch @ stretch), self._dissipated, -float(self.f @ self.a))
 
     def apply_impulse(self, impulse):
         self.v = self.v + self.b * impulse
@@ -279,18 +268,9 @@ def bodies(scene):
         target = scene.tip_target
         kinematic = scene.beam.approach == "undeformed" and target is not None
         beam = beam_body(scene.beam, target.value / scene.beam.length if kinematic else None)
-        patterns = ModalLoads(scene, modal_beam(scene.beam)).patterns
-        beam.patterns = [row for load, row in zip(scene.loads, patterns, strict=True) if load.on != "spring"]
     if (p := scene.spring) is not None:
-        spring = DuffingBody(
-            p.mass,
-            p.linear_stiffness,
-            p.cubic_stiffness,
-            p.equilibrium,
-            p.initial_velocity,
-            p.damping,
-            p.external_force,
-        )
+        start = (p.equilibrium, p.initial_velocity)
+        spring = DuffingBody(p.mass, p.linear_stiffness, p.cubic_stiffness, *start, p.damping, p.external_force)
     return beam, spring
 
 
@@ -315,9 +295,6 @@ def stopping(scene, wrap=lambda beam, spring: (beam, spring)):
         stopped = error
     recorder.finish(summary(master, recorder))
     trajectory = recorder.trajectory()
-    trajectory.summary["work"] = {
-        name: body.steps_made for name, body in (("beam", beam), ("spring", spring)) if hasattr(body, "steps_made")
-    }
     return trajectory, stopped
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bodies import simulate
 from references import integrated_anew
 from scenes import load_of, scene_from_dict, table
 
+from springbeam import simulate
 from springbeam.bodies import force
 from springbeam.run.loads import Signal
 from springbeam.scene import SceneError, load_scene, with_changes

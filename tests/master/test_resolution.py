@@ -14,7 +14,7 @@ from springbeam.run.resolution import curve_error, peak_force_doubt, why_not_res
 from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair
 from springbeam.scene import load_scene, with_changes
-from springbeam.scene.frequencies import fastest_frequency, impact_frequency, mesh_frequency, slowest_frequency
+from springbeam.scene.frequencies import fastest_frequency, mesh_frequency, slowest_frequency
 from springbeam.scene.statics import lowest_frequency, tip_compliance
 
 BEAMS = ["soft", "steel-bumper", "vibro-impact", "bar-impact"]
@@ -105,31 +105,6 @@ def test_ends_that_the_law_would_have_elsewhere_are_said(degree, share, resolved
         told = judged(with_changes(scene, coupling={"degree": degree}), share * limits[degree])
         assert (told is None) is resolved
         assert resolved or ("a higher coupling.degree" in told) is (degree < 2)
-
-
-@pytest.mark.parametrize("share", [0.99, 1.01])
-@pytest.mark.parametrize(("alpha", "strikes", "limit"), [(0.0, True, 1.0), (0.01, True, 1.0), (0.0, False, 0.01)])
-def test_waves_that_the_midpoint_rule_makes_late_have_a_limit(share, alpha, strikes, limit):
-    """n steps that turn waves by x make them lag by n x³/12; those that die out are left out."""
-    contact = {} if strikes else {"contact": {"law": "compliance"}}
-    load = {"on": "tip", "signal": "harmonic", "frequency": 20.0}
-    beam = {"n_elements": 10, "integrator": "midpoint", "alpha_b": alpha}
-    scene = with_changes(PAIR, beam=beam, loads=[load], coupling={"degree": 0}, **contact)
-    omega = 40.0 * np.pi
-    if strikes:
-        omega = impact_frequency(scene.beam) if alpha == 0.0 else 0.15 / alpha
-    count = 50
-    H = share * (12.0 * limit / count) ** (1.0 / 3.0) / omega
-    upper, lower = load_bodies(scene, 0.0, 0)
-    try:
-        told = why_not_resolved(Pair(set_up(scene), upper, lower), records(count, H), 0.0, 0.0)
-    finally:
-        upper.close()
-        lower.close()
-    assert (told is None) is (share < 1.0)
-    if told:
-        named = float(told.split("macro_step <= ")[1].split()[0])
-        assert named == pytest.approx(0.95 * H / share**1.5, rel=0.05)
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])

@@ -103,19 +103,6 @@ def test_a_pilot_that_stopped_early_is_not_returned_however_near_it_is(monkeypat
     np.testing.assert_allclose(sizes, sizes[0] / np.array([1.0, 2.0, 4.0, 1.0]), rtol=1e-12)
 
 
-def test_runs_differ_by_the_largest_of_their_motion_and_by_their_peak_force():
-    contact = {"law": "compliance", "stiffness": 1e4, "exponent": 1.0}
-    scene = with_changes(load_scene("soft"), contact=contact, beam={"n_elements": 4}, time={"t_end": 0.05})
-    coarse, fine = (simulate(with_changes(scene, coupling={"macro_step": size})) for size in (2e-3, 1e-3))
-    found = distance(coarse, fine, 5e-5)._asdict()
-    peaks = [run.summary["contact_force_max"] for run in (coarse, fine)]
-    assert found["force"] == pytest.approx(1.0 - min(peaks) / max(peaks), rel=1e-12)
-    ends = [run.at(np.linspace(0.0, 0.05, 2001)) for run in (coarse, fine)]
-    ways = {name: np.abs(fine[name] - fine[name][0]).max() for name in ("u_tip", "y")}
-    apart = max(np.abs(ends[0][name] - ends[1][name]).max() / way for name, way in ways.items())
-    assert found["motion"] == pytest.approx(apart, rel=0.05)
-
-
 @pytest.mark.parametrize(
     ("exponent", "share"), [(1.0, 0.3), (1.5, 0.1), (1.5, 1.0), (2.0, 3.0), (3.0, 0.2), (3.0, 0.5)]
 )

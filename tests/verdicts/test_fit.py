@@ -28,6 +28,8 @@ OSCILLATOR = scene_from_dict(
 #: Starts away from what is right, as a user would.
 GUESSES = ("spring.linear_stiffness=700", "spring.damping=2")
 TIMES = np.linspace(0.01, 0.29, 75)
+COARSE = ["coupling.macro_step=0.05"]
+DUFFING = ["fit", "duffing", "m.csv", "--set", "time.t_end=0.6", "--set", *COARSE, "--vary"]
 
 
 def exact(times=TIMES):
@@ -189,18 +191,17 @@ def test_the_command_ends_with_1_where_the_data_does_not_tell(here):
     """And with 2 where there are too few points; invalid options are in bad_inputs.toml."""
     written(here / "m.csv", "time,y", TIMES, exact())
     written(here / "few.csv", "time,y", TIMES[:2], exact()[:2])
-    line = ["fit", "duffing", "m.csv", "--set", "time.t_end=0.6", "--vary"]
-    found = command(*line, "spring.cubic_stiffness=-1e-12", "--out", "f")
+    found = command(*DUFFING, "spring.cubic_stiffness=-1e-12", "--out", "f")
     assert found.exit_code == 1
     assert "not determined: spring.cubic_stiffness does not change the curves" in " ".join(found.stdout.split())
     for few in (
         ["fit", "duffing", "few.csv", "--vary", "spring.mass=1"],
-        [*line, "spring.mass=1", "--shift", "9"],
+        [*DUFFING, "spring.mass=1", "--shift", "9"],
     ):
         assert "fewer of its points lie in the run" in command(*few, "--out", "few").stderr
 
 
-FIT = ["fit", "duffing", "m.csv", "--vary", "spring.linear_stiffness=3.2", "--set", "time.t_end=0.6", "--out", "f"]
+FIT = [*DUFFING, "spring.linear_stiffness=3.2", "--out", "f"]
 
 
 def test_an_interrupted_fit_goes_on_where_it_was(here, monkeypatch):
@@ -227,20 +228,15 @@ def noisy(values, share=0.02, seed=0):
 
 def test_a_wrong_minimum_is_left_and_never_certified(here):
     """From 4.5 the nearest minimum is 4.6, whose residual is 131 % of the spread; the right one is at 3.1."""
-    times = np.linspace(0.0, 20.0, 401)
-    coarse = ["coupling.macro_step=0.05"]
-    run = simulate(with_changes(load_scene("duffing", coarse), spring={"linear_stiffness": 3.1}))
+    times = np.linspace(0.0, 20.0, 201)
+    run = simulate(with_changes(load_scene("duffing", COARSE), spring={"linear_stiffness": 3.1}))
     written(here / "m.csv", "time,y", times, noisy(run.at(times)["y"]))
-    line = ["fit", "duffing", "m.csv", "--set", *coarse, "--json", "--vary"]
-    for clock in ([], ["--shift", "0"]):
-        (key, *_) = json.loads(printed(*line, "spring.linear_stiffness=4.5", *clock))["keys"]
-        assert key["low"] < 3.1 < key["high"]
+    line = ["fit", "duffing", "m.csv", "--set", *COARSE, "--json", "--vary"]
+    (key, *_) = json.loads(printed(*line, "spring.linear_stiffness=4.5"))["keys"]
+    assert key["low"] < 3.1 < key["high"]
     only = command(*line, "spring.linear_stiffness=4:6", "--shift", "0")
     assert only.exit_code == 1
     assert any("the curves do not agree" in why for why in json.loads(only.stdout)["undetermined"])
-
-
-COARSE = ["coupling.macro_step=0.05"]
 
 
 def test_a_search_follows_a_valley_to_its_end(tmp_path):
@@ -266,12 +262,12 @@ def test_of_equal_shifts_of_the_clock_the_smallest_is_found(tmp_path):
     assert abs(shift["value"]) < 0.05
 
 
-@pytest.mark.parametrize(("cubic", "clock"), [(6e6, None), (6e3, 0.0)])
-def test_a_rest_that_is_no_error_of_the_run_is_no_noise_however_small(tmp_path, cubic, clock):
-    """A cubic stiffness in the measurement, none in the scene: 5e-2 and 9e-5 of the spread are left, no noise."""
+@pytest.mark.parametrize("cubic", [6e6, 6e3])
+def test_a_rest_that_is_no_error_of_the_run_is_no_noise_however_small(tmp_path, cubic):
+    """A cubic stiffness in the measurement, none in the scene: 8e-2 and 9e-5 of the spread are left, no noise."""
     run = simulate(with_changes(OSCILLATOR, spring={"cubic_stiffness": cubic}))
     path = written(tmp_path / "m.csv", "time,y", TIMES, run.at(TIMES)["y"])
-    found = fitted(path, shift=clock)
+    found = fitted(path, shift=0.0)
     assert 1e-5 < found["left"]["y"][1] < 0.1
     assert any("is no noise: it remembers its past" in why for why in found["undetermined"])
 
@@ -290,19 +286,15 @@ def test_what_the_run_itself_is_wrong_by_is_in_the_interval(tmp_path):
 
 def test_noise_that_remembers_its_past_is_known_by_a_repeated_measurement(tmp_path):
     """The mean of five points of white noise; the interval is wider than one that takes points for independent."""
-    times = np.linspace(0.01, 0.29, 300)
-    white = np.random.default_rng(3).normal(0.0, 2e-4, (2, 304))
+    times = np.linspace(0.01, 0.29, 150)
+    white = np.random.default_rng(3).normal(0.0, 2e-4, (2, 154))
     first, second = (exact(times) + np.convolve(row, np.ones(5) / 5.0, "valid") for row in white)
     path, again = (written(tmp_path / name, "time,y", times, y) for name, y in (("1.csv", first), ("2.csv", second)))
-    alone, known = (fitted(path, ["spring.linear_stiffness=700"], repeat=file) for file in (None, again))
+    alone, known = (fitted(path, ["spring.linear_stiffness=700"], shift=0.0, repeat=file) for file in (None, again))
     assert "no noise" in alone["undetermined"][0]
     assert known["undetermined"] == []
-    (key, _) = known["keys"]
+    (key,) = known["keys"]
     assert key["low"] < 800.0 < key["high"]
-    exaggerated = written(tmp_path / "3.csv", "time,y", times, exact(times) + 0.1 * (second - exact(times)))
-    wrong = with_changes(OSCILLATOR, spring={"damping": 2.4})
-    (why,) = fitted(path, ["spring.linear_stiffness=700"], wrong, repeat=exaggerated)["undetermined"]
-    assert "times the noise of the repeated measurement" in why
 
 
 @pytest.mark.parametrize(("most", "inside"), [(800.5, False), (830.0, True)])
@@ -332,7 +324,7 @@ def test_values_that_fit_as_well_are_named(tmp_path):
     assert key["low"] < 800.0 < key["high"]
 
 
-@settings(max_examples=5, deadline=None, phases=(Phase.explicit, Phase.generate))
+@settings(max_examples=3, deadline=None, phases=(Phase.explicit, Phase.generate))
 @given(
     stiffness=st.floats(300.0, 2000.0),
     damping=st.floats(0.5, 4.0),
@@ -344,12 +336,11 @@ def test_values_that_fit_as_well_are_named(tmp_path):
     seed=st.integers(0, 1000),
 )
 @example(879.0, 1.0, 0.625, 0.0, 0.0625, 30, "nothing", 0)
-@example(1903.0, 1.0, 0.625, 0.0, 0.0625, 30, "nothing", 0)
 def test_what_is_called_determined_is_right(stiffness, damping, guess, late, share, points, wrong, seed):
     """Scenes and records are drawn, also ones that no keys can explain: a cubic stiffness, a clock that runs slow.
 
     A value that is called determined lies within twice its interval, of which the chance is 1e-4. White noise is called
-    no structure. The examples were called determined a period late: a smaller damping made up for that.
+    no structure. The example was called determined a period late: a smaller damping made up for that.
     """
     drawn = {"linear_stiffness": stiffness, "damping": damping}
     scene = with_changes(OSCILLATOR, spring=drawn)
@@ -371,7 +362,7 @@ def test_what_is_called_determined_is_right(stiffness, damping, guess, late, sha
 def test_a_laser_record_is_fitted_in_forty_runs(tmp_path):
     """Two keys, a free clock, 2 % noise: a steel beam on its bumper, as a vibrometer sees its tip."""
     scene = load_scene("steel-bumper")
-    times = np.linspace(0.01, 0.09, 801)
+    times = np.linspace(0.01, 0.09, 401)
     path = written(tmp_path / "m.csv", "time,u_tip", times + 0.0123, noisy(simulate(scene).at(times)["u_tip"]))
     found = fitted(path, ["beam.young_modulus=1.8e11", "spring.linear_stiffness=3e4"], scene)
     assert found["undetermined"] == []
