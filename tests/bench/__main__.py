@@ -1,6 +1,6 @@
 """Measures, and writes the table into docs/performance.md: ./build.sh bench [--quick] [GROUP]…
 
-The rows of groups that are not named stay as they are in the page. The group profile is only printed.
+The rows of groups that are not named stay as they are in the page.
 """
 
 import argparse
@@ -28,7 +28,6 @@ GROUPS = {
     "beam": fmus.beam,
     "spring": fmus.spring,
     "master": master.master,
-    "profile": master.profile,
     "paper": master.paper,
     "accuracy": against_scipy.accuracy,
     "sweep": sweeps.throughput,
@@ -64,7 +63,7 @@ def main():
                 flush=True,
             )
             rows.append(cells(row))
-        if not effort.quick and name != "profile":  # which has no goals
+        if not effort.quick:
             write_section(PAGE, name, table(HEAD, rows))
             write_section(PAGE, "machine", [machine()])
 

@@ -7,16 +7,12 @@ from time import process_time, thread_time
 
 import printed
 from against_scipy import UNTIL
-from measure import Row, Times, below, compare, median_and_spread, ratio_row, shown, timed
+from measure import Row, Times, below, compare, median_and_spread, ratio_row, shown
 
 from springbeam import load_scene, simulate, with_changes
-from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.fmu import Fmu, release
-from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
+from springbeam.bodies.fmu_bodies import FmuSpring
 from springbeam.paper import co_simulation, monolithic
-from springbeam.results.recording import MemoryRecorder
-from springbeam.run.master import Master
-from springbeam.run.setup import set_up
 
 #: The calls of a macro step beside its advances; those before the first one are set-up.
 STEPPING = ("GetReal", "GetFMUstate", "SetFMUstate")
@@ -115,54 +111,6 @@ def master(effort):
         yield below(f"{name}: time outside the FMUs per macro step", outside, goal, "µs", inner)
         if effort.quick:
             return
-
-
-def profile(effort):
-    """Parts of a macro step, each repeated by itself in the middle of the first tied phase of `soft`."""
-    scene = load_scene("soft")
-    beam, spring = load_bodies(scene, 0.0, scene.degree)
-    assert isinstance(beam, FmuBeam)
-    assert spring is not None
-
-    master = Master(set_up(scene), beam, spring, MemoryRecorder(scene))
-    for _ in range(20):
-        master.step()
-    state, pair, detector = master.state, master.pair, master._detector
-    start, H = pair.ends(), scene.coupling.H
-    pair.mark()
-    step = pair.attempt(state, H, start)
-    end = pair.ends()
-    state.next_shape, state.shapes_left = float("inf"), 0
-
-    def recorded(number):
-        for _ in range(number):
-            master._record(step, end, state.present, changed=False)
-        master.flush()
-
-    def stepped(body):
-        body.rewind()
-        body.advance(state.time, H, step.contact)
-
-    parts = {
-        "both bodies marked": pair.mark,
-        "a step attempted: 2 doSteps of each body, and the contact force": lambda: pair.attempt(state, H, start),
-        "of it, the beam set back and stepped": lambda: stepped(beam),
-        "of it, the spring set back and stepped": lambda: stepped(spring),
-        "is an event due at the start": lambda: detector.at_start(state, start),
-        "does one come inside": lambda: detector.first_event(state, step),
-        "its record": lambda: master._record(step, end, state.present, changed=False),
-        "of it, energies of both bodies": lambda: (beam.energies(), spring.energies()),
-        "1024 records checked and kept, and made": lambda: recorded(1024),
-        "a shape (400 a run)": lambda: master._shape(beam, early=False),
-    }
-    calls = 10 if effort.quick else 2000
-    pair.rewind()  # which is where bodies are marked
-    for what, part in parts.items():
-        seconds = [timed(lambda part=part: [part() for _ in range(calls)]) / calls for _ in range(effort.rounds)]
-        step = pair.attempt(state, H, start)  # with the bodies at the end of the step that is looked at
-        yield Row(what, "", f"{median_and_spread([1e6 * s for s in seconds])} µs")
-    for body in (beam, spring):
-        body.close()
 
 
 def paper(effort):

@@ -68,8 +68,8 @@ def test_a_tip_that_is_held_from_the_start_sets_no_length(degree):
     assert run.summary["macro_steps"] < 2000
 
 
-@pytest.mark.parametrize("share", [1.0, 1.0 + 2.0**-52, 1.1, 3.0])
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-8])
+@pytest.mark.parametrize("share", [1.0, 1.0 + 2.0**-52, 3.0])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-8])
 def test_ends_at_rest_take_the_longest_steps(tolerance, share):
     """What moves them is rounding, which is no motion whose error is asked for."""
     beam = {

@@ -111,13 +111,7 @@ APART = with_changes(
             Unstruck(1.0, 0.0, 0.0, 0.0, -2.0),
             r"start with -1 and -2 m/s .* body in \[spring\] does not take",
         ),
-        ({}, mass(0.1), r"\[beam\]: the upper end starts at 0 m and the lower one at 0.1 m; it must start"),
         ({"contact": {"law": "compliance"}}, mass(0.1), "the lower one at 0.1 m; it must start there or above"),
-        (
-            {},
-            Unstruck(1.0, 0.0, 0.0),
-            r'law = "transmission": the body in \[spring\] cannot do that, it has no impulse, .* apply_imp',
-        ),
         ({"stop": {"position": -0.1}}, mass(-0.2), r"position = -0.1: .* \[spring\] starts below .* -0.2 m"),
         (
             {"beam": {"initial_deflection_slope": 0.05, "approach": "undeformed"}},
@@ -134,24 +128,20 @@ def test_a_start_that_cannot_be_is_refused_whoever_made_the_body(change, body, s
     assert body.steps_made == 4  # that are tried, and undone
 
 
-@pytest.mark.parametrize(
-    ("error", "cause"),
-    [(OverflowError("too fast"), "OverflowError: too fast"), (ValueError(), "ValueError")],
-)
-def test_an_error_in_a_body_of_ones_own_is_reported_at_once(monkeypatch, error, cause):
+def test_an_error_in_a_body_of_ones_own_is_reported_at_once(monkeypatch):
     """Without 20 halvings of the step: it is called once more after the last step that is made."""
     advance, steps = DuffingBody.advance, []
 
     def failing(self, time, *rest):
         steps.append(time)
         if time >= 0.03:
-            raise error
+            raise OverflowError("too fast")
         return advance(self, time, *rest)
 
     monkeypatch.setattr(DuffingBody, "advance", failing)
     with pytest.raises(RunStopped) as stopped:
         simulate(with_changes(APART, contact={"law": "compliance"}), lower=mass())
-    assert stopped.value.cause == cause
+    assert stopped.value.cause == "OverflowError: too fast"
     assert stopped.value.time == pytest.approx(0.03, abs=APART.coupling.macro_step)
     assert sum(time >= 0.03 for time in steps) == 1
 

@@ -144,19 +144,16 @@ def test_link_and_tie_are_exact_and_keep_the_interface_energy(fmu, without):
     spring["parameters"] = {"m": M2, "k": K, "c": C, "v0": start}
     run = simulate(pair(fmu(), spring=spring, beam={"velocity": start or V}, contact=TIE))
     assert error(run, tied, *([start] if start else [])) < 1e-12
-    unknown = ["stiffness and damping", *(["acceleration, or how damping changes it"] if "velocity" in spring else [])]
+    assert "misplaced_ends" not in run.summary
     said = [warning.split(";")[0] for warning in run.summary["warnings"]]
-    assert said == [f"the body in [spring] does not say its {what}" for what in unknown]
+    assert "the body in [spring] does not say its stiffness and damping" in said
 
 
 def test_without_integrals_the_force_has_degree_0(fmu):
-    """The run is that of the element, whose moments no condition needs; more is refused."""
+    """The run is that of the element, whose moments no condition needs."""
     spring = {"integral": None, "integral_2": None}
     run, exact = (simulate(pair(fmu(), spring=s, contact=TIE, coupling={"degree": 0})) for s in (spring, ELEMENT))
     assert np.abs(run.y - exact.y).max() < 1e-13
-    for degree in (1, 2):
-        with pytest.raises(SceneError, match=f"degree = {degree}: .* integral and integral_2; use degree = 0"):
-            simulate(pair(fmu(), spring=spring, contact=TIE, coupling={"degree": degree}))
 
 
 ELEMENT = {"element": "spring_damper", "mass": M2, "stiffness": K, "damping": C}
@@ -204,20 +201,11 @@ def test_without_state_saving_values_are_exchanged(fmu, scheme, version):
 
 
 def test_steps_of_one_size_stay_of_one_size(fmu):
-    run = simulate(pair(fmu(variable=False), contact=TIE, coupling={"degree": 0}))
-    assert run.events[0].kind == "impact"  # where steps may have any size, the next one is short
-    assert np.diff(run.time[run.time > 0.0]) == pytest.approx(0.02, rel=1e-9)
-    assert run.summary["max_interface_residual"] < 1e-12
-    with pytest.raises(SceneError, match=r"t_end = 0\.99: .*use a multiple of .*macro_step = 0\.02"):
-        simulate(pair(fmu(variable=False), time={"t_end": 0.99}, coupling={"degree": 0}))
+    """Also after an impact, and where a load begins."""
     pulse = {"on": "tip", "signal": "half_sine", "start": 0.1, "duration": 0.3}
-    steps = np.diff(simulate(pair(fmu(variable=False), loads=[pulse], coupling={"degree": 0})).time)
-    assert steps == pytest.approx(0.02, rel=1e-9)
-    pulse["duration"] = 0.25
-    with pytest.raises(
-        SceneError, match=r"loads\]\]: a step ends where each jumps or bends: .*use a multiple of .*macro_step = 0\.02"
-    ):
-        simulate(pair(fmu(variable=False), loads=[pulse], coupling={"degree": 0}))
+    for changes in ({"contact": TIE}, {"loads": [pulse]}):
+        run = simulate(pair(fmu(variable=False), coupling={"degree": 0}, **changes))
+        assert np.diff(run.time[run.time > 0.0]) == pytest.approx(0.02, rel=1e-9)
 
 
 @pytest.mark.parametrize("what", BAD["refused"])
@@ -436,13 +424,6 @@ def test_bodies_of_every_kind_are_judged_by_what_they_say(below):
     assert run.summary["misplaced_ends"] == pytest.approx(struck("our own", 1e-3).summary["misplaced_ends"], rel=1e-3)
     assert run.summary["resolved"]
     assert not struck(below, 0.2 * np.pi).summary["resolved"]
-
-
-def test_what_a_foreign_body_does_not_say_is_not_judged(fmu):
-    run = simulate(pair(fmu()))
-    assert "misplaced_ends" not in run.summary
-    (said,) = [warning for warning in run.summary["warnings"] if "does not say its stiffness" in warning]
-    assert said.startswith("the body in [spring]")
 
 
 def test_events_are_those_of_the_element(fmu):

@@ -50,8 +50,6 @@ def test_the_iterations_are_those_of_table_2_and_the_tip_flips(number, reported)
     np.testing.assert_allclose(v[:5], [-1.0, 1.0, -1.0, 1.0, -1.0], atol=2e-4)
     assert np.mean(v[1:] * v[:-1] < 0.0) > 0.99
     assert np.max(np.abs(run.u_tip)) < 4.4e-6
-    assert run.summary["steps_apart"] == {2: 0, 4: 1}[number]
-    assert loaded.summary["iterations_per_solve"] == pytest.approx(run.summary["iterations_per_solve"], abs=1e-12)
     assert 0.0 < np.max(np.abs(loaded.u_tip - run.u_tip)) < 2e-11
     # Nothing in the model does the work of the tip that is overwritten: 75 % of the initial energy, ½∫x² dx.
     assert run.e_total[0] == pytest.approx(1.0 / 6.0, rel=1e-12)
@@ -69,9 +67,6 @@ def test_the_cases_of_the_figures_run_to_their_end_with_the_law_transmission(num
     assert (run.time[-1], run.summary["resolved"]) == (4.0, False)
     assert len(run.events) < 300
     assert np.abs(run.energy_residual).max() < 1e-9
-
-
-# -- readings
 
 
 # -- one program beside the other
@@ -143,6 +138,3 @@ def test_a_solution_that_grows_beyond_all_bounds_keeps_what_came_before():
             program.algorithm_1(scene)
         assert len(failed.value.trajectory) > 1
         assert np.isfinite(failed.value.trajectory.energy_residual).all()
-
-
-# -- the command
