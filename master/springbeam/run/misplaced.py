@@ -53,9 +53,9 @@ def misplaced(pair: Pair, records: np.ndarray, events: Sequence[Event]) -> float
     stiffness = lower.stiffness(0.5 * (records["y"] + np.append(0.0, records["y_after"][:-1])))
     if modes is None or stiffness is None or lower.damping is None:
         return None
-    steps = Steps.of(records)
-    if not len(steps.size):
+    if not records["size"].any():
         return 0.0
+    steps = Steps.of(records)
     duration = float(np.ptp(records["time"]))
     ends = Ends(modes, lower.mass, lower.damping, duration)
     ranges = [float(np.abs(records[name] - records[name][0]).max()) for name in ("u_tip_after", "y_after")]
