@@ -14,7 +14,7 @@ from pages import IMAGES, shrink, table, write_section  # beside this script
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
-from springbeam.results.steps import force
+from springbeam.results.records import force
 
 DEGREES = (0, 1, 2)
 STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)

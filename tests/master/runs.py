@@ -3,7 +3,7 @@
 import numpy as np
 
 from springbeam.motion.events import Event, EventKind
-from springbeam.results.steps import BEAM_REPORTS, SPRING_REPORTS, STEP, STEP_COLUMNS
+from springbeam.results.records import BEAM_REPORTS, SPRING_REPORTS, STEP, STEP_COLUMNS
 from springbeam.results.trajectory import Trajectory, columns_of
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.statics import SHAPE_POINTS

@@ -10,7 +10,7 @@ from springbeam import load_scene, simulate, with_changes
 from springbeam.motion.events import Event, EventKind
 from springbeam.results.contact_times import contact_changes
 from springbeam.results.distance import HELD, apart, distance, motion
-from springbeam.results.steps import joined
+from springbeam.results.records import joined
 
 TIMES = np.linspace(0.0, 1.0, 11)
 

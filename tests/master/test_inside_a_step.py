@@ -8,7 +8,7 @@ from springbeam.bodies import force
 from springbeam.bodies.protocol import Motion
 from springbeam.motion.paths import Path, sign_changes
 from springbeam.results.dense import between_rows
-from springbeam.results.steps import STEP
+from springbeam.results.records import STEP
 
 # -- The path of a position inside a step: quintics exactly, minima, zeros, the order of its error and of the cubic's
 

@@ -31,7 +31,7 @@ from springbeam.results.directory import (
 )
 from springbeam.results.files import export, load_summary, load_trajectory, read_run
 from springbeam.results.recording import FileRecorder, MemoryRecorder
-from springbeam.results.steps import STEP_COLUMNS
+from springbeam.results.records import STEP_COLUMNS
 from springbeam.results.trajectory import BODY_COLUMNS, COLUMNS
 from springbeam.run.log import Log
 from springbeam.run.outcome import RunStopped

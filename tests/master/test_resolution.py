@@ -9,7 +9,7 @@ from springbeam import simulate
 from springbeam.bodies.factory import load_bodies
 from springbeam.contact.phases import Joint, Phase
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.results.steps import STEP
+from springbeam.results.records import STEP
 from springbeam.run.resolution import curve_error, peak_force_doubt, why_not_resolved
 from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair

@@ -9,7 +9,7 @@ from scenes import kinds, scene_from_dict
 
 import springbeam
 from springbeam.bodies.protocol import Abilities, StepRefused
-from springbeam.results.steps import STEP
+from springbeam.results.records import STEP
 from springbeam.run.gate import admit
 from springbeam.run.ledger import Balance, bounds, errors
 from springbeam.run.setup import set_up

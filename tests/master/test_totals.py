@@ -6,7 +6,7 @@ from bodies import bodies
 
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.motion.events import Event, EventKind
-from springbeam.results.steps import STEP
+from springbeam.results.records import STEP
 from springbeam.results.totals import totals
 from springbeam.run.observed import force_window
 from springbeam.run.setup import set_up

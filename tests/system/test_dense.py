@@ -8,8 +8,8 @@ import scenes
 from references import reference
 
 from springbeam import load_scene, simulate
-from springbeam.results.steps import impulse
-from springbeam.results.steps import joined as are_joined
+from springbeam.results.records import impulse
+from springbeam.results.records import joined as are_joined
 from springbeam.studies.metrics import METRICS
 
 

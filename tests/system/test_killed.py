@@ -10,7 +10,7 @@ import pytest
 from commands import HANGS, printed, written
 
 from springbeam.results.files import load_trajectory
-from springbeam.results.steps import STEP
+from springbeam.results.records import STEP
 
 #: Some 6,000 steps, of which a thousand reach the disk together.
 LONG = ["run", "soft", "--set", "beam.n_elements=10", "--set", "time.t_end=12", "--set", "coupling.macro_step=2e-3"]

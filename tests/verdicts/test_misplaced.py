@@ -7,7 +7,7 @@ from bodies import bodies
 
 from springbeam import simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.results.steps import STEP
+from springbeam.results.records import STEP
 from springbeam.run.misplaced import misplaced
 from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair

@@ -423,11 +423,11 @@ class FmuBeam(OwnBody):
     def ringing(self) -> float:  # type: ignore[override]
         return min(shear_frequency(self._beam), fastest_frequency(self._beam))
 
-    def late_waves(self, rate: float, *, struck: bool) -> float:
+    def late_waves(self, rate: float, *, excited: bool) -> float:
         beam = self._beam
         if beam.integrator == "modal":
             return 0.0
-        if struck:
+        if excited:
             return impact_frequency(beam)
         return min(max(_SMOOTH_WAVES * slowest_frequency(beam), rate), lasting_frequency(beam))
 

@@ -41,7 +41,7 @@ class Findings:
     H: float = 0.0  #: a macro step, for trial steps [s]
     faults: tuple[str, ...] = ()  #: what it says, or a scene says of it, and is not so
     units: Mapping[str, Unit] = field(default_factory=dict)  #: of the variables that the scene names, by key
-    acceleration: str | None = None  #: the variable that tells it
+    acceleration: str | None = None  #: the variable that has it
 
 
 def _promised(spec: ForeignFmu, says: Any) -> Abilities:
@@ -89,7 +89,7 @@ class ForeignPort(Port):
         second = factors["time"]
         force = factors["force"]
         slopes = [force / second**order for order in range(1, abilities.slopes + 1)]
-        #: SI units by which what a step is given is divided, and those in which the FMU tells its outputs.
+        #: SI units by which what a step is given is divided, and those of its outputs.
         self._of_given = (second, second, force, *(factors["impulse"] for _ in impulse), *slopes)
         self._of_reported = tuple(factors[key] for key in reported)
         super().__init__(fmu, (spec.force,), impulse, tuple(reported.values()), abilities.slopes, **always)
@@ -274,21 +274,21 @@ class ForeignBody(FmuBody, EndLoaded):
         load = self._on_end
         self._on_end = NO_FORCE
 
-        def pushed(upward: float) -> Motion:
+        def held_by(upward: float) -> Motion:
             self.rewind()
             return self.advance(self.state.time, size, NO_FORCE, (upward, 0.0, 0.0))
 
-        let_go = pushed(0.0)
+        free = held_by(0.0)
         # A guess of 0 would be no second point.
-        guess = -self.mass * let_go.velocity / size or self.mass
+        guess = -self.mass * free.velocity / size or self.mass
         tolerance = _AT_REST * abs(guess)
-        root, _ = newton(lambda f: pushed(f).velocity, 0.0, x1=guess, tol=tolerance, full_output=True, disp=False)
+        root, _ = newton(lambda f: held_by(f).velocity, 0.0, x1=guess, tol=tolerance, full_output=True, disp=False)
         found = float(root)
-        end = pushed(found)
+        end = held_by(found)
         self.rewind()
         self._on_end = load
-        fallen = abs(let_go.displacement - displacement)
-        if abs(end.displacement - displacement) > _STAYS * fallen and abs(end.velocity) > _STAYS * abs(let_go.velocity):
+        moved = abs(free.displacement - displacement)
+        if abs(end.displacement - displacement) > _STAYS * moved and abs(end.velocity) > _STAYS * abs(free.velocity):
             raise BodyFailed(
                 f"{self._port.path}: no constant force holds its end at rest on the foundation; use a [stop] "
                 "restitution of 1, with which nothing comes to rest, or leave [stop] out"

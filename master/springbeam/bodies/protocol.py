@@ -19,7 +19,7 @@ SIZES_REMEMBERED = 64
 ROUNDED_IMPULSE = 1e-12
 #: No force over the whole step.
 NO_FORCE: Force = (0.0, 0.0, 0.0)
-#: Length of a trial step that tells an acceleration, over a macro step.
+#: Length of a trial step that shows an acceleration, over a macro step.
 _TRIAL = 2.0**-8
 
 
@@ -156,10 +156,10 @@ class Body:
         """
         return 0.0
 
-    def late_waves(self, rate: float, *, struck: bool) -> float:
+    def late_waves(self, rate: float, *, excited: bool) -> float:
         """Return the frequency up to which waves count that the body's own steps make late [rad/s], 0 if none are.
 
-        ``rate`` [rad/s] is that of a load on it; ``struck`` says whether something excites its fastest waves.
+        ``rate`` [rad/s] is that of a load on it; ``excited`` says whether something excites its fastest waves.
         """
         return 0.0
 

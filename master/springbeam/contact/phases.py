@@ -45,7 +45,7 @@ class Phase:
 
     @cached_property
     def number(self) -> float:
-        """Number in a record (`springbeam.results.steps.PHASE_NAMES`)."""
+        """Number in a record (`springbeam.results.records.PHASE_NAMES`)."""
         return float(list(Joint).index(self.joint) + 3 * self.seated)
 
 

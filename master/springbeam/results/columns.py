@@ -9,7 +9,7 @@ import numpy as np
 
 from ..motion.events import Event
 from ..scene import Scene, Spring
-from .steps import BEAM_REPORTS, PHASE_NAMES, SPRING_REPORTS, STEP_COLUMNS, common, joined
+from .records import BEAM_REPORTS, PHASE_NAMES, SPRING_REPORTS, STEP_COLUMNS, common, joined
 from .trajectory import BODY_COLUMNS, Trajectory, columns_of
 
 #: Limit of a column that does not affect the motion [N]; pictures multiply two of them.
@@ -22,7 +22,7 @@ _NOT_SHOWN = (
 #: Records from which columns are made at once, to bound the memory for a long run.
 _TOGETHER = 4096
 #: Columns from the beam, and their fields in a record.
-_TOLD_BY_BEAM = {
+_OF_BEAM = {
     "a_tip": "tip_acceleration",
     **{name: name for name in ("clamp_force", "clamp_moment", "bending_stress")},
 }
@@ -36,7 +36,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     scene
         As run.
     steps
-        Any records of the run, of dtype `springbeam.results.steps.STEP`, shape (n,).
+        Any records of the run, of dtype `springbeam.results.records.STEP`, shape (n,).
     first
         The first record of the run, shape (1,).
     """
@@ -72,7 +72,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     }
     reports = int(first["reports"][0]) if len(first) else BEAM_REPORTS + SPRING_REPORTS
     if reports & BEAM_REPORTS:
-        found |= {name: steps[field] for name, field in _TOLD_BY_BEAM.items()}
+        found |= {name: steps[field] for name, field in _OF_BEAM.items()}
     if reports & SPRING_REPORTS and scene.spring is not None:
         found["a_y"] = _acceleration(scene, scene.spring, found, steps)
     if rigid and "a_tip" in found and (scene.lower is None or "a_y" in found):

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..motion.events import Event
 from ..scene import Scene
-from .steps import impulse
+from .records import impulse
 from .trajectory import Trajectory
 
 #: Share of the impulse of a run below which a contact or a stroke is negligible.

@@ -32,7 +32,7 @@ from ..motion.events import Event
 from ..motion.paths import LAST_MOMENT, Path, derivative, sign_changes, value
 from ..scene import Scene
 from .columns import columns
-from .steps import common, joined, reduced_mass
+from .records import common, joined, reduced_mass
 from .trajectory import Trajectory
 
 #: Fields that are linear between rows, and do not change with an event.
@@ -155,8 +155,8 @@ def between_rows(rigid: bool, steps: np.ndarray) -> float:
         for position in ("u_tip", "y"):
             places = steps[f"{position}_after"]
             unsure = LAST_MOMENT * np.abs(curves[position][_DEGREE]).max() - _ROUNDING * np.abs(places).max()
-            if (way := np.abs(places - places[0]).max()) > 0.0:
-                found = max(found, float(unsure / way))
+            if (moved := np.abs(places - places[0]).max()) > 0.0:
+                found = max(found, float(unsure / moved))
     return found
 
 

@@ -66,7 +66,7 @@ def motion(columns: Mapping[str, np.ndarray], exact: Mapping[str, np.ndarray], h
     """Return the larger of the largest differences of u_tip and of y, `apart`, at equal times; ∞ without any."""
     names = [name for name in ("u_tip", "y") if name in columns and name in exact]
     found = (apart(columns[name], exact[name], held * (name == "u_tip")) for name in names)
-    return max((float(off.max(initial=0.0)) for off in found), default=inf)
+    return max((float(each.max(initial=0.0)) for each in found), default=inf)
 
 
 def apart(values: np.ndarray, exact: np.ndarray, least: float = 0.0) -> np.ndarray:

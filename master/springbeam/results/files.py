@@ -23,7 +23,7 @@ from ..scene import scene_from_dict
 from .columns import trajectory_of
 from .directory import PARQUET, ResultsUnreadable, RunDirectory
 from .document import as_json
-from .steps import STEP, steps_of
+from .records import STEP, steps_of
 from .trajectory import PHASES, SHAPE_COLUMNS, Trajectory
 
 # -- written -----------------------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from .columns import blocks, trajectory_of
 from .dense import at_multiples
 from .directory import RunDirectory
 from .files import event_lines, lines, load_events, read_run, write_rows, write_summary
-from .steps import STEP
+from .records import STEP
 from .trajectory import SHAPE_COLUMNS, Trajectory
 
 
@@ -42,7 +42,7 @@ class MemoryRecorder:
         Parameters
         ----------
         steps
-            Their records, of dtype `springbeam.results.steps.STEP`, shape (n,); all numbers are finite.
+            Their records, of dtype `springbeam.results.records.STEP`, shape (n,); all numbers are finite.
         events
             That happened on them.
         shapes

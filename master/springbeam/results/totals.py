@@ -16,7 +16,7 @@ from ..motion.events import Event
 from ..scene import Scene
 from .contact_times import foundation_contacts, kicks, tip_contacts
 from .dense import extremes
-from .steps import FORCE_COLUMNS, impulse, joined
+from .records import FORCE_COLUMNS, impulse, joined
 
 
 class Quantity(NamedTuple):
@@ -77,7 +77,7 @@ def totals(scene: Scene, steps: np.ndarray, events: Iterable[Event], window: flo
     scene
         As run.
     steps
-        Of the whole run, of dtype `springbeam.results.steps.STEP`.
+        Of the whole run, of dtype `springbeam.results.records.STEP`.
     events
         Of the whole run.
     window

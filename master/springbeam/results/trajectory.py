@@ -125,7 +125,7 @@ class Trajectory:
     events: list[Event] = field(default_factory=list)
     shape_table: np.ndarray | None = None
     summary: dict[str, Any] = field(default_factory=dict)
-    #: Records between the rows, a step per row (`springbeam.results.steps.STEP`); ``None`` without such data.
+    #: Records between the rows, a step per row (`springbeam.results.records.STEP`); ``None`` without such data.
     steps: np.ndarray | None = None
 
     if TYPE_CHECKING:

@@ -28,7 +28,7 @@ def contradictions(setup: Setup, steps: np.ndarray, events: Sequence[Event], con
     setup
         What was run.
     steps, events
-        Of the whole run so far; steps of dtype `springbeam.results.steps.STEP`.
+        Of the whole run so far; steps of dtype `springbeam.results.records.STEP`.
     contact_time
         Total duration of all contacts of the run [s].
     """

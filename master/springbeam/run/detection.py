@@ -26,7 +26,7 @@ from .stepping import Pair, Present, State
 
 #: Trial steps to the bottom of a dip.
 _MAX_DIP_TRIALS = 8
-#: Position tolerances by which the motion at a located event may be off before it is none.
+#: Position tolerances by which the motion at a located event may differ before it is none.
 _JUMP = 1e5
 #: How well the zero of a force is found, over the force at the ends of the step.
 _SHARP = 1e-9

@@ -39,7 +39,7 @@ def bounds(tolerance: float, *, exchanges: bool = False) -> tuple[float, float]:
 def errors(
     steps: np.ndarray, first: np.ndarray, scale: float, received: Collection[str] = ()
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return by how much the energy is off at each of ``steps``, over the largest until then, and that [J].
+    """Return by how much the energy has changed at each of ``steps``, over the largest until then, and that [J].
 
     ``first`` is the first record of the run, shape (1,): it has the energy that should be kept. ``scale`` is the
     largest energy before ``steps`` [J], ``received`` as of `ledger`.
@@ -69,10 +69,10 @@ class Balance:
             table for table, body in zip(("beam", "spring"), pair.bodies, strict=True) if body.received is not None
         ]
         #: Bodies of the caller's may tell no energies; there is then no balance to judge by.
-        self._untold = any(
+        self._unknown = any(
             not body.can().energies and body.received is None and body.mass < inf for body in pair.bodies
         )
-        if self._untold:
+        if self._unknown:
             self._warns = self._stops = inf
         self._scale = 0.0  #: the largest energy so far [J]
 
@@ -103,7 +103,7 @@ class Balance:
             **({"loss_contact": float(last["law_dissipated"])} if self._pair.law is not None else {}),
         }
         warnings = []
-        if self._untold:
+        if self._unknown:
             warnings.append("a body reports no energies, so the energy balance is not checked")
         elif of_judged > self._warns:
             warnings.append(self._cause(of_judged, steps))

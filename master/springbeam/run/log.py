@@ -10,7 +10,7 @@ import numpy as np
 from ..motion.events import Event
 from ..results.columns import first_not_finite
 from ..results.recording import Recorder
-from ..results.steps import STEP
+from ..results.records import STEP
 from ..results.trajectory import SHAPE_COLUMNS
 from .outcome import RunStopped
 
@@ -29,8 +29,8 @@ class Log:
     def __init__(self, recorder: Recorder, *checks: Check) -> None:
         self._recorder = recorder
         self._checks = checks
-        #: What the recorder does not have yet: records as of `springbeam.results.steps.packed`, events of these and the
-        #: next one, and the beam's shapes at some records, the numbers of `SHAPE_COLUMNS`.
+        #: What the recorder does not have yet: records as of `springbeam.results.records.packed`, events of these and
+        #: the next one, and the beam's shapes at some records, the numbers of `SHAPE_COLUMNS`.
         self.records = list[bytes]()
         self.events = list[Event]()
         self.shapes = list[np.ndarray]()

@@ -77,7 +77,7 @@ class MacroGrid:
 class Adapted:
     """The size of the next step, and how far the motion has come."""
 
-    ways: list[tuple[float, float]]  #: lowest and highest position of each end [m]
+    ranges: list[tuple[float, float]]  #: lowest and highest position of each end [m]
     energy: float = 0.0  #: the largest [J]
     number: int = _FIRST * _PER_OCTAVE  #: k of the size
     just_rejected: bool = False
@@ -131,7 +131,7 @@ class AdaptiveSteps:
 
     def accept(self, step: Step) -> None:
         """Note how far ``step``, which is made, has moved the ends."""
-        self.state.ways = self._ways(step)
+        self.state.ranges = self._ranges_with(step)
 
     def holds(self, state: State, step: Step, refused: str, *, to_kink: bool = False) -> bool:
         """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set.
@@ -170,19 +170,19 @@ class AdaptiveSteps:
         curve = 0.0
         spans = []
         bent = sqrt(2.0 * self._compliance * self.state.energy)
-        least = [max(abs(low), abs(high), bent) for low, high in self.state.ways]
-        ends = zip(step.start, step.end, self._ways(step), least, strict=True)
+        least = [max(abs(low), abs(high), bent) for low, high in self.state.ranges]
+        ends = zip(step.start, step.end, self._ranges_with(step), least, strict=True)
         for start, end, (low, high), size in ends:
             means = end.integral / step.size, end.integral_2 / step.size**2
             beside = Path.through(start[:2], end[:2], step.size, means).moments_beside_cubic
-            way = high - low
+            moved = high - low
             rounding = _ROUNDING * size
-            if bent > way and self._relative * way <= rounding:
-                way = bent
-            elif way > rounding:
-                spans.append(way)
-            if way > 0.0:
-                curve = max(curve, beside / (self._absolute + self._relative * way + rounding))
+            if bent > moved and self._relative * moved <= rounding:
+                moved = bent
+            elif moved > rounding:
+                spans.append(moved)
+            if moved > 0.0:
+                curve = max(curve, beside / (self._absolute + self._relative * moved + rounding))
         span = min(spans, default=bent)
         if span == 0.0:
             return 0.0, _CUBIC
@@ -209,9 +209,9 @@ class AdaptiveSteps:
         bends = self._compliance if self._compliance > 0.0 else inf
         return missed * min(gives, bends), degree + 3
 
-    def _ways(self, step: Step) -> list[tuple[float, float]]:
+    def _ranges_with(self, step: Step) -> list[tuple[float, float]]:
         """Return the lowest and the highest position of each end [m], with ``step``."""
-        ends = zip(self.state.ways, step.start, step.end, strict=True)
+        ends = zip(self.state.ranges, step.start, step.end, strict=True)
         return [
             (min(low, a.displacement, b.displacement), max(high, a.displacement, b.displacement))
             for (low, high), a, b in ends

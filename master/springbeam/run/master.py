@@ -20,7 +20,7 @@ from ..coupling.protocol import NotConverged, Step
 from ..motion.events import Event, EventKind, Joint
 from ..results.columns import ledger
 from ..results.recording import Recorder
-from ..results.steps import BEAM_REPORTS, SPRING_REPORTS, STEP, packed
+from ..results.records import BEAM_REPORTS, SPRING_REPORTS, STEP, packed
 from .detection import Detector
 from .ledger import Balance
 from .log import TOGETHER, Log

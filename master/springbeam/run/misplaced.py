@@ -18,8 +18,8 @@ from ..motion.events import Event
 from ..results.distance import HELD
 from .errors.ends import Ends, Terms
 from .errors.loads import left_out
+from .errors.records import StepRecords
 from .errors.soft import defect_of_law, defect_of_tip
-from .errors.steps import Steps
 from .errors.strokes import Strokes, strokes
 from .errors.tie import tie
 from .loads import ON_BEAM, ON_SPRING
@@ -34,7 +34,7 @@ _QUIET = 1e-8
 class Known(NamedTuple):
     """What all causes need of a run: its steps, and how its ends answer."""
 
-    steps: Steps
+    steps: StepRecords
     ends: Ends
     stiffness: np.ndarray  #: of the lower body over its mass, in each step [1/s²]
     strokes: Strokes
@@ -55,7 +55,7 @@ def misplaced(pair: Pair, records: np.ndarray, events: Sequence[Event]) -> float
         return None
     if not records["size"].any():
         return 0.0
-    steps = Steps.of(records)
+    steps = StepRecords.of(records)
     duration = float(np.ptp(records["time"]))
     ends = Ends(modes, lower.mass, lower.damping, duration)
     ranges = [float(np.abs(records[name] - records[name][0]).max()) for name in ("u_tip_after", "y_after")]
@@ -136,7 +136,9 @@ def _under_ties(run: Known, degree: int, alone: bool, quiet: float) -> Iterator[
         yield ends.u, ends.y
 
 
-def _by_loads(pair: Pair, terms: Terms, steps: Steps, duration: float, quiet: float) -> list[tuple[Any, ...]] | None:
+def _by_loads(
+    pair: Pair, terms: Terms, steps: StepRecords, duration: float, quiet: float
+) -> list[tuple[Any, ...]] | None:
     """Return what the parts of loads that the steps leave out add: to the terms of the tip, to u, v, y and z.
 
     ``None`` where they move no end by ``quiet`` [m].

@@ -112,10 +112,10 @@ def _late_waves(pair: Pair, steps: np.ndarray) -> str | None:
     setup = pair.setup
     size = steps["size"]
     bent = not setup.at_rest and steps["beam_potential"][0] > BENT * steps["beam_kinetic"][0]
-    struck = bool(bent) or (pair.law is None and (setup.law is not None or setup.floor is not None))
-    omega = pair.upper.late_waves(max((load.rate for load in setup.loads), default=0.0), struck=struck)
+    excited = bool(bent) or (pair.law is None and (setup.law is not None or setup.floor is not None))
+    omega = pair.upper.late_waves(max((load.rate for load in setup.loads), default=0.0), excited=excited)
     lag = omega**3 * float((size**3).sum()) / 12.0
-    limit = WAVE_LAG if struck else SMOOTH_LAG
+    limit = WAVE_LAG if excited else SMOOTH_LAG
     if lag <= limit:
         return None
     H = sqrt(float((size**3).sum() / size.sum()))

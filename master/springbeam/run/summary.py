@@ -28,8 +28,8 @@ def summary(master: Master, recorder: Recorder) -> dict[str, Any]:
     events = recorder.events()[:known]
     made = int(np.count_nonzero(np.diff(steps["time"])))
     energies, warnings, changed = master.balance.report(steps)
-    off = misplaced(pair, steps, events)
-    unresolved = why_not_resolved(pair, steps, off or 0.0, between_rows(pair.law is None, steps))
+    displaced = misplaced(pair, steps, events)
+    unresolved = why_not_resolved(pair, steps, displaced or 0.0, between_rows(pair.law is None, steps))
     window = force_window(pair, steps)
     warnings += filter(None, [unresolved or peak_force_doubt(pair, window), not_shown(scene, steps)])
     warnings += filter(None, [unknown(pair), coarse_force(pair)])
@@ -45,7 +45,7 @@ def summary(master: Master, recorder: Recorder) -> dict[str, Any]:
         "iterations": pair.joined.state.iterations,
         **energies,
         "resolved": unresolved is None and not changed and not ruled_out,
-        **({} if off is None else {"misplaced_ends": off}),
+        **({} if displaced is None else {"misplaced_ends": displaced}),
         "warnings": warnings,
         **amounts,
     }

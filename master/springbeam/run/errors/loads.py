@@ -12,7 +12,7 @@ import numpy as np
 
 from ...scene.loads import Load, TableLoad
 from .ends import Terms
-from .steps import Steps
+from .records import StepRecords
 
 #: Radians of a term, or lines of a table, per point of the quadrature of a load over a step; its points, at least and
 #: at most.
@@ -24,7 +24,7 @@ _TOGETHER = 1024
 _NORMS = [0.5, 1.5, 2.5]
 
 
-def left_out(loads: Sequence[tuple[Load, float]], terms: Terms, steps: Steps, quiet: float) -> np.ndarray | None:
+def left_out(loads: Sequence[tuple[Load, float]], terms: Terms, steps: StepRecords, quiet: float) -> np.ndarray | None:
     """Return what the part of ``loads`` that each step leaves out adds to the terms of a body, (n of the steps, terms).
 
     The loads come with the force that each unit of them is at the end [N]. ``None`` where they move no end by ``quiet``

@@ -11,9 +11,9 @@ import numpy as np
 
 from ...bodies.protocol import Body
 from ...motion.paths import derivative, value
-from ...results.steps import force, joined
+from ...results.records import force, joined
 from ...scene.laws import SoftLaw
-from .steps import Steps, path_of, penetration
+from .records import StepRecords, path_of, penetration
 
 #: Points of a step at which a law is evaluated, and their weights: Gauss points.
 _POINTS, _SHARES = np.polynomial.legendre.leggauss(4)
@@ -23,17 +23,17 @@ _INSIDE = list(zip(0.5 * (_POINTS + 1.0), 0.5 * _SHARES, strict=True))
 _Demand = Callable[[Any, Any], np.ndarray]
 
 
-def defect_of_law(law: SoftLaw, steps: Steps, parts: int) -> np.ndarray:
+def defect_of_law(law: SoftLaw, steps: StepRecords, parts: int) -> np.ndarray:
     """Return `_defect` of the force that a soft ``law`` demands along the path of the penetration."""
     return _defect(partial(_force_of_law, law), penetration(steps), steps, parts)
 
 
-def defect_of_tip(tip: Body, steps: Steps, parts: int) -> np.ndarray:
+def defect_of_tip(tip: Body, steps: StepRecords, parts: int) -> np.ndarray:
     """Return `_defect` of the force that holds a ``tip`` without mass at the lower end, while it is joined to that."""
     return _defect(partial(_force_of_tip, tip, joined(steps.before)), path_of(steps, "y", "z"), steps, parts)
 
 
-def _defect(demand: _Demand, path: Any, steps: Steps, parts: int) -> np.ndarray:
+def _defect(demand: _Demand, path: Any, steps: StepRecords, parts: int) -> np.ndarray:
     """Return four means over equal parts of each step, (n, parts, 4).
 
     They are the demanded force beyond that of the step, once evenly weighted and once by 2 (1 − s), s the

@@ -10,7 +10,7 @@ import numpy as np
 from ...contact.interface import Interface
 from ...motion.events import Event, EventKind
 from ...motion.paths import derivative, value
-from .steps import Steps, path_of
+from .records import StepRecords, path_of
 
 
 class Strokes(NamedTuple):
@@ -21,7 +21,7 @@ class Strokes(NamedTuple):
     most: np.ndarray  #: at most, the jump of the impact [m/s]; 0 without one
 
 
-def strokes(interface: Interface, steps: Steps, events: Sequence[Event]) -> Strokes:
+def strokes(interface: Interface, steps: StepRecords, events: Sequence[Event]) -> Strokes:
     """Return those of a run: the end is struck earlier or later, under the acceleration before and after that."""
     share = np.where(steps.last["phase"] >= 3.0, 0.0, 1.0)
     turns, most = np.zeros((2, len(share)))
@@ -42,6 +42,6 @@ def strokes(interface: Interface, steps: Steps, events: Sequence[Event]) -> Stro
     return Strokes(share, turns, most)
 
 
-def _last_acceleration(steps: Steps) -> Any:
+def _last_acceleration(steps: StepRecords) -> Any:
     """Return ü_tip at the end of each step [m/s²], of the path through both ends and the moments."""
     return value(derivative(derivative(path_of(steps, "u_tip", "v_tip"))), 1.0) / steps.size**2

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...motion.paths import derivative, value
-from ...results.steps import force, joined
-from .steps import Steps, penetration
+from ...results.records import force, joined
+from .records import StepRecords, penetration
 
 
 class Tie(NamedTuple):
@@ -21,7 +21,7 @@ class Tie(NamedTuple):
     pull: np.ndarray  #: C/ẏ where a tie is released at the end of the step: the impulse by an error of y [N·s/m]
 
 
-def tie(steps: Steps, degree: int, quiet: float) -> Tie:
+def tie(steps: StepRecords, degree: int, quiet: float) -> Tie:
     """Return it for forces of this ``degree``; steps whose gap stays below ``quiet`` [m] have one part."""
     parts = degree + 2  # one more than the step has forces
     path = penetration(steps)

@@ -9,8 +9,8 @@ import numpy as np
 from ...motion.paths import Path
 
 
-class Steps(NamedTuple):
-    """Records of steps (`springbeam.results.steps.STEP`), (n,) each."""
+class StepRecords(NamedTuple):
+    """Records of steps (`springbeam.results.records.STEP`), (n,) each."""
 
     before: np.ndarray  #: at the start of each step
     ends: np.ndarray  #: at its end
@@ -18,14 +18,14 @@ class Steps(NamedTuple):
     size: np.ndarray  #: [s]
 
     @classmethod
-    def of(cls, records: np.ndarray) -> Steps:
+    def of(cls, records: np.ndarray) -> StepRecords:
         """Return those of all ``records`` of a run."""
         made = np.flatnonzero(records["size"] > 0.0)
         last = np.append(made[1:], len(records)) - 1
         return cls(records[made - 1], records[made], records[last], records["size"][made])
 
 
-def path_of(steps: Steps, position: str, velocity: str) -> Any:
+def path_of(steps: StepRecords, position: str, velocity: str) -> Any:
     """Return the path of a ``position`` inside each step, the coefficients of `Path`, shape (6, n)."""
     size: Any = steps.size
     start: Any = steps.before[f"{position}_after"], steps.before[f"{velocity}_after"]
@@ -35,6 +35,6 @@ def path_of(steps: Steps, position: str, velocity: str) -> Any:
     return np.array(powers)
 
 
-def penetration(steps: Steps) -> Any:
+def penetration(steps: StepRecords) -> Any:
     """Return the path of y − u inside each step, as of `path_of`."""
     return path_of(steps, "y", "z") - path_of(steps, "u_tip", "v_tip")
