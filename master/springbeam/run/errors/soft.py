@@ -4,53 +4,88 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from itertools import product
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ...bodies.protocol import Body
-from ...motion.paths import derivative, value
+from ...motion.paths import derivative, sign_changes, value
 from ...results.records import force, joined
 from ...scene.laws import SoftLaw
 from .records import StepRecords, path_of, penetration
 
-#: Points of a step at which a law is evaluated, and their weights: Gauss points.
+#: Gauss points of a stretch between 0 and 1, and their weights.
 _POINTS, _SHARES = np.polynomial.legendre.leggauss(4)
 _INSIDE = list(zip(0.5 * (_POINTS + 1.0), 0.5 * _SHARES, strict=True))
-#: Returns, of penetrations and their rates at one place in each step, the demanded force [N] and how it grows
-#: with both [N/m], [N·s/m], (3, n).
-_Demand = Callable[[Any, Any], np.ndarray]
+#: Returns, of the numbers of steps, and penetrations and their rates at one place in each, the demanded force [N] and
+#: how it grows with both [N/m], [N·s/m], (3, n).
+_Demand = Callable[[Any, Any, Any], np.ndarray]
 
 
 def defect_of_law(law: SoftLaw, steps: StepRecords, parts: int) -> np.ndarray:
     """Return `_defect` of the force that a soft ``law`` demands along the path of the penetration."""
-    return _defect(partial(_force_of_law, law), penetration(steps), steps, parts)
+    path = penetration(steps)
+    touches = _touches(path) if law.one_sided else {}
+    return _defect(partial(_force_of_law, law), path, steps, parts, touches)
 
 
 def defect_of_tip(tip: Body, steps: StepRecords, parts: int) -> np.ndarray:
     """Return `_defect` of the force that holds a ``tip`` without mass at the lower end, while it is joined to that."""
-    return _defect(partial(_force_of_tip, tip, joined(steps.before)), path_of(steps, "y", "z"), steps, parts)
+    return _defect(partial(_force_of_tip, tip, joined(steps.before)), path_of(steps, "y", "z"), steps, parts, {})
 
 
-def _defect(demand: _Demand, path: Any, steps: StepRecords, parts: int) -> np.ndarray:
+def _defect(demand: _Demand, path: Any, steps: StepRecords, parts: int, kinks: dict[int, list[float]]) -> np.ndarray:
     """Return four means over equal parts of each step, (n, parts, 4).
 
     They are the demanded force beyond that of the step, once evenly weighted and once by 2 (1 − s), s the
-    share of the part [N], and how it grows with the penetration [N/m] and with its rate [N·s/m].
+    share of the part [N], and how it grows with the penetration [N/m] and with its rate [N·s/m]. ``kinks`` are the
+    shares of steps at which the demand is not smooth: quadrature goes from one to the next.
     """
-    size = steps.size
+    found = np.zeros((len(steps.size), parts, 4))
+    step, part, low, high = _stretches(len(steps.size), parts, kinks)
+    size = steps.size[step]
+    ends = steps.ends[step]
+    path = path[:, step]
     slope = derivative(path)
-    found = np.zeros((len(size), parts, 4))
-    for part, (at, share) in product(range(parts), _INSIDE):
-        s = (part + at) / parts
-        demanded, *grows = demand(value(path, s), value(slope, s) / size)
-        beyond = demanded - force(steps.ends, s * size)
-        found[:, part] += share * np.array([beyond, 2.0 * (1.0 - at) * beyond, *grows]).T
+    for at, share in _INSIDE:
+        s = low + at * (high - low)
+        weight = share * (high - low) * parts
+        demanded, *grows = demand(step, value(path, s), value(slope, s) / size)
+        beyond = demanded - force(ends, s * size)
+        left = 1.0 - (s * parts - part)
+        np.add.at(found, (step, part), (weight * np.array([beyond, 2.0 * left * beyond, *grows])).T)
     return found
 
 
-def _force_of_law(law: SoftLaw, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+def _stretches(steps: int, parts: int, kinks: dict[int, list[float]]) -> tuple[Any, Any, Any, Any]:
+    """Return the step, the part of it, and both ends, as shares of the step, of each stretch without ``kinks``."""
+    edges = [part / parts for part in range(parts)]
+    step = np.repeat(np.arange(steps), parts)
+    low = np.tile(edges, steps)
+    high = low + 1.0 / parts
+    if kinks:
+        smooth = ~np.isin(step, list(kinks))
+        divided = [
+            (number, *ends) for number, places in kinks.items() for ends in pairwise(sorted([*edges, 1.0, *places]))
+        ]
+        step, low, high = (
+            np.concatenate([values[smooth], more])
+            for values, more in zip((step, low, high), zip(*divided, strict=True), strict=True)
+        )
+        step = step.astype(int)
+    part = (0.5 * (low + high) * parts).astype(int)
+    return step, part, low, high
+
+
+def _touches(path: Any) -> dict[int, list[float]]:
+    """Return the shares of steps at which a contact opens or closes, by the number of the step."""
+    closed = np.array([value(path, s) for s in (0.0, *(at for at, _ in _INSIDE), 1.0)]) > 0.0
+    changing = np.flatnonzero(closed.any(axis=0) & ~closed.all(axis=0))
+    return {int(step): sign_changes(path[:, step].tolist(), 0.0, 1.0) for step in changing}
+
+
+def _force_of_law(law: SoftLaw, _step: np.ndarray, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
     """Return `_Demand` of a soft ``law``."""
     found = np.zeros((3, len(p)))
     closed = np.flatnonzero((p > 0.0) | (not law.one_sided))
@@ -60,9 +95,9 @@ def _force_of_law(law: SoftLaw, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
     return found
 
 
-def _force_of_tip(tip: Body, together: np.ndarray, y: np.ndarray, rate: np.ndarray) -> np.ndarray:
+def _force_of_tip(tip: Body, together: np.ndarray, step: np.ndarray, y: np.ndarray, rate: np.ndarray) -> np.ndarray:
     """Return `_Demand` of a ``tip`` without mass that is joined to the lower end in the steps ``together``."""
     stiffness = np.full(len(y), tip.stiffness(0.0))
     damping = np.full(len(y), tip.damping)
     held = tip.holding_force(0.0, 0.0) + stiffness * y + damping * rate
-    return np.asarray(together * [held, stiffness, damping])
+    return np.asarray(together[step] * [held, stiffness, damping])
