@@ -35,7 +35,8 @@ class Candidate:
 
     @property
     def setting(self):
-        coupling, spring = self.scene.coupling, self.scene.spring
+        coupling = self.scene.coupling
+        spring = self.scene.spring
         assert spring is not None
         return (
             f"{coupling.scheme} {coupling.degree}, {round(UNTIL / coupling.H)} steps, tolerances "

@@ -57,9 +57,11 @@ def python(folder, *arguments):
     left_out = ("PYTHONDONTWRITEBYTECODE", "OPENBLAS_NUM_THREADS")
     environment = {name: value for name, value in os.environ.items() if name not in left_out}
     environment |= {"PYTHONPYCACHEPREFIX": str(folder / "bytecode"), "XDG_CACHE_HOME": str(folder / "cache")}
-    before, began = os.times(), perf_counter()
+    before = os.times()
+    began = perf_counter()
     subprocess.run([sys.executable, *arguments], cwd=folder, env=environment, check=True, capture_output=True)
-    wall, after = perf_counter() - began, os.times()
+    wall = perf_counter() - began
+    after = os.times()
     user = after.children_user - before.children_user
     return Taken(user + after.children_system - before.children_system, wall)
 

@@ -53,7 +53,8 @@ def beam(effort):
             ("memory", "memory at its most", 1, _size),
         ):
             # A hundred elements are less than the system gives out at once.
-            n, values = line["elements"][first:], line[key][first:]
+            n = line["elements"][first:]
+            values = line[key][first:]
             exponents = _exponents(n, values)
             yield Row(
                 f"{what}, {name}, {n[0]:.0e} to {n[-1]:.0e} elements",
@@ -107,7 +108,8 @@ def spring(effort):
         ("soft 1e-12 H=2.5e-4", "`soft`, H = 2.5e-4, tolerance 1e-12"),
         ("fig4 1e-12", "`paper-fig4`, H = 4e-3, tolerance 1e-12"),
     ):
-        counts, errors = found[f"{name} counts"], found[f"{name} errors"]
+        counts = found[f"{name} counts"]
+        errors = found[f"{name} errors"]
         against = f"{bare}: {counts['rival'][0]} internal steps, ours {counts['ours'][0]}; error "
         against += f"{errors['rival'][0]:.0e} m, ours {errors['ours'][0]:.0e} m"
         yield ratio_row(f"spring step, {what}", _of(found[name]), 1.2, against)

@@ -22,8 +22,10 @@ class Inside:
     """Time spent in advances and `STEPPING` calls while it is in force; what ctypes needs is not part of it."""
 
     def __init__(self):
-        self.seconds, self.calls = 0.0, 0
-        self._bound, self._advancing = Fmu.bound, Fmu.advancing
+        self.seconds = 0.0
+        self.calls = 0
+        self._bound = Fmu.bound
+        self._advancing = Fmu.advancing
 
     def _timed(self, function):
         def call():
@@ -44,11 +46,13 @@ class Inside:
             advance, *arrays = self._advancing(fmu, *arguments)
             return self._timed(advance), *arrays
 
-        Fmu.bound, Fmu.advancing = bound, advancing
+        Fmu.bound = bound
+        Fmu.advancing = advancing
         return self
 
     def __exit__(self, *_):
-        Fmu.bound, Fmu.advancing = self._bound, self._advancing
+        Fmu.bound = self._bound
+        Fmu.advancing = self._advancing
 
 
 def nothing(times=20_000):
@@ -56,7 +60,8 @@ def nothing(times=20_000):
     with Inside() as inside:
         body = FmuSpring(load_scene("soft").spring, 0.0)
         call = body.fmu.bound("GetReal", None, c_size_t.from_param(0), None)
-        inside.seconds, inside.calls = 0.0, 0
+        inside.seconds = 0.0
+        inside.calls = 0
         for _ in range(times):
             call()
         body.close()
@@ -79,7 +84,8 @@ def whole_call(effort):
     """What a call of `simulate` takes beside its solution, in a process that has run the scene before."""
     scene = with_changes(load_scene("soft"), time={"t_end": 0.0712}, coupling={"macro_step": 0.0712 / 6})
     simulate(scene)
-    calls, solutions = [], []
+    calls = []
+    solutions = []
     for _ in range(5 * effort.rounds):
         began = process_time()
         run = simulate(scene)
@@ -96,7 +102,8 @@ def master(effort):
         coupling = {"macro_step": H, "scheme": scheme, "degree": degree}
         scene = with_changes(load_scene("soft"), coupling=coupling)
         only_tied = with_changes(scene, time={"t_end": 0.071})
-        outside, within = [], []
+        outside = []
+        within = []
         for _ in range(effort.rounds):
             seconds, steps = tied_phase(scene)
             release()  # instances that are kept would go on with calls that nobody times
@@ -106,7 +113,8 @@ def master(effort):
             of_fmus = (inside.seconds - inside.calls * empty) / summary["macro_steps"]
             within.append(1e6 * of_fmus)
             outside.append(1e6 * (seconds / steps - of_fmus))
-        name, goal = f"`soft` tied, {scheme} {degree}, H = {H:g}", 26.0 if degree == 0 else 30.0
+        name = f"`soft` tied, {scheme} {degree}, H = {H:g}"
+        goal = 26.0 if degree == 0 else 30.0
         inner = f"inside {median_and_spread(within)} µs"
         yield below(f"{name}: time outside the FMUs per macro step", outside, goal, "µs", inner)
         if effort.quick:
@@ -142,7 +150,8 @@ def paper(effort):
     for _ in range(min(effort.rounds, 5)):
         summary = simulate(resolved).summary
         per_step.append(float(summary["wall_time"]) / summary["macro_steps"])
-    median, needed = statistics.median(per_step), 3.5 / 4e-6
+    median = statistics.median(per_step)
+    needed = 3.5 / 4e-6
     per_step_of_scipy = statistics.median(times.rival) / steps
     yield Row(
         "`paper-fig2` resolved: H = 4e-6 ≤ 1/ω₁, 64 modes",

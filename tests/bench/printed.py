@@ -22,7 +22,8 @@ def simulate(scene):
 class _AsPrinted(monolithic._Algorithm):
     def _set_step(self, h):
         super()._set_step(h)
-        d, alpha = self.discrete, self.beam.alpha_b
+        d = self.discrete
+        alpha = self.beam.alpha_b
         self.A = (4.0 * d.M + (h**2 + 2.0 * alpha * h) * d.K).tocsc()
         last = self.A.shape[0] - 1
         self.at_tip = sp.csc_array(([1.0], ([last], [last])), shape=self.A.shape)
@@ -32,8 +33,11 @@ class _AsPrinted(monolithic._Algorithm):
         """Make Newton's steps of (62) on all unknowns, told by that of the tip."""
         if solve != "beam":
             return super()._newton(f, guess, solve)
-        before, h, M = self.rows[-1], self.h, self.discrete.M
-        known, x = self.B @ before.q + 4.0 * h * (M @ before.v) + 2.0 * h**2 * self.load, before.q.copy()
+        before = self.rows[-1]
+        h = self.h
+        M = self.discrete.M
+        known = self.B @ before.q + 4.0 * h * (M @ before.v) + 2.0 * h**2 * self.load
+        x = before.q.copy()
         at_start = self._compliance(before.q[-1], self.stiffness)[0]
 
         def equation(w):

@@ -61,17 +61,21 @@ class Rival:
 
         Raises ReferenceFailure if the solver fails, or takes more than ``limit`` seconds.
         """
-        s, wanted, seconds = self._system, np.asarray(times, dtype=float), 0.0
+        s = self._system
+        wanted = np.asarray(times, dtype=float)
+        seconds = 0.0
         evaluations = 0
         state = HybridState(s, *initial(s, 0.0))
-        n, found = 2 * s.n, np.empty((len(wanted), s.size))
+        n = 2 * s.n
+        found = np.empty((len(wanted), s.size))
         found[wanted <= state.time] = state.X
         state.start()
         while state.time < wanted[-1]:
             if state.phase not in self._phases:
                 self._phases[state.phase] = _Phase(s, state.phase)
             phase = self._phases[state.phase]
-            until, watched = min(wanted[-1], s.loads.smooth_from(state.time)), state.watched()
+            until = min(wanted[-1], s.loads.smooth_from(state.time))
+            watched = state.watched()
             inside = np.flatnonzero((wanted > state.time) & (wanted < until))
             options: dict[str, Any] = {"rtol": rtol, "atol": atol, "t_eval": [*wanted[inside], until]}
             if method != "DOP853" and phase.jacobian is not None:
@@ -138,12 +142,17 @@ class _Phase:
     """The equations of one phase of contact, and the functions that end it."""
 
     def __init__(self, s: HybridSystem, phase: ReferencePhase) -> None:
-        self._system, self._phase, self._held = s, phase, s.held(phase)
+        self._system = s
+        self._phase = phase
+        self._held = s.held(phase)
         self._soft = s.scene.coupled and not s.joined(phase) and s.law.acts(phase.contact)
-        self._damped, self._hardening = bool(np.any(s.c)), s.spring.cubic_stiffness / s.spring.mass**2
+        self._damped = bool(np.any(s.c))
+        self._hardening = s.spring.cubic_stiffness / s.spring.mass**2
         self.jacobian: Callable[[float, np.ndarray], np.ndarray] | None = None
         if not self._soft or isinstance(s.law, Link):  # linear but for the cubic spring
-            units, self.jacobian, top = np.eye(2 * s.n + 2 * s.alone), self._jacobian, s.n - 1
+            units = np.eye(2 * s.n + 2 * s.alone)
+            self.jacobian = self._jacobian
+            top = s.n - 1
             self._linear = np.transpose([0.5 * (self.rhs(0.0, unit) - self.rhs(0.0, -unit)) for unit in units])
             two = 2.0 * units[top]
             self._cubic = (0.25 * (self.rhs(0.0, two) - self.rhs(0.0, -two)) - self._linear[:, top]) / 3.0
@@ -155,8 +164,10 @@ class _Phase:
         return np.concatenate((X[: 2 * s.n], (X[s.A] @ s.tip, X[s.V] @ s.tip) if s.alone else ()))
 
     def rhs(self, time: float, X: np.ndarray) -> np.ndarray:
-        s, n = self._system, self._system.n
-        x, x_dot = X[:n], X[n : 2 * n]
+        s = self._system
+        n = self._system.n
+        x = X[:n]
+        x_dot = X[n : 2 * n]
         p = s.load - s.omega2 * x
         if self._damped:
             p -= s.c * x_dot
@@ -170,7 +181,8 @@ class _Phase:
         return np.concatenate((x_dot, p, (X[-1], s.tip @ p) if s.alone else ()))
 
     def _jacobian(self, time: float, X: np.ndarray) -> np.ndarray:
-        J, top = self._linear.copy(), self._system.n - 1
+        J = self._linear.copy()
+        top = self._system.n - 1
         J[:, top] += 3.0 * X[top] ** 2 * self._cubic
         return np.asarray(J)
 
@@ -179,7 +191,9 @@ class _Phase:
 
         One that starts at zero, as after its own event, counts from where it first exceeds rounding, either way.
         """
-        s, state, A = self._system, np.zeros(self._system.size), self._system.A
+        s = self._system
+        state = np.zeros(self._system.size)
+        A = self._system.A
 
         def other(time: float, X: np.ndarray) -> float:
             state[: 2 * s.n], state[s.T] = X[: 2 * s.n], time
@@ -193,7 +207,8 @@ class _Phase:
         }
         if s.scene.elastic_stop:
             quick = {}
-        function, noise = quick.get(watch.name, other), s.noise(watch.unit, start)
+        function = quick.get(watch.name, other)
+        noise = s.noise(watch.unit, start)
         counts = function(float(start[s.T]), self.start(start)) > noise
 
         def rising(time: float, X: np.ndarray) -> float:
@@ -203,5 +218,6 @@ class _Phase:
             return value if counts or value < -noise else noise
 
         found: Any = function if counts else rising
-        found.terminal, found.direction = True, -1.0
+        found.terminal = True
+        found.direction = -1.0
         return cast("Callable[[float, np.ndarray], float]", found)

@@ -15,7 +15,8 @@ from springbeam.results.directory import REPORT
 from springbeam.results.files import load_trajectory
 from springbeam.scene import shipped_scenes
 
-DESKTOP, PHONE = {"width": 1200, "height": 900}, {"width": 390, "height": 800}
+DESKTOP = {"width": 1200, "height": 900}
+PHONE = {"width": 390, "height": 800}
 #: Shorter where nothing new happens later.
 T_END = {"soft": 0.3, "duffing": 4.0, "bar-impact": 2.2}
 

@@ -10,7 +10,10 @@ import pytest
 from fmpy import fmi2, fmi3
 from fmpy.fmi1 import FMICallException
 
-OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
+OK = 0
+WARNING = 1
+DISCARD = 2
+ERROR = 3
 
 #: The inputs of force and impulse, the motion of the end.
 ENDS = {
@@ -33,7 +36,8 @@ class Fmu:
     """A loaded FMU: description, library, and what the tests need to know of it."""
 
     def __init__(self, path, folder):
-        self.path, self.folder = path, folder
+        self.path = path
+        self.folder = folder
         fmpy.extract(str(path), unzipdir=str(folder))
         self.description = fmpy.read_model_description(str(path))
         self.version = self.description.fmiVersion
@@ -88,7 +92,9 @@ class Instance:
     """One instance of FMI 2.0; keeps the messages it sends. A call that fails raises, unless its status is returned."""
 
     def __init__(self, fmu, name=b"test", guid=None, resources=None, callbacks=True, logging=False, **options):
-        self.fmu, self.slave, self.messages = fmu, copy(fmu.slave), []
+        self.fmu = fmu
+        self.slave = copy(fmu.slave)
+        self.messages = []
         self.identity = (name, fmu.description.guid.encode() if guid is None else guid, resources)
         self.make(callbacks, logging, **options)
 
@@ -226,7 +232,10 @@ class Instance3(Instance):
 
     def make(self, callbacks=True, logging=False, events=False, early=False):
         self.logger = fmi3.fmi3LogMessageCallback(lambda _environment, *message: self.log(*message))
-        self.event, self.end, self.early, self.last = ct.c_bool(), ct.c_bool(), ct.c_bool(), ct.c_double()
+        self.event = ct.c_bool()
+        self.end = ct.c_bool()
+        self.early = ct.c_bool()
+        self.last = ct.c_double()
         logger = self.logger if callbacks else fmi3.fmi3LogMessageCallback()
         unused = (None, 0, None, logger, fmi3.fmi3IntermediateUpdateCallback())
         options = (*self.identity, False, logging, events, early, *unused)

@@ -60,7 +60,8 @@ def test_a_step_ends_at_an_impact_and_event_mode_applies_the_impulse(spring):
 
 
 def test_without_event_mode_the_impulse_is_applied_where_the_step_ends(spring):
-    k, twin = started(spring, events=False, **FALLING), started(spring, **FALLING)
+    k = started(spring, events=False, **FALLING)
+    twin = started(spring, **FALLING)
     for one in (k, twin):
         one.step(0.0, 0.2)
     handle(twin)
@@ -69,7 +70,8 @@ def test_without_event_mode_the_impulse_is_applied_where_the_step_ends(spring):
 
 
 def test_event_mode_keeps_the_derivatives_of_inputs(spring):
-    k, twin = started(spring, **FALLING), started(spring, **FALLING)
+    k = started(spring, **FALLING)
+    twin = started(spring, **FALLING)
     for one in (k, twin):
         one.derive("external_force", 1, 3.0)
     handle(k)
@@ -80,7 +82,8 @@ def test_event_mode_keeps_the_derivatives_of_inputs(spring):
 
 @pytest.mark.parametrize("events", [True, False])
 def test_where_early_return_is_forbidden_steps_are_those_of_fmi_2(spring, fmus, events):
-    k, old = started(spring, events=events, early=False, **FALLING), fmus["2.0"]["spring"].running(**FALLING)
+    k = started(spring, events=events, early=False, **FALLING)
+    old = fmus["2.0"]["spring"].running(**FALLING)
     for i in range(10):
         for one in (k, old):
             one.step(0.2 * i, 0.2)
@@ -91,7 +94,9 @@ def test_where_early_return_is_forbidden_steps_are_those_of_fmi_2(spring, fmus, 
 
 def test_impacts_that_die_out_are_a_few_events_and_end_at_rest(spring):
     """Each is told once: as many events as impacts, and at last a release by a force that lifts the top."""
-    k, time, events = started(spring, **FALLING), 0.0, 0
+    k = started(spring, **FALLING)
+    time = 0.0
+    events = 0
     while time < 2.0:
         k.step(time, 2.0 - time)
         time = k.reached()
@@ -128,7 +133,8 @@ def test_a_slow_contact_is_told_once(spring, speed):
     """The tool rounds the tip's place to where it was before the event, which is 5e-11 s of the way."""
     free = {"linear_stiffness": 0.0, "displacement": 0.3, "contact_law": 2, "tip_displacement": 0.3 + 1e-3 * speed}
     k = started(spring, **free)
-    time, events = 0.0, 0
+    time = 0.0
+    events = 0
     while time < 2e-3:
         k.derive("tip_displacement", 1, -speed)
         k.step(time, 2e-3 - time)
@@ -150,7 +156,8 @@ def test_a_held_force_asks_for_whole_steps(spring):
 
 
 def test_a_state_saved_in_event_mode_is_one_between_steps_where_there_is_no_event_mode(case):
-    k, plain = case.instance(events=True).start(), started(case, events=False)
+    k = case.instance(events=True).start()
+    plain = started(case, events=False)
     assert k.call("EnterStepMode") == OK
     k.step(0.0, 0.1)
     assert k.call("EnterEventMode") == OK

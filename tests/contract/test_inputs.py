@@ -20,7 +20,8 @@ def polynomial(k, name, f, t=0.0):
 @pytest.mark.parametrize("f", [(0.8, 5.0, -7.0), (0.8, 0.0, -7.0)], ids=["both", "second"])
 def test_derivatives_hold_for_one_step_the_value_stays(case, f):
     """One sets them one by one, the other in one call."""
-    once, again = case.moving(), case.moving()
+    once = case.moving()
+    again = case.moving()
     polynomial(once, case.force, f)
     again.set(case.force, f[0])
     again.derive_at_once(case.force, *f[1:])
@@ -35,12 +36,15 @@ def test_derivatives_hold_for_one_step_the_value_stays(case, f):
 
 def test_an_impulse_acts_once_at_the_start_of_the_next_step(case):
     """Without damping it changes the energy by its work J (v⁻ + v⁺)/2 with v⁺ = v⁻ + J/m, exactly, and never again."""
-    J, H, is_beam = -0.3, 0.05, case.name == "beam"
+    J = -0.3
+    H = 0.05
+    is_beam = case.name == "beam"
     k = case.moving(**({"alpha_b": 0.0} if is_beam else {"damping": 0.0}))
     stored = ("kinetic_energy", "strain_energy" if is_beam else "potential_energy")
     mass = k.get("tip_mass") if is_beam else 1.0
     k.step(0.0, H)
-    before, velocity = sum(k.get(*stored)), k.get(case.velocity)
+    before = sum(k.get(*stored))
+    velocity = k.get(case.velocity)
     k.set(case.impulse, J)
     assert k.get(case.impulse, case.velocity) == [J, velocity]
     for i in (1, 2):
@@ -60,7 +64,9 @@ def test_every_output_has_its_rate(case, variant):
     # Of the last step, or counted.
     steps = ("stop_force", "stop_impulse", "internal_steps", "displacement_integral", "tip_displacement_integral")
     names = [n for n in case.outputs if not n.startswith(steps)]
-    h, moving, time = 1e-5, 0, 0.0
+    h = 1e-5
+    moving = 0
+    time = 0.0
 
     def advance(size):
         nonlocal time
@@ -120,9 +126,11 @@ def test_rates_of_what_follows_forces_at_once_count_rates_of_forces(beam, load):
 
 
 def test_inputs_that_are_another_times_a_factor(case):
-    H, f = 0.2, (0.8, -3.0, 11.0)
+    H = 0.2
+    f = (0.8, -3.0, 11.0)
     for one, other, factor, values in VALUES["same"][case.name]:
-        a, b = case.moving(**values), case.moving(**values)
+        a = case.moving(**values)
+        b = case.moving(**values)
         for i in range(5):
             polynomial(a, one, f)
             polynomial(b, other, tuple(factor * x for x in f))
@@ -139,7 +147,8 @@ def test_inputs_that_are_another_times_a_factor(case):
 
 def test_contact_force_is_ignored_by_the_law_inside(spring):
     values = {"contact_law": 2, "displacement": 0.1}
-    plain, pressed = spring.running(**values), spring.running(**values, contact_force=5.0)
+    plain = spring.running(**values)
+    pressed = spring.running(**values, contact_force=5.0)
     for k in (plain, pressed):
         k.step(0.0, 0.01)
     assert plain.outputs() == pressed.outputs()
@@ -227,12 +236,15 @@ MESHES = [
 @pytest.mark.parametrize("mesh", MESHES)
 def test_a_cantilever_at_rest_has_the_forces_of_statics(beam, mesh):
     """Q = P + q (L − x), M = P (L − x) + q (L − x)²/2, and a point force at x = 0.5: to rounding on any mesh."""
-    point, g, height = 0.7, 1.6, 0.1
+    point = 0.7
+    g = 1.6
+    height = 0.1
     # EI = KAG = 1
     section = {"density": 3.0, "area": 2.0, "second_moment_of_area": 4.0, "young_modulus": 0.25, "shear_modulus": 0.5}
     k = beam.running(**mesh, **section, initial_state=2, tip_force=2.0, tip_load=0.5, distributed_load=-3.0, gravity=g,
                      section_height=height, **{"point_force[1]": point})  # fmt: skip
-    q, P = -3.0 - 3.0 * 2.0 * g, 2.5
+    q = -3.0 - 3.0 * 2.0 * g
+    P = 2.5
     shear = P + q * (1.0 - X) + point * (X <= 0.5)
     moment = P * (1.0 - X) + q * (1.0 - X) ** 2 / 2 + point * np.maximum(0.0, 0.5 - X)
     assert along(k, "shear_force") == pytest.approx(shear, abs=2e-14)

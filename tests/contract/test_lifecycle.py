@@ -15,7 +15,9 @@ from springbeam.scene.files import tomllib
 # -- which call is allowed when (FMI 2.0.4, section 4.2.4), and what importers get wrong or do differently ------------
 
 
-OK, WARNING, ERROR = 0, 1, 3
+OK = 0
+WARNING = 1
+ERROR = 3
 #: Parameters of the law that looks ahead.
 CALLS = tomllib.loads(Path(__file__).parents[1].joinpath("bad_inputs.toml").read_text(encoding="utf-8"))["calls"]
 AHEAD = {"contact_law": 2, "communication_step": 1e-3, "tip_response": 1e-4}
@@ -62,7 +64,8 @@ def test_callbacks_may_be_null(case):
 
 
 def test_debug_messages_only_when_asked_for(case):
-    silent, chatty = case.instance(), case.instance(logging=True)
+    silent = case.instance()
+    chatty = case.instance(logging=True)
     for k in (silent, chatty):
         k.start()
     assert silent.messages == []
@@ -271,7 +274,8 @@ def test_memory_is_flat_over_many_instances(case):
 
     A pointer that is lost takes 32. One Python object serves all.
     """
-    information, instance = ct.CDLL(None).mallinfo2, case.instance()
+    information = ct.CDLL(None).mallinfo2
+    instance = case.instance()
     information.restype = MallocInfo
     instance.free()
 

@@ -11,13 +11,16 @@ from springbeam.scene.files import tomllib
 # -- fmi2DoStep: which steps are refused, and what a refused step leaves behind ---------------------------------------
 
 
-OK, DISCARD, ERROR = 0, 2, 3
+OK = 0
+DISCARD = 2
+ERROR = 3
 
 
 def test_times_may_be_multiplied_or_summed_and_sizes_be_differences(case):
     # 1e5 s into a run, times carry 1e-11 s of rounding; 1e-9 of this step would be less.
     k = case.moving(start_time=1e5)
-    size, time = 1e-3, 1e5
+    size = 1e-3
+    time = 1e5
     for i in range(300):
         multiplied = 1e5 + i * size
         following = 1e5 + (i + 1) * size
@@ -100,7 +103,8 @@ def test_steps_of_the_communication_step_are_made_at_late_times(spring, start):
 
 @pytest.mark.parametrize("tolerance", [0.1, 1e-4, 0.0, -1.0, math.nan, 1e-3])
 def test_a_loose_tolerance_of_the_importer_changes_nothing(case, tolerance):
-    plain, loose = case.moving(), case.moving(tolerance=tolerance)
+    plain = case.moving()
+    loose = case.moving(tolerance=tolerance)
     for k in (plain, loose):
         k.step(0.0, 0.5)
     assert loose.outputs() == plain.outputs()
@@ -140,10 +144,13 @@ def advance(case, k, time, steps, impulse):
 def test_the_bytes_of_a_state_are_all_that_another_instance_needs(case):
     """tests/fuzz repeats steps from their states."""
     values = {"beam": {"communication_step": 1e-3}, "spring": {}}[case.name]
-    k, twin, fresh = case.moving(**values), case.moving(**values), case.instance()
+    k = case.moving(**values)
+    twin = case.moving(**values)
+    fresh = case.instance()
     for one in (k, twin):
         told = advance(case, one, 0.0, 3, 0.2)[-1]
-    time, blob = 0.01 + 0.02 + 0.03, k.serialized()
+    time = 0.01 + 0.02 + 0.03
+    blob = k.serialized()
     assert twin.serialized() == blob  # no pointers in it
     first = advance(case, k, time, 7, 0.2)
     k.free()
@@ -164,7 +171,8 @@ def test_a_state_carries_its_phase_parameters_and_time(case, entered):
         k.step(2.0, 0.02)
         return k.outputs()
 
-    k, fresh = case.instance(), case.instance()
+    k = case.instance()
+    fresh = case.instance()
     if entered:
         k.enter(start_time=2.0)
     for name, value in case.parameters.items():

@@ -18,7 +18,8 @@ from commands import ran
 
 
 HERE = Path(__file__).resolve().parent
-SIZE, END = 1e-3, 0.4
+SIZE = 1e-3
+END = 0.4
 #: Rounding [m] of importers that exchange more than once before the first step: the beam's forecast, which is that
 #: without a force, is then computed with one set. By hand it is 7e-18.
 TWICE = 1e-17
@@ -68,7 +69,9 @@ class System:
         self.parameters = {p: v for p, v in PARAMETERS.items() if p.split(".")[0] in names}
         if name == "spring":
             self.parameters["spring.velocity"] = -1.0
-        self._scratch, self._reference, self._of_master = scratch, reference, of_master
+        self._scratch = scratch
+        self._reference = reference
+        self._of_master = of_master
 
     def in_python(self, importer, ssp=None, **environment):
         """Return the rows of ``run_IMPORTER.py``, run by the importer's own Python; ``ssp``: of this system file."""
@@ -87,7 +90,8 @@ class System:
         assert n >= 399  # a tool that adds up its times may leave out the last step
         assert np.abs(rows - self.by_hand()[:n]).max() <= within
         if self.connections:
-            error, difference = np.abs(rows - self._reference[:n]).max(), np.abs(rows - self._of_master[:n]).max()
+            error = np.abs(rows - self._reference[:n]).max()
+            difference = np.abs(rows - self._of_master[:n]).max()
             print(f"error {error:.3e} m, from springbeam run {difference:.3e} m")
             assert error < 1.1 * np.abs(self._of_master - self._reference).max()
             assert difference < 4e-5  # the first step, whose tip is foreseen by its mean velocity over two
@@ -339,7 +343,8 @@ RUNS = {
 
 @pytest.mark.parametrize("model", ["beam", "spring"])
 def test_compiled_from_its_own_sources_it_gives_the_same_bits(fmu_folder, tmp_path, model):
-    shipped, compiled = fmu_folder / f"{model}.fmu", tmp_path / f"{model}.fmu"
+    shipped = fmu_folder / f"{model}.fmu"
+    compiled = tmp_path / f"{model}.fmu"
     description = fmpy.read_model_description(str(shipped))
     if not description.buildConfigurations:
         pytest.skip(f"{model}.fmu is packed without the source of SUNDIALS")

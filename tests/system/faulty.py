@@ -69,7 +69,8 @@ class Script:
 
     @contextmanager
     def at(self, where):
-        before, self.where = self.where, where
+        before = self.where
+        self.where = where
         try:
             yield
         finally:
@@ -86,7 +87,8 @@ class Script:
                     continue
                 if function == "fmi2Instantiate":
                     assert not alive or allowed == set()
-                    alive, allowed = True, None
+                    alive = True
+                    allowed = None
                     continue
                 if function in WITHOUT_INSTANCE:
                     continue
@@ -108,7 +110,8 @@ class Script:
 def hang():
     """Call a C function that never returns, not even for a signal: the second lock of a mutex."""
     print("hanging", flush=True)
-    library, mutex = ctypes.CDLL(None), ctypes.create_string_buffer(256)
+    library = ctypes.CDLL(None)
+    mutex = ctypes.create_string_buffer(256)
     library.pthread_mutex_init(mutex, None)
     library.pthread_mutex_lock(mutex)
     library.pthread_mutex_lock(mutex)
@@ -134,7 +137,8 @@ class Library(functions.Library):
         function = super().__getitem__(name)
 
         def call(*arguments):
-            function.restype, function.argtypes = call.restype, getattr(call, "argtypes", None)
+            function.restype = call.restype
+            function.argtypes = getattr(call, "argtypes", None)
             return self._called(name, function, arguments)
 
         call.restype = ctypes.c_int
@@ -146,7 +150,8 @@ class Library(functions.Library):
         return call
 
     def _called(self, name, function, arguments):
-        fmu, script = Path(self._name).stem, self._script
+        fmu = Path(self._name).stem
+        script = self._script
         fault = next((f for f in script.faults if f.after(fmu, name, script.where)), None)
         if fault is None:
             result = function(*arguments)

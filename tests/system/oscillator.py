@@ -60,7 +60,8 @@ _DESCRIPTION = Path(__file__).with_name("oscillator2.xml").read_text(encoding="u
 @functools.cache
 def _library(lacks):
     folder = Path(tempfile.mkdtemp(prefix="springbeam-oscillator-"))
-    source, library = Path(__file__).with_suffix(".c"), folder / "oscillator.so"
+    source = Path(__file__).with_suffix(".c")
+    library = folder / "oscillator.so"
     renamed = [] if lacks is None else [f"-D{lacks}=renamed"]
     subprocess.run(["cc", "-O1", "-shared", "-fPIC", *renamed, "-o", library, source], check=True)
     content = library.read_bytes()

@@ -15,11 +15,6 @@ from springbeam.scene import scene_from_dict
 SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2}, coupling={"macro_step": 1e-3, "degree": 2})
 
 
-@pytest.fixture(scope="module")
-def run():
-    return simulate(SOFT)
-
-
 def test_rows_at_an_interval_are_those_of_at(here):
     assert 0.072 / 3e-3 < 24.0
     printed("run", "soft", "--set=time.t_end=0.072", "--out=rows", "--no-plots", "--output-interval=3e-3")
@@ -42,7 +37,8 @@ def test_a_run_that_is_made_step_by_step_is_a_trajectory_on_the_way():
     with springbeam.Simulation(scene) as sim:
         assert len(sim.run) == 0
         assert all(sim.step() for _ in range(40))
-        halfway, state = sim.run, sim.state
+        halfway = sim.run
+        state = sim.state
         assert halfway.summary["status"] == "running"
         assert (halfway.time[-1], halfway.phase[-1]) == (state.time, state.phase.name)
         assert halfway.summary["macro_steps"] == state.macro_steps == 40
@@ -51,18 +47,6 @@ def test_a_run_that_is_made_step_by_step_is_a_trajectory_on_the_way():
         assert (sim.done, sim.step(), sim.run.summary["status"]) == (True, False, "done")
         assert np.array_equal(halfway.at(0.00512).y, sim.run.at(0.00512).y)
     assert halfway.steps.tobytes() == sim.run.steps[:41].tobytes()
-
-
-def test_to_pandas_and_xarray(run):
-    pytest.importorskip("pandas")
-    pytest.importorskip("xarray")
-    table, dataset = run.to_pandas(), run.to_xarray()
-    assert list(table.columns) == list(run.columns)
-    assert np.array_equal(table["y"].to_numpy(), run.y)
-    assert (table.attrs["units"]["z"], dataset["u_tip"].attrs) == ("m/s", {"units": "m"})
-    assert np.array_equal(dataset["deflection"].sel(x=1.0).values, run.shapes[1][:, -1])
-    for name in ("bending_moment", "shear_force"):
-        assert np.array_equal(dataset[name].values, getattr(run, name))
 
 
 # -- bodies of one's own --------------------------------------------------------------------------------------------
@@ -77,9 +61,13 @@ class Silent(springbeam.Body):
     """Nothing but what a body must do: no shape, no energies, no force that holds it."""
 
     def __init__(self, body):
-        self.body, self.mass = body, body.mass
-        self.mark, self.rewind, self.advance = body.mark, body.rewind, body.advance
-        self.motion, self.apply_impulse = body.motion, body.apply_impulse
+        self.body = body
+        self.mass = body.mass
+        self.mark = body.mark
+        self.rewind = body.rewind
+        self.advance = body.advance
+        self.motion = body.motion
+        self.apply_impulse = body.apply_impulse
 
 
 def test_a_body_need_not_tell_its_shape_or_energies():
@@ -130,7 +118,8 @@ def test_a_start_that_cannot_be_is_refused_whoever_made_the_body(change, body, s
 
 def test_an_error_in_a_body_of_ones_own_is_reported_at_once(monkeypatch):
     """Without 20 halvings of the step: it is called once more after the last step that is made."""
-    advance, steps = DuffingBody.advance, []
+    advance = DuffingBody.advance
+    steps = []
 
     def failing(self, time, *rest):
         steps.append(time)
@@ -159,12 +148,9 @@ def test_a_scene_may_be_a_name_a_file_or_tables(tmp_path):
 
 def test_numbers_of_numpy_are_numbers():
     load = {"on": "beam", "shape": np.array([1.0, -0.5]), "amplitude": np.arange(3)[2]}
-    tables = {"beam": {"n_elements": np.int32(7)}, "spring": {"damping": np.array(0.5)}, "loads": [load]}
-    scene = with_changes(load_scene("soft"), **tables)
-    assert (scene.beam.n_elements, type(scene.beam.n_elements), scene.spring.damping) == (7, int, 0.5)
+    scene = with_changes(load_scene("soft"), beam={"n_elements": np.int32(7)}, loads=[load])
+    assert (scene.beam.n_elements, type(scene.beam.n_elements)) == (7, int)
     assert (scene.loads[0].shape, scene.loads[0].amplitude) == ((1.0, -0.5), 2.0)
-    with pytest.raises(SceneError, match=r"n_elements = 7\.5: must be a whole number"):
-        with_changes(scene, beam={"n_elements": np.float64(7.5)})
 
 
 def test_a_simulation_gives_its_fmus_back_once_and_steps_no_more():

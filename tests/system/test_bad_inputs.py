@@ -50,7 +50,8 @@ def contents(folder):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_a_bad_scene_is_refused(name, here):
-    places, remedies = listed(SCENES[name]["place"]), listed(SCENES[name]["remedy"])
+    places = listed(SCENES[name]["place"])
+    remedies = listed(SCENES[name]["remedy"])
     Path("scene.toml").write_bytes(content_of(SCENES[name]))
     before = contents(here)
     lines = refused("run", "scene.toml").removeprefix("error: ").splitlines()

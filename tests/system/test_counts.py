@@ -58,7 +58,8 @@ def test_a_tied_step_costs_two_steps_of_each_body(counted, H, degree):
     each size of step: H/8 after the impact, what is left of H, and H."""
     coupling = {"macro_step": H, "degree": degree}
     run, calls = counted(with_changes(load_scene("soft"), coupling=coupling, time={"t_end": 0.071}))
-    summary, of_impact = run.summary, 1  # a trial step tells the force after it
+    summary = run.summary
+    of_impact = 1  # a trial step for the force after it
     for body in ("beam", "spring"):
         assert [summary[f"{body}_{what}"] for what in ("steps", "rollbacks")] == [
             calls[body, f"fmi2{function}"] for function in ("DoStep", "SetFMUstate")

@@ -24,7 +24,8 @@ def test_rows_are_themselves_and_between_them_every_column_holds(name):
     steps = run.steps[run.steps["size"] > 0.0]
     nodes, weights = np.polynomial.legendre.leggauss(5)
     inside = [run.at(steps["time"] - 0.5 * (1.0 - x) * steps["size"]) for x in nodes]
-    middles, begin = inside[2], run.steps[np.flatnonzero(run.steps["size"] > 0.0) - 1]
+    middles = inside[2]
+    begin = run.steps[np.flatnonzero(run.steps["size"] > 0.0) - 1]
     assert list(middles.columns) == list(run.columns)
     kept = sum(middles[name] for name in run.columns if name.startswith("e_") and name != "e_total")
     assert np.array_equal(middles.e_total, kept)
@@ -39,7 +40,8 @@ def test_rows_are_themselves_and_between_them_every_column_holds(name):
             assert np.array_equal(middles.v_tip[joined], middles.z[joined])
     rows = np.flatnonzero(run.steps["size"] > 0.0)
     for name in {"clamp_force", "clamp_moment", "e_contact", "e_dissipated"} & set(run.columns):
-        straight, largest = 0.5 * (run[name][rows - 1] + run[name][rows]), np.abs(run[name]).max()
+        straight = 0.5 * (run[name][rows - 1] + run[name][rows])
+        largest = np.abs(run[name]).max()
         assert middles[name] == pytest.approx(straight, rel=1e-12, abs=1e-12 * largest), name
     # Forces have the impulse of those applied, but for what turns a mismatch round; ends keep the integral of their
     # step, and what is seated stays so up to the next row.
@@ -84,7 +86,8 @@ def test_extremes_are_those_of_the_curve(name):
         if column not in run.columns:
             assert value is None
             continue
-        grid, scale = of(fine[column]), np.abs(fine[column]).max()
+        grid = of(fine[column])
+        scale = np.abs(fine[column]).max()
         beyond = value - grid if of is not np.min else grid - value
         assert -1e-12 * scale <= beyond <= 1e-3 * scale, name
         seen += abs(value - of(run[column])) > 1e-6 * scale

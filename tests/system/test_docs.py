@@ -11,6 +11,7 @@ import sys
 import tokenize
 from pathlib import Path
 
+import numpy as np
 import pytest
 from commands import COMMAND, HANGS, command
 
@@ -72,12 +73,7 @@ def blocks(page, language):
 
 
 def shell_lines():
-    return [
-        (page.name, number, line)
-        for page in PAGES
-        for number, block in enumerate(blocks(page, "sh"))
-        for line in block.splitlines()
-    ]
+    return [line for page in PAGES for block in blocks(page, "sh") for line in block.splitlines()]
 
 
 def reason_not_to_run(line):
@@ -103,6 +99,15 @@ def test_the_notebook_runs(capsys, monkeypatch):
         if cell["cell_type"] == "code":
             assert cell["outputs"] == []
             exec(compile("".join(cell["source"]), "first_steps.ipynb", "exec"), names)
+    run = names["run"]
+    table = run.to_pandas()
+    dataset = run.to_xarray()
+    assert list(table.columns) == list(run.columns)
+    assert np.array_equal(table["y"].to_numpy(), run.y)
+    assert (table.attrs["units"]["z"], dataset["u_tip"].attrs) == ("m/s", {"units": "m"})
+    assert np.array_equal(dataset["deflection"].sel(x=1.0).values, run.shapes[1][:, -1])
+    for name in ("bending_moment", "shear_force"):
+        assert np.array_equal(dataset[name].values, getattr(run, name))
     assert re.search(r"deepest tip -15\.00 mm\n0\.000000 s  impact\n(.*\n)+\{0\.5: 8\.61", capsys.readouterr().out)
 
 
@@ -173,19 +178,21 @@ def test_commands_of_the_documentation_run(desk, page, unpainted, kept_reference
                 continue
             if ">" in line:  # what a shell does; all others are run in this process, which has imported everything
                 ran = subprocess.run(["bash", "-c", line], capture_output=True, text=True, timeout=HANGS)
-                code, said = ran.returncode, ran.stderr
+                code = ran.returncode
+                said = ran.stderr
             else:
                 program, *arguments = shlex.split(line, comments=True)
                 assert program == "springbeam"
                 result = command(*arguments)
-                code, said = result.exit_code, result.stderr
+                code = result.exit_code
+                said = result.stderr
                 output += result.stdout
             assert (code, said) == (0, ""), f"{page.name}: {line}"
 
 
 def test_what_is_not_run_is_still_there_and_understood():
     for start in NOT_RUN:
-        lines = [line for _, _, line in shell_lines() if line.startswith(start)]
+        lines = [line for line in shell_lines() if line.startswith(start)]
         assert lines, f"{start}: nowhere in the documentation"
         for line in lines:
             program, *words = shlex.split(line, comments=True)

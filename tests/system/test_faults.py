@@ -109,7 +109,8 @@ def test_a_fault_that_passes_is_stepped_over(run, fmu, place, fault):
     assert fault.happened == 1
     script.check()
     assert code == 0
-    trajectory, undisturbed = load_trajectory(directory), whole(run, law)
+    trajectory = load_trajectory(directory)
+    undisturbed = whole(run, law)
     assert trajectory.summary["halved_steps"] == 1
     assert trajectory.time[-1] == SCENE["time"]["t_end"]
     last = [float(cell) for cell in undisturbed["trajectory.csv"].split()[-1].split(b",")[1:4:2]]
@@ -184,7 +185,8 @@ cli.main()
     ids=["tied", "location"],
 )
 def test_a_call_that_never_returns_can_be_interrupted(tmp_path, number, fmu, where):
-    directory, run = tmp_path / "run", ("run", PATH, "--no-plots", "-q", "--out")
+    directory = tmp_path / "run"
+    run = ("run", PATH, "--no-plots", "-q", "--out")
     process = subprocess.Popen(
         [sys.executable, "-c", HANGING, fmu, "fmi2DoStep", where, "3", *map(str, run), directory],
         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])},

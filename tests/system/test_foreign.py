@@ -25,8 +25,13 @@ from springbeam.bodies.protocol import FmuError
 from springbeam.results.files import load_summary
 from springbeam.scene import scene_from_dict
 
-M1, M2, K, C, V = 2.0, 3.0, 40.0, 0.2, -0.3
-STIFFNESS, DAMPING = 50.0, 0.1
+M1 = 2.0
+M2 = 3.0
+K = 40.0
+C = 0.2
+V = -0.3
+STIFFNESS = 50.0
+DAMPING = 0.1
 #: Names that a scene may leave out, each with what stands on it.
 WITHOUT = {"nothing": (), "velocity, impulse": ("velocity", "impulse")}
 BAD = scenes.table("bad_inputs.toml")["fmus"]
@@ -74,7 +79,8 @@ def swung(A, start, times):
 
 def linked(times):
     """The exact displacements of both ends from V and rest, shape (2, n)."""
-    k, c = STIFFNESS, DAMPING
+    k = STIFFNESS
+    c = DAMPING
     A = np.zeros((4, 4))
     A[:2, 2:] = np.eye(2)
     A[2:, :2] = np.array([[-k, k], [k, -k - K]]) / [[M1], [M2]]
@@ -246,7 +252,9 @@ def test_a_guess_is_set(fmu):
 
 
 #: Units of an FMU that counts in mm, ms and kN, its masses in kg: SI units of each.
-_MM, _MS, _KN = 'm="1" factor="0.001"', 's="1" factor="0.001"', 'kg="1" m="1" s="-2" factor="1000"'
+_MM = 'm="1" factor="0.001"'
+_MS = 's="1" factor="0.001"'
+_KN = 'kg="1" m="1" s="-2" factor="1000"'
 BASES = {
     "mm": _MM,
     "ms": _MS,
@@ -305,7 +313,10 @@ def test_the_body_that_the_page_builds_by_python_fmu_is_the_element(tmp_path, mo
 @pytest.fixture
 def hanging(monkeypatch):
     """Tell whether an FMU hangs, which it says itself; patience is then at its end, and an hour has passed."""
-    asked, ask, clock, poll = [], isolated.FmuProcess.ask, isolated.monotonic, Connection.poll
+    asked = []
+    ask = isolated.FmuProcess.ask
+    clock = isolated.monotonic
+    poll = Connection.poll
 
     def noted(self, *arguments):
         asked.append(self._errors)
@@ -436,7 +447,8 @@ def test_events_are_those_of_the_element(fmu):
     }
     below = {"parameters": {"m": M2, "k": 400.0, "c": C}}
     scene = pair(fmu(), spring=below, **tables)
-    run, exact = simulate(scene), simulate(pair(fmu(), spring={**ELEMENT, "stiffness": 400.0}, **tables))
+    run = simulate(scene)
+    exact = simulate(pair(fmu(), spring={**ELEMENT, "stiffness": 400.0}, **tables))
     assert kinds(run) == kinds(exact)
     assert {"impact", "stop_impact", "release", "separation"} <= set(kinds(run))
     assert [e.time for e in run.events] == pytest.approx([e.time for e in exact.events], abs=5e-9)

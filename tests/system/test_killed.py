@@ -43,7 +43,8 @@ def started(directory):
 )
 def test_a_run_that_is_ended_from_outside_leaves_what_it_has_computed(tmp_path, long, number, code, status):
     """Each file is, to the last byte, the beginning of that of the whole run."""
-    directory, whole = tmp_path / "run", written(long)
+    directory = tmp_path / "run"
+    whole = written(long)
     run = started(directory)
     run.send_signal(number)
     _, errors = run.communicate(timeout=HANGS)

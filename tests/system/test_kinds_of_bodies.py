@@ -11,7 +11,9 @@ from springbeam import PointMass, SceneError, SpringDamper, simulate, with_chang
 from springbeam.bodies.protocol import NO_FORCE, Abilities
 from springbeam.scene import load_scene, scene_from_dict
 
-M, K, C = 3.0, 40.0, 0.2
+M = 3.0
+K = 40.0
+C = 0.2
 #: A mass on a linear spring and damper as a table ``[spring]``.
 OWN = {"mass": M, "linear_stiffness": K, "damping": C}
 ELEMENT = {"element": "spring_damper", "mass": M, "stiffness": K, "damping": C}
@@ -57,7 +59,8 @@ def test_they_move_alike(below, kind):
     """m ẍ + c ẋ + k x = 0 of both masses together, with the momentum of the upper one."""
     spring, bodies = below(kind)
     run = simulate(above(spring), **bodies)
-    decay, mass = 0.5 * C / (2.0 + M), 2.0 + M
+    decay = 0.5 * C / (2.0 + M)
+    mass = 2.0 + M
     omega = np.sqrt(K / mass - decay**2)
     exact = -0.3 * 2.0 / mass / omega * np.exp(-decay * run.time) * np.sin(omega * run.time)
     assert np.abs(run.y - exact).max() < 1e-11

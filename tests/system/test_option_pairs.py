@@ -48,7 +48,8 @@ def test_a_pair_runs_or_is_refused(tmp_path, monkeypatch, pair):
     assert run.summary["status"] == "done"
     assert run.time[-1] == run.scene.time.t_end
     said = any("energy" in warning for warning in run.summary["warnings"])
-    coupling, spring = run.scene.coupling, run.scene.spring
+    coupling = run.scene.coupling
+    spring = run.scene.spring
     tolerance = max(coupling.tolerance, 0.0 if spring is None else spring.relative_tolerance)
     most, _ = bounds(tolerance, exchanges=coupling.scheme != "energy")
     assert run.summary["max_energy_residual"] <= most or said

@@ -29,7 +29,8 @@ def found(program, number):
 )
 def test_the_figures_have_the_numbers_that_they_had(program, number):
     """Rounding moves them by at most 5e-12 of their size."""
-    run, before = found(program, number), RECORDED[program][str(number)]
+    run = found(program, number)
+    before = RECORDED[program][str(number)]
     curves = {**run.columns, "energy": run.e_beam + run.e_spring + run.e_load}
     assert run.summary["iterations_per_solve"] == pytest.approx(before["iterations"], abs=1e-12)
     for name, (low, high) in before["extremes"].items():
@@ -43,7 +44,8 @@ def test_the_iterations_are_those_of_table_2_and_the_tip_flips(number, reported)
 
     f_b = (0, …, 0, −6) of the next figure bends the tip by 6 h_x/3 × its compliance 4/(3κ) ≈ 7e-14 m: nothing to see.
     """
-    run, loaded = found("monolithic", number), found("monolithic", number + 1)
+    run = found("monolithic", number)
+    loaded = found("monolithic", number + 1)
     assert run.summary["iterations_per_solve"] == pytest.approx(reported, abs=0.01)
     v = run.v_tip
     assert (run.time[0], len(run)) == (0.5, 876)

@@ -16,7 +16,8 @@ def beside_reference(scene, bounds, _):
     run = simulate(scene)
     rows = np.searchsorted(run.time, np.unique(run.time)[:: len(run) // 100 + 1], side="right") - 1
     exact = reference(scene, sample_times=run.time[rows])
-    starts, among = bounds.get("starts", []), bounds.get("among", [])
+    starts = bounds.get("starts", [])
+    among = bounds.get("among", [])
     for found in (scenes.kinds(run), scenes.kinds(exact)):
         assert found[: len(starts)] == starts
         assert any(found[k : k + len(among)] == among for k in range(len(found) + 1))
@@ -53,7 +54,8 @@ def beside_reference(scene, bounds, _):
 
 def overlap(run):
     """Return the largest depth of an end below the foundation, of a free tip below the top, or gap of a tie [m]."""
-    free, seated = run.phase == "free", run.phase == "seated"
+    free = run.phase == "free"
+    seated = run.phase == "seated"
     apart = np.where(free, np.maximum(-run.gap, 0.0), np.where(seated, 0.0, np.abs(run.gap)))
     soft = run.scene.contact.law == "compliance"
     below = 0.0 if run.scene.stop is None else (run.scene.stop.position - run.y).max()

@@ -12,7 +12,12 @@ from springbeam.signals.spectra import power_spectrum, shock_of_run, shock_spect
 from springbeam.studies.metrics import METRICS
 from springbeam.studies.sweep import Sweep
 
-MASS, STIFFNESS, DAMPING, FORCE, DRIVE, START = 0.2, 800.0, 1.2, 3.0, 7.0, 0.05
+MASS = 0.2
+STIFFNESS = 800.0
+DAMPING = 1.2
+FORCE = 3.0
+DRIVE = 7.0
+START = 0.05
 
 
 def oscillator(t_end=8.0, **load):
@@ -118,7 +123,8 @@ def highest_in_space(run):
 @pytest.mark.parametrize(("signal", "more"), [("half_sine", {}), ("trapezoid", {"rise": 1e-3})])
 def test_the_damage_boundary_of_an_oscillator_is_that_of_its_shock_spectrum(signal, more, importable):
     """The critical peak is limit over the spectrum of a pulse of peak 1; a short one counts by its velocity change."""
-    limit, durations = 80.0, (0.004, 0.03, 0.1)
+    limit = 80.0
+    durations = (0.004, 0.03, 0.1)
     vary = ("loads.0.amplitude=50,200,2000", f"loads.0.duration={','.join(map(str, durations))}")
     study = Sweep(
         scene=pulsed(signal=signal, **more),
@@ -172,7 +178,9 @@ def test_the_power_of_a_settled_oscillator_is_at_its_drive(driven):
 
 def test_the_shock_of_a_stiff_mount_is_that_of_its_base():
     """A mount 80 times as fast as a pulse of 11 ms moves with its base: absolute motion, the relative one is small."""
-    amplitude, pulse, step = 500.0, 0.011, 1e-5
+    amplitude = 500.0
+    pulse = 0.011
+    step = 1e-5
     scene = with_changes(
         oscillator(t_end=0.03, on="base", signal="half_sine", frequency=None, amplitude=amplitude, duration=pulse),
         spring={"mass": 1e-3, "linear_stiffness": 1e-3 * (2.0 * pi * 80.0 / pulse) ** 2, "initial_velocity": 0.0,

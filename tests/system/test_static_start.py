@@ -14,7 +14,10 @@ from springbeam.run.runner import run_in_memory
 from springbeam.scene import SceneError, scene_from_dict
 from springbeam.scene.statics import tip_compliance
 
-G, K1, MASS, LINK = 9.81, 2.0e3, 0.05, 1.0e5
+G = 9.81
+K1 = 2.0e3
+MASS = 0.05
+LINK = 1.0e5
 BEAM = {
     "length": 0.8,
     "width": 0.03,
@@ -38,7 +41,8 @@ def scene(**tables):
 
 def hanging(beam):
     """Return u₀ [m]."""
-    EI, KAG = beam.young_modulus * beam.second_moment_of_area, beam.shear_coefficient * beam.area * beam.shear_modulus
+    EI = beam.young_modulus * beam.second_moment_of_area
+    KAG = beam.shear_coefficient * beam.area * beam.shear_modulus
     return -beam.density * beam.area * G * (beam.length**4 / (8.0 * EI) + beam.length**2 / (2.0 * KAG))
 
 
@@ -61,14 +65,16 @@ def test_ends_that_touch_stay_at_rest_under_the_force_of_statics(name):
     k = np.inf if what.spring is None else K1
     stiffness = LINK if name in ("link", "compliance", "elastic stop") else 0.0
     run = run_in_memory(what)
-    C, columns = pressed(what.beam, k, stiffness), run.columns
+    C = pressed(what.beam, k, stiffness)
+    columns = run.columns
     u = hanging(what.beam) + tip_compliance(what.beam) * C
     assert columns["u_tip"][0] == pytest.approx(u, rel=1e-9, abs=1e-9 * -hanging(what.beam))
     assert np.ptp(columns["u_tip"]) < 1e-13 * -hanging(what.beam)
     assert set(columns["phase"]) == {PHASES.get(name, "tied")}
     force = columns["contact_force" if "contact_force" in columns else "foundation_force"]
     # A gap of an ulp of the parts that the tip is the sum of is closed by the first step, with at most the beam's mass.
-    mass, parts = what.beam.density * what.beam.area * what.beam.length, -hanging(what.beam)
+    mass = what.beam.density * what.beam.area * what.beam.length
+    parts = -hanging(what.beam)
     rounding = mass * np.spacing(parts) / run.steps["size"][1] ** 2
     np.testing.assert_allclose(force, C, rtol=1e-8, atol=rounding)
     assert np.abs(columns["energy_residual"]).max() < 1e-13
@@ -125,7 +131,8 @@ def test_a_softening_spring_does_not_start_at_rest_at_an_unstable_height_or_past
 @pytest.mark.parametrize("gap", [0.0, 1e-3])
 def test_elements_start_at_rest_under_their_loads(gap):
     """Two masses on springs k, pressed together by f on the upper one; apart where the gap is larger than f/k."""
-    upper, f = {**ELEMENT, "external_force": -1.0}, 1.0
+    upper = {**ELEMENT, "external_force": -1.0}
+    f = 1.0
     what = scene(beam=upper, spring=ELEMENT, contact={"gap": gap})
     run = run_in_memory(what)
     C = max(f - K1 * gap, 0.0) / 2.0
@@ -139,11 +146,13 @@ def test_a_beam_without_inertia_starts_where_it_rests():
     beam = {**BEAM, "fidelity": "quasi_static", "distributed_load": -5.0, "alpha_b": 0.01}
     what = scene(beam=beam, spring=SPRING, loads=None)
     run = run_in_memory(what)
-    columns, loaded = run.columns, what.beam
+    columns = run.columns
+    loaded = what.beam
     EI = loaded.young_modulus * loaded.second_moment_of_area
     KAG = 5 / 6 * loaded.area * loaded.shear_modulus
     free = -5.0 * (0.8**4 / (8.0 * EI) + 0.8**2 / (2.0 * KAG))
     np.testing.assert_allclose(columns["y"], free / (1.0 + K1 * tip_compliance(what.beam)), rtol=1e-10)
-    C, arm = columns["contact_force"][0], 0.8 * (1.0 - np.linspace(0.0, 1.0, 21))
+    C = columns["contact_force"][0]
+    arm = 0.8 * (1.0 - np.linspace(0.0, 1.0, 21))
     np.testing.assert_allclose(run.bending_moment[0], C * arm - 5.0 * arm**2 / 2.0, atol=1e-10)
     np.testing.assert_allclose(run.shear_force[0], C - 5.0 * arm, atol=1e-10)

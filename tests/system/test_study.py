@@ -22,7 +22,8 @@ def plan(kind=sweep.Sweep, masses="1,2", **options):
 
 
 def test_only_cases_without_a_record_are_computed(tmp_path):
-    study, seen = plan(masses="1,2,4"), []
+    study = plan(masses="1,2,4")
+    seen = []
     with Records(study, tmp_path) as records:
         whole = study.computed(records)
     lines = (tmp_path / FILE).read_bytes().splitlines(keepends=True)
@@ -72,7 +73,8 @@ def test_an_interrupted_study_says_how_it_goes_on_and_does(here, unpainted, monk
     monkeypatch.setattr(sweep.Sweep, "parallel", False)
     shown = printed(*SWEEP, "--out", "whole")
     assert re.search(r"^spring\.mass +y_min\n *1 .*\n *1\.25 .*\n *1\.5 .*\n *1\.75 .*\n *2 .*\nresults ", shown, re.M)
-    interrupt, record = Interrupt(3), sweep.Sweep.record
+    interrupt = Interrupt(3)
+    record = sweep.Sweep.record
     monkeypatch.setattr(sweep.Sweep, "record", lambda *arguments: interrupt() or record(*arguments))
     cut = command(*SWEEP)
     assert cut.exit_code == 3

@@ -30,8 +30,10 @@ def test_a_curve_between_few_points_is_judged_too(monkeypatch):
 def test_what_a_configuration_costs_and_where_it_errs_is_that_of_its_run():
     """The spring strikes its stop once."""
     scene = soft(time={"t_end": 0.12})
-    run, exact = tradeoff.run_in_memory(scene), reference(scene)
-    row, summary = {**costs(run), **tradeoff._errors(run, exact)}, run.summary
+    run = tradeoff.run_in_memory(scene)
+    exact = reference(scene)
+    row = {**costs(run), **tradeoff._errors(run, exact)}
+    summary = run.summary
     assert row["cost_do_steps"] == summary["beam_steps"] + summary["spring_steps"]
     assert row["error_energy"] == summary["max_energy_residual"]
     assert kinds(run) == kinds(exact) == ["impact", "stop_impact"]
@@ -48,8 +50,11 @@ def test_front_and_choices_are_of_what_is_a_result():
     def row(seconds, error, family="steady"):
         return {"family": family, "setting": "", "status": "done", "error_motion": error, "cost_wall_time": seconds}
 
-    rough, better = row(1.0, 1e-3), row(2.0, 1e-5)
-    lucky, wrong, exact = row(0.7, 1e-6, "luck"), row(0.1, 0.2, "luck"), row(1.5, 1e-7, "exact")
+    rough = row(1.0, 1e-3)
+    better = row(2.0, 1e-5)
+    lucky = row(0.7, 1e-6, "luck")
+    wrong = row(0.1, 0.2, "luck")
+    exact = row(1.5, 1e-7, "exact")
     found = [rough, better, lucky, wrong, exact]
     assert pareto(found) == [lucky, exact]
     assert cheapest(found) == [rough, exact, exact, None]

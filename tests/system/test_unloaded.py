@@ -22,7 +22,8 @@ ALONE = {
     "stop": {"position": -0.03125, "restitution": 0.5},
     "coupling": {"macro_step": 5e-3},
 }
-LOWER, Y0 = 3.0, -0.02  # N/m, m
+LOWER = 3.0  # N/m
+Y0 = -0.02  # m
 PAIR = {
     "time": {"t_end": 0.3},
     "beam": {"young_modulus": 100.0, "shear_modulus": 100.0, "initial_velocity_slope": -1.0, "n_elements": 6},
@@ -35,7 +36,8 @@ SOFT = {"stiffness": 1e4, "exponent": 1.5}
 
 def raised(scene):
     """Return a spring alone that is higher by `RAISED`, with its stop."""
-    height, stop = scene.spring.equilibrium + RAISED, scene.stop.position + RAISED
+    height = scene.spring.equilibrium + RAISED
+    stop = scene.stop.position + RAISED
     return with_changes(scene, spring={"equilibrium": height, "unloaded": RAISED}, stop={"position": stop})
 
 
@@ -54,7 +56,8 @@ def reference_at(scene):
 @pytest.mark.parametrize("k2", [900.0, -100.0])
 def test_a_spring_that_is_moved_with_its_stop_has_the_same_motion(program, k2):
     scene = with_changes(scene_from_dict(ALONE), spring={"cubic_stiffness": k2, "damping": 0.1})
-    low, high = program(scene), program(raised(scene))
+    low = program(scene)
+    high = program(raised(scene))
     assert scenes.kinds(low) == scenes.kinds(high)
     for column, moved in (("y", RAISED), ("z", 0.0), ("e_spring", 0.0), ("e_dissipated", 0.0)):
         np.testing.assert_allclose(high[column] - moved, low[column], atol=1e-9 * np.abs(low[column]).max())
