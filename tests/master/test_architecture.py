@@ -35,7 +35,10 @@ def test_no_files_import_each_other_in_a_circle():
 
 
 #: What takes long to load.
-SLOW = ("numpy", "scipy", "matplotlib", "plotly", "fmpy", "pyarrow", "distributed", "pandas", "pint")
+SLOW = (
+    *("numpy", "scipy", "matplotlib", "plotly", "fmpy", "pyarrow", "distributed", "pandas", "pint"),
+    *("numpy.ma", "multiprocessing.connection", "rich.progress"),
+)
 
 
 #: Commands that load none of it.
@@ -57,7 +60,7 @@ SMALL = "--no-plots --set time.t_end=0.01 --set beam.n_elements=4"
 LOADED = {
     "doctor": "numpy fmpy",
     f"run soft {SMALL}": "numpy fmpy",
-    "report results/soft": "numpy plotly",
+    "report results/soft": "numpy",
     "export results/soft": "numpy",
     f"crosscheck soft {SMALL}": "numpy scipy fmpy pyarrow",
 }

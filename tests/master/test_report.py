@@ -7,6 +7,7 @@ import re
 from collections import Counter
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
 from lxml import html
 from runs import EVERY_EVENT, PAIR, SCENES, a_trajectory
@@ -82,6 +83,8 @@ def test_every_scene_has_one_valid_page_that_loads_nothing(has):
     assert CHARTS[has] | {"motion", "slider", "play", "numbers", "scene", "reproduce", "about"} <= set(found.ids)
     data = found.data
     assert {*data["motion"]["parts"], *data["overTime"]} == set(data["charts"]) <= set(found.ids)
+    for chart in data["charts"].values():
+        go.Figure(chart)  # knows all keys and values of plotly.js, and raises ValueError for others
     absent = {"u_tip": scene.beam, "y": scene.spring, "foundation_force": scene.stop}
     assert not [name for name, body in absent.items() if body is None and name in curves(data)]
 

@@ -6,6 +6,7 @@ import hashlib
 from contextlib import ExitStack
 from math import inf
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..scene import Beam, Scene, SceneError, Spring
 from ..scene.linearised import hilltop
@@ -15,10 +16,11 @@ from ..scene.statics import resting_height, tip_compliance, tip_load_deflection
 from .archive import fmu_directory, own_fmu
 from .elements import ELEMENTS
 from .fmu_bodies import FmuBeam, FmuSpring
-from .foreign import Findings, ForeignBody
-from .probe import examined
 from .protocol import Body, FmuError
 from .quasi_static import QuasiStaticBeam
+
+if TYPE_CHECKING:
+    from .foreign import Findings
 
 
 def load_bodies(
@@ -59,6 +61,8 @@ def _body(
     contact_force: float,
 ) -> Body:
     if isinstance(spec, ForeignFmu):
+        from .foreign import ForeignBody
+
         return ForeignBody(spec, spec is scene.upper, (start_time, scene.time.t_end), found)
     if isinstance(spec, Spring):
         return FmuSpring(spec, start_time, top_at_rest(scene, contact_force) if scene.static else None)
@@ -137,6 +141,10 @@ def _load_at_start(scene: Scene, end: str, mass: float) -> float:
 
 def findings(scene: Scene) -> dict[str, Findings]:
     """Check the foreign FMUs of ``scene`` (`springbeam.bodies.probe`), by table. Raises FmuError."""
+    if not scene.foreign:
+        return {}
+    from .probe import examined  # which starts processes
+
     H = scene.coupling.macro_step or 1e-3 * scene.time.t_end
     times = 0.0, scene.time.t_end
     return {table: examined(spec, table == "beam", times, H) for table, spec in scene.foreign.items()}

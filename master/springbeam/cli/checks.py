@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 _PACKAGES = (
-    *("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "plotly", "pebble", "pyarrow"),
+    *("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "pebble", "pyarrow"),
     "distributed",  # for clusters
 )
 

@@ -15,7 +15,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn
+from typing import Annotated, Any, ClassVar, NoReturn, Protocol
 
 import typer
 from rich.console import Console
@@ -26,8 +26,12 @@ from .. import scene
 from ..results.directory import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory
 from ..studies.tables import Findings
 
-if TYPE_CHECKING:
-    from rich.progress import Progress, ProgressColumn
+
+class Show(Protocol):
+    """Say how much is done and, if that has changed, what is being done and how much there is."""
+
+    def __call__(self, done: float, words: str | None = None, total: float | None = None) -> None: ...
+
 
 DISAGREES = 1
 BAD_INPUT = 2
@@ -159,14 +163,33 @@ def console_for(*, silent: bool) -> Console:
     return _Results(highlight=False, quiet=silent)
 
 
-def progress_bar(*columns: ProgressColumn, quiet: bool) -> Progress:
-    """Return a progress bar on stderr, which shows if that is a terminal."""
-    from rich.progress import Progress
+@contextmanager
+def progress(words: str, total: float | None, *, silent: bool) -> Iterator[Show]:
+    """Show on stderr what a command does, the part done and the time left, if that is a terminal.
 
+    Yields the function by which the command says how much of ``total`` is done. With ``None`` only the time passed is
+    shown until the command knows a total.
+    """
     console = Console(stderr=True)
-    return Progress(
-        *columns, console=console, transient=True, redirect_stdout=False, disable=quiet or not console.is_terminal
+    if silent or not console.is_terminal:
+        yield lambda done, words=None, total=None: None
+        return
+    from rich import progress as bars  # which only a terminal needs
+
+    columns = (
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(bar_width=20),
+        bars.TaskProgressColumn(),
+        bars.TimeElapsedColumn(),
+        bars.TimeRemainingColumn(),
     )
+    with bars.Progress(*columns, console=console, transient=True, redirect_stdout=False) as bar:
+        task = bar.add_task(words, total=total)
+
+        def show(done: float, words: str | None = None, total: float | None = None) -> None:
+            bar.update(task, completed=done, description=words, total=total)
+
+        yield show
 
 
 def say(found: Findings, *, quiet: bool, as_json: bool) -> None:

@@ -21,7 +21,7 @@ from .common import (
     ReadOption,
     RunArgument,
     fail,
-    progress_bar,
+    progress,
     results_directory,
 )
 
@@ -43,10 +43,12 @@ def report(
     from ..pictures.report import page
     from ..results.files import load_trajectory
 
-    trajectory = load_trajectory(results_directory(directory))
+    run = results_directory(directory)
     target = _free(out or directory / REPORT, force)
-
-    target.write_text(page(trajectory), encoding="utf-8")
+    with progress("reads the run", 2, silent=False) as show:
+        trajectory = load_trajectory(run)
+        show(1, "makes the page")
+        target.write_text(page(trajectory), encoding="utf-8")
     return Findings(files=[("", target)])
 
 
@@ -70,8 +72,11 @@ def plot(
     from ..pictures.plots import plot_run
     from ..results.files import load_trajectory
 
-    trajectory = load_trajectory(results_directory(directory))
-    written = plot_run(trajectory, directory, PICTURES if everything else names or (OVERVIEW,))
+    run = results_directory(directory)
+    with progress("reads the run", 2, silent=False) as show:
+        trajectory = load_trajectory(run)
+        show(1, "draws")
+        written = plot_run(trajectory, directory, PICTURES if everything else names or (OVERVIEW,))
     if not written:
         fail(BAD_INPUT, f"{directory}: the run has no data for {', '.join(names or PICTURES)}")
     return Findings(files=[("", file) for file in written])
@@ -90,7 +95,9 @@ def export(
     """
     from ..results.files import export as write
 
-    return Findings(files=[("", file) for file in write(results_directory(directory), form)])
+    run = results_directory(directory)
+    with progress("reads the run and writes its tables", None, silent=False):
+        return Findings(files=[("", file) for file in write(run, form)])
 
 
 def animate(
@@ -112,8 +119,6 @@ def animate(
 
     Example: springbeam animate results/soft --out soft.mp4
     """
-    from rich.progress import BarColumn, MofNCompleteColumn
-
     from ..pictures.animation import AnimationError
     from ..pictures.animation import animate as write
     from ..results.files import load_trajectory
@@ -121,12 +126,14 @@ def animate(
     trajectory = load_trajectory(results_directory(directory))
     target = _free(out or directory / ANIMATIONS[0], force)
 
-    def progress(times: Sequence[float]) -> Iterable[float]:
-        with progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), quiet=quiet) as bar:
-            yield from bar.track(times)
+    def counted(times: Sequence[float]) -> Iterable[float]:
+        with progress("frames", len(times), silent=quiet) as show:
+            for number, time in enumerate(times, 1):
+                yield time
+                show(number)
 
     try:
-        write(trajectory, target, seconds=seconds, fps=fps, progress=progress)
+        write(trajectory, target, seconds=seconds, fps=fps, progress=counted)
     except AnimationError as error:
         fail(BAD_INPUT, str(error))
     return Findings(files=[("", target)])
@@ -172,15 +179,19 @@ def compare(
     from ..results.files import load_trajectory
     from ..studies.beside import beside_measured, beside_one_another
 
-    trajectories = [load_trajectory(results_directory(run)) for run in runs[: 1 if measured else None]]
-    if measured:
-        found = beside_measured(trajectories[0], runs[1], names or [], shift, read or [])
-    else:
-        found = beside_one_another([str(run) for run in runs], trajectories)
-    if no_plots:
-        return replace(found, document={**found.document, "picture": None})
-    out.parent.mkdir(parents=True, exist_ok=True)
-    found.pictures["comparison"]().savefig(out, dpi=_DPI)
+    directories = [results_directory(run) for run in runs[: 1 if measured else None]]
+    with progress("reads the runs", 3, silent=quiet or as_json) as show:
+        trajectories = [load_trajectory(directory) for directory in directories]
+        show(1, "compares")
+        if measured:
+            found = beside_measured(trajectories[0], runs[1], names or [], shift, read or [])
+        else:
+            found = beside_one_another([str(run) for run in runs], trajectories)
+        if no_plots:
+            return replace(found, document={**found.document, "picture": None})
+        show(2, "draws")
+        out.parent.mkdir(parents=True, exist_ok=True)
+        found.pictures["comparison"]().savefig(out, dpi=_DPI)
     return replace(found, document={**found.document, "picture": out}, files=[("picture", out)], where=out)
 
 
@@ -221,8 +232,12 @@ def spectrum(
     from ..results.files import load_trajectory
     from ..studies.spectrum import spectrum as spectra_of
 
-    trajectory = load_trajectory(results_directory(run))
-    found = spectra_of(trajectory, of or (), low, high, quality, since, segments, str(run))
-    directory = out or run.with_name(f"{run.resolve().name}-spectrum")
-    directory.mkdir(parents=True, exist_ok=True)
-    return found.written(directory, pictures=not no_plots)
+    results_directory(run)
+    with progress("reads the run", 3, silent=quiet or as_json) as show:
+        trajectory = load_trajectory(run)
+        show(1, "computes spectra")
+        found = spectra_of(trajectory, of or (), low, high, quality, since, segments, str(run))
+        show(2, "writes and draws")
+        directory = out or run.with_name(f"{run.resolve().name}-spectrum")
+        directory.mkdir(parents=True, exist_ok=True)
+        return found.written(directory, pictures=not no_plots)

@@ -10,7 +10,7 @@ import typer
 
 from ..results.directory import RunDirectory
 from ..studies.tables import Findings
-from .common import STOPPED, ForceOption, JsonOption, NoPlotsOption, QuietOption, SettingsOption, fail
+from .common import STOPPED, ForceOption, JsonOption, NoPlotsOption, QuietOption, SettingsOption, fail, progress
 from .run import carry_out
 
 #: (A) to (E) of the paper's figures.
@@ -49,7 +49,8 @@ def paper(
     scene = load_scene(f"paper-fig{figure}", settings or ())
     failed = ""
     try:
-        made = (as_one_system if monolithic else co_simulation).algorithm_1(scene)
+        with progress("Algorithm 1", scene.time.t_end, silent=quiet or as_json) as show:
+            made = (as_one_system if monolithic else co_simulation).algorithm_1(scene, progress=show)
     except AlgorithmFailure as failure:
         failed = f"the run stopped early: {failure}"
         if failure.trajectory is None:

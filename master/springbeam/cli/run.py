@@ -28,7 +28,7 @@ from .common import (
     SettingsOption,
     cause_of,
     fail,
-    progress_bar,
+    progress,
 )
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def run(
     _refuse_options(what, interval)
     for line in () if quiet or as_json else implausible(what):
         typer.echo(f"warning: {line}", err=True)
-    made = picked(what)
+    made = picked(what, silent=quiet or as_json)
     what = what if made is None else made.scene
     default = Path("results") / Path(scene).stem
     if out is None and not force:
@@ -107,7 +107,7 @@ def _refuse_options(scene: Scene, interval: float | None) -> None:
         fail(BAD_INPUT, f"--output-interval {interval:g}: must be a time [s], {rows}")
 
 
-def picked(scene: Scene) -> Trajectory | None:
+def picked(scene: Scene, *, silent: bool) -> Trajectory | None:
     """Return the run with the accuracy of the scene; ``None`` if the scene has none."""
     if scene.accuracy is None:
         return None
@@ -115,7 +115,8 @@ def picked(scene: Scene) -> Trajectory | None:
     from ..run.outcome import RunStopped
 
     try:
-        return pick(scene)
+        with progress_of_run(scene.time.t_end, "pilot runs", silent=silent) as show:
+            return pick(scene, show)
     except RunStopped as stopped:
         fail(STOPPED, f"a pilot run for accuracy = {scene.accuracy:g} {stopped}")
 
@@ -141,11 +142,11 @@ def carry_out(
     t_end = recorder.scene.time.t_end
     error = ""
     try:
-        with _progress(t_end, quiet=silent) as progress, recorder:
+        with progress_of_run(t_end, "run", silent=silent) as show, recorder:
             if made is not None:
                 recorder.write(made)
             else:
-                run_scene(recorder.scene, recorder, progress)
+                run_scene(recorder.scene, recorder, show)
     except (RunStopped, OSError, FmuError, KeyboardInterrupt) as stopped:
         if not recorder.begun and not isinstance(stopped, RunStopped):
             raise
@@ -178,22 +179,17 @@ def _drawn(directory: Path, names: Sequence[str]) -> Findings:
 
 
 @contextmanager
-def _progress(t_end: float, *, quiet: bool) -> Iterator[Progress]:
-    """Show simulated time, phase and speed on stderr, if that is a terminal."""
-    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    state = TextColumn("{task.fields[state]}")
-    left = TimeRemainingColumn()
-    with progress_bar(BarColumn(bar_width=20), TaskProgressColumn(), state, left, quiet=quiet) as bar:
-        task = bar.add_task("", total=t_end, state="starting")
+def progress_of_run(t_end: float, what: str, *, silent: bool) -> Iterator[Progress]:
+    """Show simulated time, phase and speed of a run, or of several one after the other; ``what`` names them."""
+    with progress(what, t_end, silent=silent) as bar:
         start = shown = monotonic()
 
         def show(time: float, phase: str, macro_steps: int) -> None:
             nonlocal shown
-            if not bar.disable and (now := monotonic()) - shown >= _REFRESH_SECONDS:
+            if (now := monotonic()) - shown >= _REFRESH_SECONDS:
                 shown = now
                 speed = macro_steps / (now - start)
-                bar.update(task, completed=time, state=f"t = {time:.4g}/{t_end:g} s  {phase:<7}{speed:7.0f} steps/s")
+                bar(time, f"{what}  t = {time:.4g}/{t_end:g} s  {phase:<7}{speed:7.0f} steps/s")
 
         yield show
 

@@ -14,7 +14,7 @@ from rich.text import Text
 
 from ..scene.files import beginning, shipped_scenes, tables_of
 from ..studies.tables import Findings, table
-from .common import BAD_INPUT, JsonOption, SceneArgument, SettingsOption, fail
+from .common import BAD_INPUT, JsonOption, SceneArgument, SettingsOption, fail, progress
 
 
 def _complete_table(incomplete: str) -> list[str]:
@@ -118,7 +118,8 @@ def predict(
     from ..studies.stability.predict import predict as prediction_of
 
     what = load_scene(scene, settings or ())
-    p = prediction_of(what)
+    with progress("modes and stability", None, silent=as_json):
+        p = prediction_of(what)
     shown: list[Any] = [Text(what.title or "(untitled scene)", style="bold")]
     shown += [f"{name:<10}{text}" for name, text in _lines(p)]
     shown += [f"note      {note}" for note in p["notes"]]

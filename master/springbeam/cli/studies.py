@@ -11,7 +11,6 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -36,13 +35,11 @@ from .common import (
     complete_key,
     console_for,
     fail,
-    progress_bar,
+    progress,
 )
 from .run import picked, picked_in_words
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from ..studies.study import Records, Study
     from ..studies.tables import Done, Row
 else:
@@ -70,6 +67,11 @@ class Frame:
         str | None,
         typer.Option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster instead of local processes."),
     ] = None
+
+    @property
+    def silent(self) -> bool:
+        """Whether only a path or JSON is to be printed."""
+        return self.quiet or self.as_json
 
 
 @dataclass(frozen=True)
@@ -117,11 +119,10 @@ def find(once: Once, scene: str, frame: Frame) -> Findings:
     from ..run.outcome import RunStopped
 
     with _new_directory(Path("results") / f"{Path(scene).stem}-{once.kind}", frame) as directory:
-        bar = _counted(silent=frame.quiet or frame.as_json)
+        number = count(1)
         try:
-            with bar:
-                task = bar.add_task(once.announced, total=once.parts)
-                found = once.find(partial(bar.advance, task))
+            with progress(once.announced, once.parts, silent=frame.silent) as show:
+                found = once.find(lambda: show(next(number)))
             if frame.force:
                 for stale in directory.glob(f"{once.kind}.*"):
                     stale.unlink()
@@ -196,30 +197,21 @@ def _computed(study: Study, records: Records, frame: Frame) -> dict[str, Row]:
     total = study.expected(there)
     if there == len(study.cases()) == total:
         return study.computed(records)
-    silent = frame.quiet or frame.as_json
     known = f"\n{there} of {total} records are there" * bool(there)
-    console_for(silent=silent).print(f"{study.announced.format(total)}{known}")
-    bar = _counted(silent=silent)
-    task = bar.add_task("", total=total, completed=there)
+    console_for(silent=frame.silent).print(f"{study.announced.format(total)}{known}")
     processes = (frame.workers or os.cpu_count() or 1) if study.parallel else 0
-    with records, dask_cluster(frame.scheduler) if frame.scheduler else nullcontext() as cluster, bar:
+    workers = dask_cluster(frame.scheduler) if frame.scheduler else nullcontext()
+    with records, workers as cluster, progress(study.kind, total, silent=frame.silent) as show:
+        show(there)
 
         def report(_: Row) -> None:
             nonlocal total
             done = len(records.by_name)
             if done > total:
                 total = study.expected(done)
-            bar.update(task, completed=done, total=total)
+            show(done, f"{study.kind}: {done} of {total}", total)
 
         return study.computed(records, processes, cluster, report)
-
-
-def _counted(*, silent: bool) -> Progress:
-    """Return a progress bar of parts: how many are done, and when all will be."""
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-
-    what = TextColumn("{task.description}")
-    return progress_bar(what, BarColumn(bar_width=20), MofNCompleteColumn(), TimeRemainingColumn(), quiet=silent)
 
 
 # -- the commands ---------------------------------------------------------------------------------------------------
@@ -408,20 +400,24 @@ def crosscheck(
 
     what = scenes.load_scene(scene, settings or ())
     event_driven.refuse(what)
-    made = picked(what)
-    compared = what if made is None else made.scene
     look = study.orders if with_orders else study.crosscheck
 
     def compare(done: Done) -> Findings:
+        made = picked(what, silent=True)
+        compared = what
+        if made is not None:
+            compared = made.scene
+            done()
         found = look(compared, quick=quick, done=done)
         if made is None:
             return found
         return replace(found, shown=[f"accuracy {picked_in_words(made.summary['accuracy'])}", *found.shown])
 
+    searches = int(what.accuracy is not None)
     if with_orders:
         parts = study.parts_of_orders(quick)
-        return Once("orders", f"a reference and {parts - 1} runs", parts, compare)
-    return Once("crosscheck", "2 runs and 2 references", PARTS, compare)
+        return Once("orders", f"a reference and {parts - 1} runs", parts + searches, compare)
+    return Once("crosscheck", "2 runs and 2 references", PARTS + searches, compare)
 
 
 @study_command("workers")

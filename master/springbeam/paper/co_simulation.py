@@ -8,6 +8,7 @@ and ``energy_residual`` shows it. Readings where the print leaves something open
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import closing
 from math import inf, isfinite
 from time import perf_counter
@@ -60,13 +61,17 @@ class Row(NamedTuple):
     e_injected_spring: float
 
 
-def algorithm_1(scene: Scene, *, at_contact: AtContact = "rest") -> Trajectory:
+def algorithm_1(
+    scene: Scene, *, at_contact: AtContact = "rest", progress: Callable[[float], object] = float
+) -> Trajectory:
     """Run Algorithm 1 through the FMUs with h_t = ``coupling.macro_step`` on a scene with beam and spring.
 
     Parameters
     ----------
     at_contact
         See `springbeam.paper.problem.AtContact`.
+    progress
+        Called with the time [s] at the end of each step.
 
     Returns
     -------
@@ -87,7 +92,7 @@ def algorithm_1(scene: Scene, *, at_contact: AtContact = "rest") -> Trajectory:
     problem.refuse(scene)
     with closing(_Algorithm(scene, at_contact)) as algorithm:
         try:
-            algorithm.run()
+            algorithm.run(progress)
         except (StepRefused, BodyFailed, OverflowError) as failed:
             failure = AlgorithmFailure(f"{failed} at t = {algorithm.time:.6g} s")
             failure.trajectory = algorithm.trajectory() if algorithm.begun else None
@@ -133,7 +138,7 @@ class _Algorithm:
     def close(self) -> None:
         self._beam.close()
 
-    def run(self) -> None:
+    def run(self, progress: Callable[[float], object]) -> None:
         """Make all steps; `trajectory` has them, also where one fails."""
         beam = self._scene.beam
         assert beam is not None
@@ -149,6 +154,7 @@ class _Algorithm:
             else:
                 self._free_step(end)
             self.time = end
+            progress(end)
 
     def trajectory(self) -> Trajectory:
         """Return the rows so far as a result."""

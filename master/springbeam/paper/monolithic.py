@@ -59,7 +59,13 @@ class _Row(NamedTuple):
     booked: bool = False  #: whether the step was one in contact
 
 
-def algorithm_1(scene: Scene, *, at_contact: AtContact = "rest", y_temp: YTemp = "equation") -> Trajectory:
+def algorithm_1(
+    scene: Scene,
+    *,
+    at_contact: AtContact = "rest",
+    y_temp: YTemp = "equation",
+    progress: Callable[[float], object] = float,
+) -> Trajectory:
     """Run Algorithm 1 with h_t = ``coupling.macro_step`` on a scene with beam and spring, and a shorter last step to
     ``time.t_end`` where that is off the grid.
 
@@ -67,6 +73,8 @@ def algorithm_1(scene: Scene, *, at_contact: AtContact = "rest", y_temp: YTemp =
     ----------
     at_contact, y_temp
         See the module.
+    progress
+        Called with the time [s] at the end of each step.
 
     Returns
     -------
@@ -89,7 +97,7 @@ def algorithm_1(scene: Scene, *, at_contact: AtContact = "rest", y_temp: YTemp =
     problem.refuse(scene)
     algorithm = _Algorithm(scene, at_contact, y_temp)
     try:
-        algorithm.run()
+        algorithm.run(progress)
     except AlgorithmFailure as failure:
         failure.trajectory = algorithm.trajectory()
         raise
@@ -169,7 +177,7 @@ class _Algorithm:
 
     # Algorithm ------------------------------------------------------------------------------------------------------
 
-    def run(self) -> None:
+    def run(self, progress: Callable[[float], object]) -> None:
         """Make all steps; `trajectory` has them, also where one fails."""
         self.began = clock.perf_counter()
         row = self._start()
@@ -185,6 +193,7 @@ class _Algorithm:
                 touched = True
                 row = self._first_contact(row)
             self.rows.append(row)
+            progress(end)
 
     def _start(self) -> _Row:
         beam = self.beam

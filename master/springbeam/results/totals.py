@@ -151,7 +151,7 @@ def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tu
 
     # Inside steps the mean is largest where C is the same at both edges of the window: between `edges` both forces are
     # of degree 2. The root of a τ² + b τ + c at which it falls is 2 c / (√(b² − 4 a c) − b), also where a is 0.
-    edges = np.union1d(rows, rows - window)
+    edges = np.sort(np.concatenate([rows, rows - window]))
     half = 0.5 * np.diff(edges)
     middle = edges[:-1] + half
     c, b, twice_a = (upto(middle + window, "right", order) - upto(middle, "right", order) for order in (1, 2, 3))

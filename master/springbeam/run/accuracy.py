@@ -59,7 +59,8 @@ def simulate(
     scene
         What is simulated: a scene, its tables as dictionaries, a file, or the name of a shipped scene.
     progress
-        Called with time [s], phase and number of macro steps once per accepted step; not while settings are searched.
+        Called with time [s], phase and number of macro steps once per accepted step; with an accuracy, in each of the
+        runs that are made for it.
     upper, lower
         Bodies of the caller at the start of the run, in place of the beam and of the spring: `springbeam.Body`.
 
@@ -77,11 +78,13 @@ def simulate(
     scene = as_scene(scene)
     if scene.accuracy is None or upper is not None or lower is not None:
         return runner.run_in_memory(scene, progress, upper=upper, lower=lower)
-    return pick(scene)
+    return pick(scene, progress)
 
 
-def pick(scene: Scene) -> Trajectory:
+def pick(scene: Scene, progress: Progress | None = None) -> Trajectory:
     """Return a run of ``scene`` that keeps its ``accuracy``; its scene has the settings that were picked.
+
+    ``progress``: as of `simulate`.
 
     ``accuracy`` of its summary has the settings, with an estimate of each part of the `distance`; that of
     the motion is at least how far the run misplaces its ends (`springbeam.run.misplaced`).
@@ -104,7 +107,7 @@ def pick(scene: Scene) -> Trajectory:
         prepared = _prepared(scene, scene.duration / steps)
         steps *= 2.0
         try:
-            fine = runner.run_in_memory(prepared)
+            fine = runner.run_in_memory(prepared, progress)
         except RunStopped as error:
             if steps > _MOST or error.run is None:
                 raise
@@ -118,7 +121,7 @@ def pick(scene: Scene) -> Trajectory:
             agrees = _SAFETY * max(errors.values()) <= asked
             # A run with doubts that are not in the estimate needs one more halving: the runs may agree by chance.
             if agrees and (agreed or not _doubts(fine)):
-                return _coarsest(scene, coarse, fine, errors, pilots)
+                return _coarsest(scene, coarse, fine, errors, pilots, progress)
             agreed = agrees
         pilots.append(fine)
         coarse = fine
@@ -130,7 +133,12 @@ def pick(scene: Scene) -> Trajectory:
 
 
 def _coarsest(
-    scene: Scene, coarse: Trajectory, fine: Trajectory, errors: dict[str, float], pilots: list[Trajectory]
+    scene: Scene,
+    coarse: Trajectory,
+    fine: Trajectory,
+    errors: dict[str, float],
+    pilots: list[Trajectory],
+    progress: Progress | None,
 ) -> Trajectory:
     """Return the run with the fewest steps that keeps the accuracy of ``scene``, ``fine`` or a coarser one.
 
@@ -154,7 +162,7 @@ def _coarsest(
         if scene.duration < _FEWEST * H:
             break
         try:
-            coarse = known.get(H) or runner.run_in_memory(_prepared(scene, H))
+            coarse = known.get(H) or runner.run_in_memory(_prepared(scene, H), progress)
         except RunStopped:
             break
         if H not in known:

@@ -11,8 +11,6 @@ makes its force, a `SoftLaw`. Only this module and `springbeam.monolithic.laws`,
 independently, compare names of laws. ``docs/contributing.md`` shows how to add a law.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -191,7 +189,7 @@ class Contact(Table):
         """Return C as a function of the penetration and its rate; ``None`` for a rigid law."""
         return None
 
-    def compliance(self, p: np.ndarray) -> np.ndarray:
+    def compliance(self, p: "np.ndarray") -> "np.ndarray":
         """Return the part of a rigid law's force that the paper calls normal compliance [N], at depths p [m] below Ψ.
 
         That is the column ``compliance_force``.
@@ -240,7 +238,7 @@ class TransmissionContact(Contact):
 
     legend = "part λ(Ψ − u)₊ᵖ"
 
-    def compliance(self, p: np.ndarray) -> np.ndarray:
+    def compliance(self, p: "np.ndarray") -> "np.ndarray":
         with np.errstate(over="ignore"):
             return np.asarray(self.stiffness * np.maximum(p, 0.0) ** self.exponent)
 

@@ -4,8 +4,6 @@
 values is a file of two columns, time and value (``recorded``).
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from math import inf
 from pathlib import Path
@@ -53,7 +51,7 @@ class Load(Table):
             raise ValueError(f"at = {self.at}: a load has a shape or acts at a point; leave one of the two out")
         return self
 
-    def curve(self, t: np.ndarray) -> Any:
+    def curve(self, t: "np.ndarray") -> Any:
         """Return the value over the amplitude at t [s] after `start`; before it begins and after its end, anything."""
         raise NotImplementedError
 
@@ -121,7 +119,7 @@ class Load(Table):
         """Return whether the lines of a straight table are too close for steps of ``macro_step`` [s] to end on them."""
         return False
 
-    def value(self, times: Any) -> np.ndarray:
+    def value(self, times: Any) -> "np.ndarray":
         """Return the signal at ``times`` [s], any shape, in `unit`; where it jumps, the value after the jump."""
         t = np.asarray(times, dtype=float) - self.since
         first, last = self._extent
@@ -133,7 +131,7 @@ class ConstantLoad(Load):
 
     signal: Literal["constant"] = key("–", "the amplitude at all times", "constant")
 
-    def curve(self, t: np.ndarray) -> Any:
+    def curve(self, t: "np.ndarray") -> Any:
         return 1.0
 
 
@@ -190,7 +188,7 @@ class HarmonicLoad(_Lasting):
     def wave(self) -> tuple[float, float]:
         return self.rate, self.phase
 
-    def curve(self, t: np.ndarray) -> Any:
+    def curve(self, t: "np.ndarray") -> Any:
         return np.sin(self.rate * t + self.phase)
 
 
@@ -206,7 +204,7 @@ class ChirpLoad(_Pulse):
     def rate(self) -> float:
         return 2.0 * np.pi * max(self.frequency, self.frequency_end)
 
-    def curve(self, t: np.ndarray) -> Any:
+    def curve(self, t: "np.ndarray") -> Any:
         mean = self.frequency + 0.5 * (self.frequency_end - self.frequency) * t / self.duration
         return np.sin(2.0 * np.pi * mean * t + self.phase)
 
@@ -220,7 +218,7 @@ class HalfSineLoad(_Pulse):
     def wave(self) -> tuple[float, float]:
         return np.pi / self.duration, 0.0
 
-    def curve(self, t: np.ndarray) -> Any:
+    def curve(self, t: "np.ndarray") -> Any:
         return np.sin(np.pi / self.duration * t)
 
 
@@ -229,7 +227,7 @@ class SawtoothLoad(_Pulse):
 
     signal: Literal["sawtooth"] = key("–", "a pulse with its peak at the end", "sawtooth")
 
-    def curve(self, t: np.ndarray) -> Any:
+    def curve(self, t: "np.ndarray") -> Any:
         return t / self.duration
 
 
@@ -249,7 +247,7 @@ class TrapezoidLoad(_Pulse):
     def _bends(self) -> tuple[float, ...]:
         return 0.0, self.rise, self.duration - self.rise, self.duration
 
-    def curve(self, t: np.ndarray) -> Any:
+    def curve(self, t: "np.ndarray") -> Any:
         return np.clip(np.minimum(t, self.duration - t) / self.rise, 0.0, 1.0)
 
 
@@ -258,7 +256,7 @@ class StepLoad(_Lasting):
 
     signal: Literal["step"] = key("–", "the amplitude from the start on", "step")
 
-    def curve(self, t: np.ndarray) -> Any:
+    def curve(self, t: "np.ndarray") -> Any:
         return 1.0
 
 
@@ -271,7 +269,7 @@ class RampLoad(_Pulse):
     def _extent(self) -> tuple[float, float]:
         return 0.0, inf
 
-    def curve(self, t: np.ndarray) -> Any:
+    def curve(self, t: "np.ndarray") -> Any:
         return np.clip(t / self.duration, 0.0, 1.0)
 
 
@@ -288,7 +286,7 @@ class TableLoad(Reading, _Started):
         return self
 
     @property
-    def record(self) -> PPoly:
+    def record(self) -> "PPoly":
         """The table, as the polynomials between its lines. Raises ValueError, which names its line and column."""
         return self._read[0]
 
@@ -297,7 +295,7 @@ class TableLoad(Reading, _Started):
         return self._read[1]
 
     @property
-    def _read(self) -> tuple[PPoly, list[str]]:
+    def _read(self) -> "tuple[PPoly, list[str]]":
         path = Path(self.file)
         reading = Reading(**{name: getattr(self, name) for name in Reading.model_fields})
         try:
@@ -335,7 +333,7 @@ class TableLoad(Reading, _Started):
         times = self.record.x
         return bool(LINES_IN_STEP * (times[-1] - times[0]) < macro_step * (len(times) - 1))
 
-    def curve(self, t: np.ndarray) -> Any:
+    def curve(self, t: "np.ndarray") -> Any:
         return self.record(t)
 
 
@@ -355,7 +353,7 @@ SIGNAL = OneOf(Load, "signal", "value over time", SIGNALS, "constant")
 
 
 @lru_cache(maxsize=16)
-def _record(path: Path, modified: int, interpolation: str, unit: str, reading: Reading) -> tuple[PPoly, list[str]]:
+def _record(path: Path, modified: int, interpolation: str, unit: str, reading: Reading) -> "tuple[PPoly, list[str]]":
     recorded = Recorded(path, reading)
     if len(recorded.units) != 2:
         raise ValueError(f"{len(recorded.units)} columns; a table has two, time and value")

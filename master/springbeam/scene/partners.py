@@ -4,8 +4,6 @@
 ``element``, one of these.
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Literal
 
 from .tables import Beam, OneOf, Spring, Table, key

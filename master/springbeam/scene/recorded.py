@@ -6,8 +6,6 @@ else semicolons, else commas. Lines that are empty or begin with # are skipped. 
 acceleration is standard gravity. `Reading` has what else a file may need; nothing of it is guessed.
 """
 
-from __future__ import annotations
-
 import codecs
 import csv
 import re
@@ -125,7 +123,7 @@ class Recorded:
             raise ValueError(f"line {self._numbers[row - 1]}: {number} columns; there must be {what} between")
         return list(zip(*(column.to_pylist() for column in found.columns), strict=True))
 
-    def read(self, wanted: Mapping[int, str]) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+    def read(self, wanted: Mapping[int, str]) -> "tuple[np.ndarray, dict[int, np.ndarray]]":
         """Return the times [s], ascending, shape (n,), and columns by their numbers, shapes (n,).
 
         ``wanted`` are the units of the result by number of the column; "" leaves a column as it is. `notes` then has
@@ -139,7 +137,7 @@ class Recorded:
             raise ValueError(f"{values.shape[1]} lines are left; there must be two at least")
         return values[0], dict(zip(wanted, values[1:], strict=True))
 
-    def _values(self, k: int, wanted: str) -> np.ndarray:
+    def _values(self, k: int, wanted: str) -> "np.ndarray":
         """Return column ``k`` in the unit ``wanted``, as it is without any; NaN where a value is missing."""
         label = f"column {self._labels[k]}"
         cells = [cell.strip() for cell in self._cells[k]]
@@ -161,7 +159,7 @@ class Recorded:
             self.notes.append(f"{label} has no unit: {wanted} is assumed")
         return values * _factor(self.units[k], wanted, label)
 
-    def _present(self, values: np.ndarray) -> np.ndarray:
+    def _present(self, values: "np.ndarray") -> "np.ndarray":
         """Return ``values`` without the lines in which one is missing, if these are to be dropped."""
         lacking = np.isnan(values).any(axis=0)
         self._lines = np.arange(len(self._numbers))
@@ -171,7 +169,7 @@ class Recorded:
         self._note(lacking, "dropped, where a value is missing")
         return values[:, ~lacking]
 
-    def _ascending(self, values: np.ndarray) -> np.ndarray:
+    def _ascending(self, values: "np.ndarray") -> "np.ndarray":
         """Return ``values`` with ascending times. Raises ValueError if that is not to be made."""
         times = values[0]
         late = np.zeros(len(times), dtype=bool)
@@ -196,7 +194,7 @@ class Recorded:
             means.append(np.where(numbers > 0, sums / np.maximum(numbers, 1), nan))
         return np.array([sorted_times, *means])
 
-    def _interpolated(self, values: np.ndarray) -> np.ndarray:
+    def _interpolated(self, values: "np.ndarray") -> "np.ndarray":
         """Return ``values`` with those that are missing on the line between their neighbours; lines beyond go."""
         times = values[0]
         filled = [values[0]]

@@ -1,7 +1,5 @@
 """A whole scene: its tables, and values that follow from them before anything is built or loaded."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Annotated, Any, NamedTuple

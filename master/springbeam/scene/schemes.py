@@ -4,8 +4,6 @@ A scheme is one table of keys, a `Coupling` named in `SCHEMES`. Only this module
 the schemes, compare their names.
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Literal
 
 from pydantic import model_validator

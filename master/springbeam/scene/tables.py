@@ -4,8 +4,6 @@ Field names are those of the FMU parameters; units are SI. `springbeam.scene.rul
 `springbeam.scene.messages` lists the keys and makes ``docs/scene.md`` and the JSON Schema from them.
 """
 
-from __future__ import annotations
-
 import re
 from collections import defaultdict
 from collections.abc import Callable
@@ -93,7 +91,9 @@ def _plain(value: Any) -> Any:
 
 
 class Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True, serialize_by_alias=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, strict=True, serialize_by_alias=True, defer_build=True
+    )
 
     #: Values that alternative groups of keys give: a table has keys of one group.
     WAYS: ClassVar[tuple[Ways, ...]] = ()

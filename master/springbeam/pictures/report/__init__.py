@@ -88,7 +88,7 @@ def page(trajectory: Trajectory) -> str:
         event_words={kind: look.words for kind, look in EVENT_LOOKS.items()},
         more_events=max(0, len(trajectory.events) - _EVENTS_SHOWN),
         rows=len(time),
-        points=max((len(curve.x) for chart in over_time for curve in chart.figure.data), default=0),
+        points=max((chart.points for chart in over_time), default=0),
         toml=tomli_w.dumps(scene.model_dump(exclude_none=True)),
         data=_as_script(_data(trajectory, [*moving, *over_time], shown, frames) if over_time else None),
         glossary=list(_glossary(trajectory)),
@@ -137,7 +137,7 @@ def _data(trajectory: Trajectory, drawn: list[Chart], moving: list[Sketch], fram
     data: dict[str, Any] = {
         "unit": {"factor": unit.factor, "name": unit.name},
         "backdrop": backdrop(trajectory),
-        "charts": {chart.name: chart.figure.to_dict() for chart in drawn},
+        "charts": {chart.name: {"data": chart.traces, "layout": chart.layout} for chart in drawn},
         "overTime": [chart.name for chart in drawn[len(moving) :]],
     }
     if frames is not None:

@@ -1,12 +1,16 @@
-"""The charts of the report, figures of plotly: panels over a common time axis, and sketches that the script moves."""
+"""The charts of the report, JSON of plotly.js: panels over a common time axis, and sketches that the script moves.
+
+They are dictionaries and not the figures of plotly's Python package, which takes as long to load and to check each key
+as all the rest of a report.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from base64 import b64encode
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from ...results.trajectory import Trajectory
 from ..drawing import (
@@ -37,11 +41,25 @@ _SKETCH_HEIGHT = 3.0
 
 @dataclass
 class Chart:
-    """A figure with its heading."""
+    """A figure of plotly.js with its heading."""
 
     name: str
     heading: str
-    figure: go.Figure
+    layout: dict[str, Any]
+    traces: list[dict[str, Any]] = field(default_factory=list)
+    #: Most points of a trace.
+    points: int = 0
+
+    def add(self, **trace: Any) -> None:
+        """Add a curve or points. Arrays become base64, which keeps all digits in little room; ``None`` is left out."""
+        self.points = max(self.points, len(trace["x"]))
+        given = {key: value for key, value in trace.items() if value is not None}
+        arrays = {key: _encoded(value) for key, value in given.items() if isinstance(value, np.ndarray)}
+        self.traces.append({"type": "scatter", **given, **arrays})
+
+    def set_axis(self, name: str, title: str, **keys: Any) -> None:
+        """Set the title of the axis ``name`` and some of its keys."""
+        self.layout[name].update(keys, title={"text": title, "standoff": 6})
 
 
 def charts(trajectory: Trajectory) -> list[Chart]:
@@ -72,11 +90,11 @@ def backdrop(trajectory: Trajectory) -> list[dict[str, Any]]:
 
 def _of_panel(trajectory: Trajectory, panel: Panel) -> Chart:
     """Draw a panel."""
-    figure = _over_time(trajectory, _height_of(panel.height))
+    chart = _over_time(trajectory, panel.name, panel.heading, _height_of(panel.height))
     clock = time_unit(trajectory).factor
     factor = panel.unit.factor
     for curve in panel.curves:
-        figure.add_scatter(
+        chart.add(
             x=_single(clock * curve.time),
             y=_single(factor * curve.values),
             name=curve.look.words,
@@ -84,24 +102,24 @@ def _of_panel(trajectory: Trajectory, panel: Panel) -> Chart:
             hovertemplate=f"%{{y:.6g}} {panel.unit.name}",
             **_style(curve, panel),
         )
-    figure.update_yaxes(title_text=panel.axis)
+    chart.set_axis("yaxis", panel.axis)
     if panel.logarithmic is not None:
         begin, end = (float(np.log10(limit)) for limit in panel.logarithmic)
-        figure.update_yaxes(
+        chart.layout["yaxis"].update(
             type="log", range=[begin, end], tick0=0.0, dtick=max(1, round((end - begin) / 4.0)), exponentformat="e",
             zeroline=False,
         )  # fmt: skip
-    return Chart(panel.name, panel.heading, figure)
+    return chart
 
 
 def _timeline(trajectory: Trajectory) -> Chart:
     """Draw each kind of event in a row of its own; the phases are in the backdrop."""
     kinds = event_marks(trajectory)
-    figure = _over_time(trajectory, height=76 + 18 * len(kinds))
+    chart = _over_time(trajectory, "timeline", "Phases and events", 76 + 18 * len(kinds))
     for i, mark in enumerate(kinds):
-        figure.add_scatter(
+        chart.add(
             x=time_unit(trajectory).factor * mark.times,
-            y=np.full(len(mark.times), -i),
+            y=np.full(len(mark.times), -float(i)),
             customdata=np.column_stack([mark.times, mark.losses]),
             mode="markers",
             marker={**_marker_style(mark.marker), "color": mark.look.colour},
@@ -111,29 +129,45 @@ def _timeline(trajectory: Trajectory) -> Chart:
             hovertemplate="t = %{customdata[0]:.9g} s, energy lost %{customdata[1]:.3g} J",
         )
     if not kinds:
-        figure.add_scatter(x=[], y=[])  # plotly draws no axes without a curve
-    figure.update_layout(hovermode="closest", showlegend=False)
-    figure.update_yaxes(
+        chart.add(x=[], y=[])  # plotly draws no axes without a curve
+    chart.layout.update(hovermode="closest", showlegend=False)
+    chart.layout["yaxis"].update(
         range=[-len(kinds), 1.0], showgrid=False, zeroline=False, showticklabels=False, ticks="", fixedrange=True
     )
-    return Chart("timeline", "Phases and events", figure)
+    return chart
 
 
 def moving_chart(sketch: Sketch, frames: Frames) -> Chart:
     """Draw a sketch at the first frame; the page's script moves it."""
-    figure = go.Figure(layout=_layout(_height_of(_SKETCH_HEIGHT)))
-    figure.update_layout(hovermode="closest", margin_r=30, showlegend=len(sketch.moving) > 1)
-    figure.update_xaxes(range=list(sketch.x), title_text=f"position along the beam x [{sketch.along.name}]")
-    figure.update_yaxes(range=list(sketch.y), title_text=f"height [{sketch.unit.name}]", zeroline=False)
+    chart = Chart(sketch.name, sketch.heading, _layout(_height_of(_SKETCH_HEIGHT)))
+    chart.layout.update(hovermode="closest", showlegend=len(sketch.moving) > 1)
+    chart.layout["margin"].update(r=30)
+    chart.set_axis("xaxis", f"position along the beam x [{sketch.along.name}]", range=sketch.x)
+    chart.set_axis("yaxis", f"height [{sketch.unit.name}]", range=sketch.y, zeroline=False)
     for look, x, y, part, label in sketch.strokes:
         shown = part in ("beam", "top")
-        figure.add_scatter(
-            x=x, y=sketch.unit.factor * frames.heights(part, 0) if part is not None else y, mode="lines+text",
-            text=["", f"\u00a0{label}"] if label else None, textposition="middle right", cliponaxis=False, meta=part,
-            name=look.words, line=_line_style(look), showlegend=part is not None, hoverinfo=None if shown else "skip",
+        chart.add(
+            x=x,
+            y=sketch.unit.factor * frames.heights(part, 0) if part is not None else y,
+            mode="lines+text",
+            text=["", f"\u00a0{label}"] if label else None,
+            textposition="middle right",
+            cliponaxis=False,
+            meta=part,
+            name=look.words,
+            line=_line_style(look),
+            showlegend=part is not None,
+            hoverinfo=None if shown else "skip",
             hovertemplate=f"%{{y:.6g}} {sketch.unit.name}" if shown else None,
-        )  # fmt: skip
-    return Chart(sketch.name, sketch.heading, figure)
+        )
+    return chart
+
+
+def _encoded(values: np.ndarray) -> dict[str, str]:
+    """Return the typed array of plotly.js for ``values``, of any shape."""
+    shape = {"shape": ", ".join(map(str, values.shape))} if values.ndim > 1 else {}
+    data = b64encode(values.tobytes()).decode("ascii")
+    return {"dtype": values.dtype.str[1:], "bdata": data, **shape}
 
 
 def _single(values: np.ndarray) -> np.ndarray:
@@ -149,23 +183,22 @@ def _height_of(inches: float) -> int:
     return round(_PIXELS_BESIDE + _PIXELS_PER_INCH * inches)
 
 
-def _over_time(trajectory: Trajectory, height: int) -> go.Figure:
-    """Return a figure of ``height`` [px] without curves over the run's time."""
+def _over_time(trajectory: Trajectory, name: str, heading: str, height: int) -> Chart:
+    """Return a chart of ``height`` [px] over the run's time, without curves."""
     unit = time_unit(trajectory)
-    time = trajectory["time"]
-    figure = go.Figure(layout=_layout(height))
-    ends = [unit.factor * float(time[0]), unit.factor * float(time[-1])]
-    return figure.update_xaxes(range=ends, title_text=f"time t [{unit.name}]")
+    chart = Chart(name, heading, _layout(height))
+    ends = (unit.factor * trajectory["time"][[0, -1]]).tolist()
+    chart.set_axis("xaxis", f"time t [{unit.name}]", range=ends)
+    return chart
 
 
 def _layout(height: int) -> dict[str, Any]:
     """Return the layout that all charts share; ``height`` in pixels."""
     axis = {
         "gridcolor": _GRID, "zeroline": False, "showline": True, "linecolor": BLACK, "ticks": "outside", "ticklen": 4,
-        "title": {"standoff": 6}, "exponentformat": "power",
+        "exponentformat": "power",
     }  # fmt: skip
     return {
-        "template": "none",
         "height": height,
         "margin": {"l": 66, "r": 14, "t": 10, "b": 42},
         "font": {"family": "system-ui, sans-serif", "size": 12, "color": "#222222"},
@@ -174,7 +207,7 @@ def _layout(height: int) -> dict[str, Any]:
         "hovermode": "x",
         "showlegend": True,
         "legend": {"orientation": "h", "x": 0.0, "xanchor": "left", "y": 1.0, "yanchor": "bottom"},
-        "xaxis": axis,
+        "xaxis": {**axis},
         "yaxis": {**axis, "zeroline": True, "zerolinecolor": GREY, "zerolinewidth": 1.0},
     }
 
@@ -186,7 +219,12 @@ def _style(curve: Curve, panel: Panel) -> dict[str, Any]:
     if marker is not None:
         values = panel.unit.factor * curve.values
         foot = 0.0 if panel.logarithmic is None else panel.logarithmic[0]
-        stems = {"type": "data", "symmetric": False, "array": np.zeros(len(values)), "arrayminus": values - foot}
+        stems = {
+            "type": "data",
+            "symmetric": False,
+            "array": _encoded(np.zeros(len(values))),
+            "arrayminus": _encoded(values - foot),
+        }
         return {
             "mode": "markers",
             "marker": {**_marker_style(marker), "color": colour},
