@@ -62,7 +62,7 @@ LOADED = {
     f"run soft {SMALL}": "numpy fmpy",
     "report results/soft": "numpy",
     "export results/soft": "numpy",
-    f"crosscheck soft {SMALL}": "numpy scipy fmpy pyarrow",
+    f"crosscheck soft {SMALL}": "numpy scipy fmpy pyarrow numpy.ma",
 }
 
 

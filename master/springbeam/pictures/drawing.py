@@ -6,6 +6,7 @@ Colours are those of Okabe and Ito, which any colour vision can distinguish. Wid
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -165,12 +166,12 @@ def decimated(time: np.ndarray, values: np.ndarray, columns: int = PIXEL_COLUMNS
     if len(time) <= 4 * columns:
         return np.arange(len(time))
     edges = np.searchsorted(time, np.linspace(time[0], time[-1], columns + 1)[1:-1])
-    keep = []
-    for span in np.split(np.arange(len(time)), edges):
-        if len(span):
-            part = values[span]
-            keep += [span[0], span[int(np.argmin(part))], span[int(np.argmax(part))], span[-1]]
-    return np.unique(keep)
+    keep = set[int]()
+    for begin, end in pairwise([0, *edges.tolist(), len(time)]):
+        if begin < end:
+            part = values[begin:end]
+            keep |= {begin, begin + int(part.argmin()), begin + int(part.argmax()), end - 1}
+    return np.array(sorted(keep))
 
 
 class EventMark(NamedTuple):

@@ -174,7 +174,7 @@ def frames_of(trajectory: Trajectory) -> Frames | None:
         return None
     some = np.arange(len(known))
     if len(known) > MOST_FRAMES:
-        some = np.unique(np.searchsorted(known, np.linspace(known[0], known[-1], MOST_FRAMES)))
+        some = np.array(sorted({*np.searchsorted(known, np.linspace(known[0], known[-1], MOST_FRAMES)).tolist()}))
     time = time[some]
     deflection = None if deflection is None else deflection[some]
     row = np.searchsorted(rows, time, side="right") - 1

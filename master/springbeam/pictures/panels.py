@@ -189,7 +189,7 @@ def energies(trajectory: Trajectory) -> Panel:
     """Return the energies that are not zero throughout, stacked where none is negative but by rounding."""
     total = Look(BLACK, "total", Line(1.4, dashed=True))
     names = [*present(trajectory, ENERGIES), "e_total"]
-    rows = np.unique(np.concatenate([decimated(trajectory["time"], trajectory[name]) for name in names]))
+    rows = np.array(sorted({row for name in names for row in decimated(trajectory["time"], trajectory[name]).tolist()}))
     curves = _not_zero(_curves(trajectory, ENERGIES | {"e_total": total}, rows))
     least = min((np.min(curve.values) for curve in curves), default=0.0)
     stacked = bool(least >= -1e-9 * np.max(trajectory["e_total"]))
