@@ -6,7 +6,7 @@ Field names are those of the FMU parameters; units are SI. `springbeam.scene.rul
 
 import re
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import reduce
 from itertools import chain
@@ -104,9 +104,6 @@ class Table(BaseModel):
     #: Keys of a lower body that ``gap`` of ``[contact]`` gives.
     AT_GAP: ClassVar[tuple[str, ...]] = ()
 
-    #: Keys that follow from others: the condition on the given keys, and the values.
-    FOLLOWS: ClassVar[tuple[tuple[Callable[[set[str]], bool], dict[str, Callable[[Any], float]]], ...]] = ()
-
     @classmethod
     def ones(cls) -> dict[str, float]:
         """Return 1 for all needed keys: the dimensionless table for which exact solutions are stated."""
@@ -124,6 +121,11 @@ class Table(BaseModel):
             key for ways in cls.WAYS if name in chain(*ways) for group in ways if name not in group for key in group
         }
 
+    @classmethod
+    def following(cls, given: set[str], keys: Mapping[str, float]) -> dict[str, float]:
+        """Return the keys that follow from those that are ``given``; of ``keys`` a bad or missing value is 1."""
+        return {}
+
     @model_validator(mode="wrap")
     @classmethod
     def _completed(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
@@ -135,12 +137,9 @@ class Table(BaseModel):
         for name in data:
             if name in given and (others := given & cls.other_ways(name)):
                 raise ValueError(f"{', '.join([name, *sorted(others)])}: alternatives; leave one out")
-        # A bad value, which is reported as such, counts as 1.
+        # A bad value is reported as such.
         sane = {name: x for name, x in data.items() if isinstance(x, (int, float)) and abs(x) <= float_info.max}
-        following = [values for follow, values in cls.FOLLOWS if follow(given)]
-        follows = {
-            name: value(defaultdict(lambda: 1.0, sane)) for values in following for name, value in values.items()
-        }
+        follows = cls.following(given, defaultdict(lambda: 1.0, sane))
         if given.isdisjoint(cls.SCALES):
             follows |= {name: one for name, one in cls.ones().items() if name in cls.SCALES}
         follows = {name: value for name, value in follows.items() if name not in given}
@@ -270,35 +269,25 @@ class Beam(Table):
         ("width", "height", "diameter", "poisson_ratio", "approach_speed", "approach", "fidelity")
     )
 
-    FOLLOWS = (
-        (lambda given: "area" not in given, {"shear_coefficient": lambda k: 1.0}),  # what is missing is the section
-        (
-            lambda given: {"width", "height"} <= given,
-            {
-                "area": lambda k: k["width"] * k["height"],
-                "second_moment_of_area": lambda k: k["width"] * k["height"] * k["height"] * k["height"] / 12.0,
-                "shear_coefficient": lambda k: 5.0 / 6.0,
-            },
-        ),
-        (
-            lambda given: "diameter" in given,
-            {
-                "area": lambda k: pi * k["diameter"] * k["diameter"] / 4.0,
-                "second_moment_of_area": lambda k: (
-                    pi * k["diameter"] * k["diameter"] * k["diameter"] * k["diameter"] / 64.0
-                ),
-                "shear_coefficient": lambda k: 9.0 / 10.0,
-            },
-        ),
-        (
-            lambda given: "poisson_ratio" in given,
-            {"shear_modulus": lambda k: k["young_modulus"] / (2.0 * (abs(1.0 + k["poisson_ratio"]) or 1.0))},
-        ),
-        (
-            lambda given: "approach_speed" in given,
-            {"initial_velocity_slope": lambda k: 0.0 - k["approach_speed"] / (k["length"] or 1.0)},
-        ),
-    )
+    @classmethod
+    def following(cls, given: set[str], keys: Mapping[str, float]) -> dict[str, float]:
+        found = {}
+        if "area" not in given:  # what is missing is the section
+            found["shear_coefficient"] = 1.0
+        if {"width", "height"} <= given:
+            found["area"] = keys["width"] * keys["height"]
+            found["second_moment_of_area"] = found["area"] * keys["height"] * keys["height"] / 12.0
+            found["shear_coefficient"] = 5.0 / 6.0
+        if "diameter" in given:
+            square = keys["diameter"] * keys["diameter"]
+            found["area"] = pi * square / 4.0
+            found["second_moment_of_area"] = pi * square * square / 64.0
+            found["shear_coefficient"] = 9.0 / 10.0
+        if "poisson_ratio" in given:
+            found["shear_modulus"] = keys["young_modulus"] / (2.0 * (abs(1.0 + keys["poisson_ratio"]) or 1.0))
+        if "approach_speed" in given:
+            found["initial_velocity_slope"] = 0.0 - keys["approach_speed"] / (keys["length"] or 1.0)
+        return found
 
     @property
     def section_height(self) -> float:
