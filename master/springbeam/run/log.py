@@ -48,18 +48,13 @@ class Log:
             return
         steps, stopped = self._sound(np.frombuffer(b"".join(self.records), STEP))
         shapes = np.array(self.shapes).reshape(-1, len(SHAPE_COLUMNS))
-        finite = np.isfinite(shapes).all(axis=1)
-        wrong = shapes[~finite, 0]
-        if wrong.size and len(steps) and wrong[0] <= steps["time"][-1]:
-            steps = steps[steps["time"] <= wrong[0]]
-            stopped = RunStopped("the beam's shape is not finite", float(wrong[0]))
         last, known = (steps["time"][-1], int(steps["events"][-1])) if len(steps) else (-np.inf, 0)
         events = self.events[: max(known - self._events, 0)]
         self._events += len(events)
         self.records = []
         self.events = []
         self.shapes = []
-        self._recorder.keep(steps, events, shapes[finite & (shapes[:, 0] <= last)])
+        self._recorder.keep(steps, events, shapes[shapes[:, 0] <= last])
         if stopped is not None:
             raise stopped
 

@@ -300,5 +300,8 @@ class Master:
         if time >= state.next_shape:
             state.next_shape += every * ((time - state.next_shape) // every + 1.0)
         shape = self.pair.upper.shape()
-        if shape is not None:
-            self._log.shapes.append(np.array([time, *shape]))
+        if shape is None:
+            return
+        if not np.isfinite(shape).all():
+            raise RunStopped("the beam's shape is not finite", time)
+        self._log.shapes.append(np.array([time, *shape]))
