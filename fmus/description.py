@@ -49,6 +49,10 @@ def is_continuous_input(v: Variable) -> bool:
     return v["causality"] == "input" and not v["consumed"]
 
 
+def is_settable(v: Variable) -> bool:
+    return v["causality"] in ("parameter", "input") or v["exact"]
+
+
 def value_text(v: Variable, value: str) -> str:
     if v["type"] == "Boolean":
         return "true" if float(value) else "false"
@@ -78,7 +82,7 @@ def values(v: Variable) -> dict[str, str]:
         attributes |= {key: value_text(v, v[key]) for key in ("min", "max") if "inf" not in v[key]}
     if v["type"] == "Real" and v["nominal"] != "1":
         attributes["nominal"] = v["nominal"]
-    if v["causality"] in ("parameter", "input") or v["exact"]:
+    if is_settable(v):
         attributes["start"] = value_text(v, v["start"])
     return attributes
 
@@ -185,6 +189,10 @@ class Description:
                 }
                 ET.SubElement(listed, "Float64", derivative)
 
+    def _settable(self) -> list[str]:
+        """Return what is set before the start and acts there: an impulse acts in the first step."""
+        return [v["name"] for v in self.variables if is_settable(v) and not v["consumed"]]
+
     def _structure(self) -> None:
         structure = ET.SubElement(self.root, "ModelStructure")
         for kind in ("Output", "InitialUnknown"):
@@ -198,10 +206,9 @@ class Description:
                     unknown = ET.SubElement(parent, kind, valueReference=self._reference3(i))
                 if kind == "Output":
                     known = v["dependencies"]
-                elif v["initial_dependencies"] is not None:
-                    known = [[name, 0] for name in v["initial_dependencies"]]
                 else:
-                    continue  # which means: all
+                    names = v["initial_dependencies"]
+                    known = [[name, 0] for name in (self._settable() if names is None else names)]
                 on = {(self.number[name], order) for name, order in known if self.version == 3 or order == 0}
                 numbers = {str(j + 1) if self.version == 2 else self._reference3(j, order) for j, order in on}
                 unknown.set("dependencies", " ".join(sorted(numbers, key=int)))

@@ -53,7 +53,7 @@ struct Parameters {
   std::array<double, 4> point_force_position{0.5, 0.5, 0.5, 0.5};  ///< x/L of the point forces
 };
 
-/// What acts on the beam beside the tip force: each load has a shape in space and is a polynomial in time. The moving
+/// The loads on the beam, without the tip force: each has a shape in space and is a polynomial in time. The moving
 /// clamp's frame is not inertial: in it the beam is under the uniform load −ρA a.
 class Loads {
  public:
@@ -151,7 +151,7 @@ class Beam {
   Beam(const Beam&) = delete;
   Beam& operator=(const Beam&) = delete;
 
-  // Step sizes, forces and impulses are finite, sizes > 0: whoever takes them from outside has checked that.
+  // @pre step sizes, forces and impulses are finite, sizes > 0
 
   /// Advance by `size` [s] under the tip force C [N] and the loads.
   /// @throws std::domain_error (state unchanged) if the step is too long: a shorter one may be computed
@@ -162,8 +162,8 @@ class Beam {
   /// @throws as step()
   void apply_tip_impulse(double impulse);
 
-  /// Take C [N] and the loads' values as acting now, for tip_acceleration() and load_potential(), which otherwise refer
-  /// to the end of the last step. The motion does not depend on it.
+  /// Set the tip force C [N] and the loads that act now, for tip_acceleration() and load_potential(), which otherwise
+  /// refer to the end of the last step. The motion does not depend on it.
   void set_forces(double tip_force, const Loads& loads);
   double tip_force() const { return now_.scalars.tip_force; }  ///< that acts now
 
@@ -194,9 +194,9 @@ class Beam {
   Shape deflection() const { return space_->deflection(now_.q); }                         ///< [m]
   Shape rotation() const { return space_->rotation(now_.q); }                             ///< [rad]
 
-  /// What follows the forces that act now without delay. Internal forces are those that equilibrium asks for, of C, the
-  /// loads and the inertia between a point and the tip: there M = 0 and Q = C + the tip load, and the clamp's reaction,
-  /// −Q and −M at x = 0, balances them and the rate of momentum.
+  /// Quantities that depend without delay on the forces that act now. Internal forces are in equilibrium with C, the
+  /// loads and the inertia between a point and the tip: at the tip M = 0 and Q = C + the tip load, and the clamp's
+  /// reaction, −Q and −M at x = 0, balances them and the rate of momentum.
   struct Response {
     double tip_acceleration = 0.0;
     InternalForces forces;
@@ -249,8 +249,8 @@ class Beam {
 
   /// Makes `now_` of `start_`, but for its forces and, if book_step() does it, work.
   virtual void advance(double size, const Polynomial& tip_force, const Loads& loads) = 0;
-  /// Adds to `now_` what the last step dissipated and its loads did. Called when that is asked for or a step follows: a
-  /// step that is tried and taken back, as event location does with ever new sizes, never pays for it.
+  /// Add to `now_` the energy that the last step dissipated and the work of its loads. Called when these are read or a
+  /// step follows: a step that is tried and taken back, as in event location, does without.
   virtual void book_step() const {}
 
   Eigen::VectorXd force(Loads::Values loads, double tip_force = 0.0) const;  ///< Σ values·F

@@ -90,7 +90,7 @@ class Timoshenko final : public Discretisation {
   Eigen::MatrixXd weights_;       // (b_j, s)/h(2j+1) of the strains h κ_j, h γ_j
   Eigen::MatrixXd from_strains_;  // unknowns of an element that is clamped at its left node, by its strains
   BandFactors mass_factors_;
-  mutable std::array<Eigen::VectorXd, Loads::count> loads_;  // where one was asked for
+  mutable std::array<Eigen::VectorXd, Loads::count> loads_;  // computed at first use
 };
 
 }  // namespace beam

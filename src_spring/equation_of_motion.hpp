@@ -13,7 +13,7 @@
 
 namespace spring {
 
-/// What acts from outside over a segment, τ from its start.
+/// External loads over a segment, quadratic in the time τ since its start.
 struct Loads {
   Polynomial force;  ///< F [N]
   Polynomial tip;    ///< u_tip [m]

@@ -2,8 +2,8 @@
 // constant, for both bodies alike (action = reaction), at the value that does the work of the law:
 //     C = [Φ(δ⁺) − Φ(δ)]/(δ⁺ − δ) · [1 + χ (δ⁺ − δ)/H]₊,   δ = y − u_tip,   Φ(δ) = λ δ₊^{p+1}/(p+1)
 // (docs/coupling.md). For χ = 0 it dissipates nothing, else C (δ⁺ − δ) − [Φ(δ⁺) − Φ(δ)] ≥ 0.
-// It is sent at the step's start, before the tip arrives from there; what is known is a step older. That is enough,
-// because the beam is linear: it says how its tip would go on without a force, u + 2H w two steps ahead, and
+// It is sent at the step's start, before the tip's displacement there arrives: the last message is a step older. That
+// is enough, because the beam is linear: it predicts its tip without a force, u + 2H w two steps ahead, and
 //     u_tip⁺ = u + 2H w + C₋ r₂ + C r₁,
 // C₋ the force meanwhile, r₁ and r₂ what 1 N held over a step adds to u_tip at its end and a step later.
 #pragma once
@@ -15,7 +15,7 @@
 
 namespace spring {
 
-/// What the beam says of its tip: displacement u now [m], mean velocity w over the next two steps without a force
+/// The beam's message: displacement u of its tip now [m], mean velocity w over the next two steps without a force
 /// [m/s].
 struct TipMessage {
   double displacement = 0.0, velocity = 0.0;
@@ -28,17 +28,18 @@ class HeldContact {
   HeldContact(const Compliance& law, double mass, double size, const std::array<double, 2>& response);
 
   /// Where the top would be [m] after a step of H under a force [N] held over it; NaN if it cannot make that step. The
-  /// force that is chosen is the last it is asked for.
+  /// last call has the force that is chosen.
   using Top = std::function<double(double)>;
 
-  /// Before the first step, whenever the `arrived` message changes: choose its force, the top being at y. w then stands
-  /// for the first step's mean velocity, too. `initial`: it is of start values. A message that is unanswered() is none.
+  /// Before the first step, whenever the `arrived` message changes: choose the force of this step, the top being at y.
+  /// Its mean velocity is taken to be w, too. `initial`: the message has start values. If it is unanswered(), the force
+  /// is 0.
   void begin(const TipMessage& arrived, bool initial, double y, const Top& top);
-  /// Zeros where the start values are others: the tool has nothing to pass on yet, and as it does not pass the force on
-  /// either, that is 0 over the first step.
+  /// Zeros where the start values are not 0: the tool has not exchanged values yet, so the beam makes the first step
+  /// without a force.
   bool unanswered(const TipMessage& arrived) const;
 
-  /// A step was made under force(), at whose start the message `arrived`, and the top is at y: choose the next force.
+  /// After a step under force(), with the message that `arrived` at its start and the top at y: choose the next force.
   void advance(const TipMessage& arrived, double y, const Top& top);
 
   /// C over the next step [N]; not finite if none was found, or where the tip goes leaves the range of numbers.

@@ -1,5 +1,5 @@
-// What comes from outside. Each parameter is within its own limits, those of the table in fmus/spring/spring_fmu.cpp,
-// and inputs are finite: whoever takes them from outside has checked that.
+// Parameters and inputs. The caller has checked that each parameter is within its own limits, those of the table in
+// fmus/spring/spring_fmu.cpp, and that inputs are finite.
 #pragma once
 
 #include "polynomial.hpp"
@@ -14,7 +14,7 @@ struct Parameters {
   double damping = 0.0;           ///< α_s [N·s/m]
   double linear_stiffness = 1.0;  ///< k1 [N/m]
   double cubic_stiffness = 0.0;   ///< k2 [N/m³]
-  double unloaded = 0.0;          ///< y₀ [m], where the spring is without force
+  double unloaded = 0.0;          ///< y₀ [m], where the spring force is 0
   double displacement = 0.0;      ///< y at the start [m]
   double velocity = 0.0;          ///< ẏ at the start [m/s]
   ContactLaw contact_law = ContactLaw::external;
@@ -28,11 +28,11 @@ struct Parameters {
   double absolute_tolerance = 1e-14;
 
   bool compliant() const { return contact_law == ContactLaw::normal_compliance; }
-  /// |y − y₀| where a softening spring's potential has its hilltop, √(k1/|k2|); infinity for any other.
+  /// |y − y₀| at the maximum of a softening spring's potential, √(k1/|k2|) [m]; infinity for any other.
   double hilltop() const;
 };
 
-/// Held or polynomial over one step; τ from its start.
+/// Inputs over one step, quadratic in the time τ since its start.
 struct Inputs {
   Polynomial contact_force{};      ///< C [N], positive presses the spring down
   Polynomial foundation_force{};   ///< N ≥ 0 [N], upward; used when the stop inside is not enabled
@@ -47,7 +47,7 @@ struct Inputs {
   }
 };
 
-/// @throws std::invalid_argument naming the parameter that cannot be beside the others, its value and what is allowed
+/// @throws std::invalid_argument naming the parameter that contradicts the others, its value and what is allowed
 void check(const Parameters& parameters);
 
 }  // namespace spring

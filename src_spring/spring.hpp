@@ -1,9 +1,8 @@
 // The Duffing spring with its foundation, integrated by SUNDIALS IDA as an implicit system F(t, Y, Ẏ) = 0.
 //     m ÿ + α_s ẏ + k1 (y − y₀) + k2 (y − y₀)³ = −C + N + f_s − m a   (Ahn & Tate, eq. (6)),      up is positive.
-// y₀ is where the spring is without force, 0 in (6); a is the acceleration of the foundation, relative to which y is
-// counted. C comes from outside (contact_law external) or from the normal compliance inside, C = λ_nc δ₊^p (1 + χ δ̇)₊,
-// δ = y − u_tip;
-// N comes from outside or, with the stop enabled, from Signorini's condition (8) with restitution:
+// y₀ is where the spring force is 0, at 0 in (6); y is relative to the foundation, whose acceleration is a. C comes
+// from outside (contact_law external) or from the normal compliance inside, C = λ_nc δ₊^p (1 + χ δ̇)₊, δ = y − u_tip; N
+// comes from outside or, with the stop enabled, from Signorini's condition (8) with restitution:
 //     0 ≤ N ⊥ y − φ ≥ 0,   z⁺ = −e z⁻ at an impact. Impacts that die out end seated, y = φ, until N would be < 0.
 #pragma once
 
@@ -16,7 +15,7 @@
 
 namespace spring {
 
-/// The step could not be completed: the state is as before the step, `reached` tells how far it came.
+/// The step could not be completed: the state is as before the step, `reached` is how far it came.
 class StepFailure : public std::runtime_error {
  public:
   StepFailure(const std::string& what, double reached) : std::runtime_error(what), reached(reached) {}
@@ -49,7 +48,7 @@ class Spring {
 
   /// Take `inputs` as acting at the present instant, for acceleration(), reaction() and contact_energy() before the
   /// first step or after an input has jumped. The motion does not depend on it. `extrapolated`:
-  /// as extrapolated() then says.
+  /// the value of extrapolated() from then on.
   void observe(const Inputs& inputs, bool extrapolated = false) {
     observe(Loads::from(parameters_, inputs), extrapolated);
   }

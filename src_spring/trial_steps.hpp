@@ -1,5 +1,5 @@
-// Steps of a spring that are tried under one contact force after the other, as a held contact asks for them
-// (held_contact.hpp). The force that is found is that of the next step, whose trial is then the step.
+// Trial steps of a spring under one contact force after the other, by which a held contact finds its force
+// (held_contact.hpp). The trial under the force that is found is then the next step.
 #pragma once
 
 #include <string>
@@ -12,16 +12,16 @@ class TrialSteps {
  public:
   explicit TrialSteps(Spring& spring) : spring_(spring) {}
 
-  /// From the spring's present state, over `size` [s], under what else `inputs` say of the start of the step.
+  /// From the spring's present state, over `size` [s], under the other `inputs` at the start of the step.
   void begin(double size, const Inputs& inputs);
   /// y after a step under a contact force [N] held over it; NaN if there is no such step. The spring stays as it is.
   double displacement_under(double contact_force);
   /// Why the last step of a series could not be made; empty if all could.
   const std::string& failure() const { return failure_; }
 
-  /// Puts the spring where the last trial has ended, if that is the step which is asked for: of the same size, under
-  /// the same inputs, from the same state, and without impacts, whose times a trial does not know.
-  /// @return whether it was; if not, nothing has changed
+  /// Make the last trial the step, if it had this size, these inputs, the present state at its start, and no impacts,
+  /// whose times a trial does not know.
+  /// @return whether it did; if not, nothing has changed
   bool adopt(double size, const Inputs& inputs);
 
  private:

@@ -13,19 +13,19 @@ struct Description {
 };
 constexpr std::array<Description, Wiring::faults> descriptions{
     {{10,
-      "the tip was not where it was foreseen, so the contact gains or loses energy. Connect tip_displacement and "
+      "the tip was not where it was predicted, so the contact gains or loses energy. Connect tip_displacement and "
       "tip_velocity_forecast of the beam to the inputs of these names and reaction to its tip_force; set "
       "communication_step in both to the step size, tip_response and tip_response_2 to the beam's. Loads on the beam "
       "that change much within a step show here, too"},
      {3,
-      "the tip was not where it was foreseen, but where one step more or less takes it: exchange values between "
+      "the tip was not where it was predicted, but where it is a step later or earlier: exchange values between "
       "the steps only, for both FMUs alike (Jacobi), or delay what is exchanged within a step by one step"},
-     {3, "the tip was not where it was foreseen: tip_response and tip_response_2 are swapped"},
+     {3, "the tip was not where it was predicted: tip_response and tip_response_2 are swapped"},
      {1,
-      "no values were exchanged before the first step (or a blow hit the beam): the tip made it without a contact "
-      "force, which adds energy. Exchange values before the first step, too"},
+      "no values were exchanged before the first step (or an impulse acted on the beam): the tip made it without a "
+      "contact force, which adds energy. Exchange values before the first step, too"},
      {1,
-      "the beam's tip arrives or communication_step is set, but contact_law = 1: there is no contact. Set "
+      "values of the beam's tip arrive or communication_step is set, but contact_law = 1: there is no contact. Set "
       "contact_law = 2, or connect only contact_force"},
      {1,
       "tip_velocity_forecast arrives but is not used, as communication_step = 0: a contact that the steps do not "
@@ -35,6 +35,8 @@ constexpr std::array<Description, Wiring::faults> descriptions{
 // Parts of the tip's path in a step: what rounding leaves of it, what a load that changes within a step adds, and what
 // only a step without the contact force does.
 constexpr double rounding = 1e-6, noticeable = 0.05, most = 0.75;
+// By how much nearer the tip is to where it would be without the first force, whose prediction is a guess, too.
+constexpr double nearer = 0.5;
 // An explanation holds if it leaves no more than this part of the miss.
 constexpr double unexplained = 0.01;
 
@@ -52,7 +54,8 @@ void Wiring::check_step(const HeldContact& contact, const TipMessage& arrived) {
   const auto distance = [&arrived](double tip) { return std::abs(arrived.displacement - tip); };
   const double miss = distance(state.tip);
   if (state.steps < 2.0) {  // the first step's mean velocity was a guess
-    if (miss > most * path_) shown_[no_first_exchange] = 1;
+    const bool without_force = distance(state.tip - r1 * state.last) < nearer * miss;
+    if (miss > most * path_ && without_force) shown_[no_first_exchange] = 1;
     return;
   }
   if (miss <= rounding * path_) return;

@@ -13,7 +13,7 @@ namespace spring {
 class Wiring {
  public:
   enum Fault : std::size_t {
-    elsewhere,          ///< the tip is not where it was foreseen, by a good part of its path in a step
+    elsewhere,          ///< the tip is not where it was predicted, by a good part of its path in a step
     late,               ///< it is where it would be a step later or earlier
     swapped,            ///< it is where it would be with r₁ for r₂
     no_first_exchange,  ///< it made the first step without the contact force

@@ -189,7 +189,7 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
   return follows ? difference(of, known) : 0.0;
 }
 
-/// At the start a parameter may act in any way, and its derivative is asked for once: two models more cost little.
+/// At the start a parameter may act in any way, and its derivative is read once: two models more cost little.
 double Instance::difference(const Variable& of, unsigned known) {
   const Variable& by = table_.variables[known];
   const std::size_t place = place_[known];

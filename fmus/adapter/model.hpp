@@ -1,4 +1,4 @@
-// What the adapter asks of a model: built from parameters, stepped, saved and restored. No FMI types.
+// The interface of a model to the adapter: built from parameters, stepped, saved and restored. No FMI types.
 #pragma once
 
 #include <array>
@@ -12,13 +12,13 @@ namespace fmi {
 /// A quantity that is quadratic in time over a step: its value and its first two time derivatives at the start.
 using Polynomial = std::array<double, 3>;
 
-/// What was asked for cannot be had, and nothing has changed: becomes fmi2Discard or fmi3Discard, after which the
+/// The call cannot be carried out, and nothing has changed: becomes fmi2Discard or fmi3Discard, after which the
 /// instance goes on. So FMI 3.0 has it; an importer that follows FMI 2.0 restores a state before it repeats a step,
 /// which does no harm.
 class Discarded : public std::runtime_error {
  public:
-  /// Whether a step of another size may do. Where none does, importers are asked to end the simulation: they would ask
-  /// again and again. Those that know better change inputs or restore a state.
+  /// Whether a step of another size may do. Where none does, the importer is requested to end the simulation: it would
+  /// repeat the call again and again. Those that know better change inputs or restore a state.
   enum class Remedy { other_size, none };
 
   explicit Discarded(const std::string& what, Remedy remedy = Remedy::other_size)

@@ -27,7 +27,7 @@ enum Phase : unsigned {
 struct Progress {
   Phase phase = instantiated;
   double time = 0.0, stop_time = std::numeric_limits<double>::infinity();
-  double tolerance = 0.0;  ///< relative, asked for by the importer; 0 = none
+  double tolerance = 0.0;  ///< relative, of the importer; 0 = none
 };
 
 struct Snapshot {

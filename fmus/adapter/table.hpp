@@ -51,7 +51,7 @@ struct Variable {
   std::function<double(const Model&)> get;             ///< outputs
   std::function<double(const Model&)> derivative;      ///< outputs that know their time derivative
   std::vector<Dependency> dependencies;                ///< of an output between steps
-  /// Of an output at initialization. Where it has no list, it may depend on all that is set.
+  /// Of an output at initialization. Where it has no list, it may depend on all that is set but impulses.
   std::optional<std::vector<std::string>> initial_dependencies{std::in_place};
 
   /// Whether it is an input that is a polynomial over the step.

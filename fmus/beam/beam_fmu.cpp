@@ -44,7 +44,7 @@ struct BeamModel final : fmi::Model {
     loads.set(Loads::hat, {parameters.tip_load_coefficient, 0.0, 0.0});
     set_distributed({});
     tip_response = {};
-    if (foresees()) tip_response = beam->tip_response(parameters.communication_step);
+    if (predicts()) tip_response = beam->tip_response(parameters.communication_step);
   }
 
   void evaluate(Acting acting) override {
@@ -96,7 +96,7 @@ struct BeamModel final : fmi::Model {
     if (!derived_.line) derived_.line = Line{beam->deflection(), beam->rotation()};
     return *derived_.line;
   }
-  /// What follows forces without delay. A tool that asks for it after each step does not pay for the shape.
+  /// Quantities that depend on forces without delay. A tool that reads them after each step does not pay for the shape.
   const Beam::Response& response() const {
     if (!derived_.response) derived_.response = beam->response();
     return *derived_.response;
@@ -114,7 +114,7 @@ struct BeamModel final : fmi::Model {
 
   const Beam::Forecast& forecast() const {
     if (!derived_.forecast)
-      derived_.forecast = foresees() ? beam->forecast(parameters.communication_step) : Beam::Forecast{};
+      derived_.forecast = predicts() ? beam->forecast(parameters.communication_step) : Beam::Forecast{};
     return *derived_.forecast;
   }
   /// As the tip goes on under the tip force and the loads that are set.
@@ -126,18 +126,18 @@ struct BeamModel final : fmi::Model {
     return rate;
   }
   double forecast_per_load(std::size_t load) const {
-    return foresees() ? beam->forecast_per_load(parameters.communication_step, load).velocity : 0.0;
+    return predicts() ? beam->forecast_per_load(parameters.communication_step, load).velocity : 0.0;
   }
 
  private:
-  bool foresees() const { return parameters.communication_step > 0.0; }
+  bool predicts() const { return parameters.communication_step > 0.0; }
   Loads::Values load_rates() const {
     Loads::Values rates{};
     loads.for_each([&](std::size_t i, const fmi::Polynomial& f) { rates[i] = f[1]; });
     return rates;
   }
 
-  /// What is found where it is asked for, and kept until something changes.
+  /// Computed at first use, and kept until something changes.
   struct Derived {
     std::optional<Line> line;
     std::optional<Beam::Response> response;
@@ -223,19 +223,19 @@ fmi::Table fmi::make_table() {
         .range(0, 1);
   }
   parameter("gravity", "m/s2", &FmuParameters::gravity,
-            "acceleration of gravity g, downward: a uniform load of -density*area*g, part of distributed_load in "
-            "load_work and load_potential");
+            "gravitational acceleration g, downward: adds -density*area*g to distributed_load, also in load_work and "
+            "load_potential");
   parameter("initial_state", "", &FmuParameters::initial_state,
-            "1 = as the two slopes say, 2 = at rest under the loads and the tip force at the start")
+            "1 = given by initial_deflection_slope and initial_velocity_slope, 2 = at rest, in equilibrium with the "
+            "loads and the tip force at the start")
       .range(1, 2)
       .choice = "InitialState";
   parameter("section_height", "m", &FmuParameters::section_height,
             "height of the cross-section h, for max_bending_stress; 0 = not given")
       .at_least(0);
-  parameter(
-      "communication_step", "s", &FmuParameters::communication_step,
-      "size H of the communication steps, for a partner that foresees the tip (communication_step of the spring). "
-      "If > 0, tip_velocity_forecast, tip_response and tip_response_2 are known")
+  parameter("communication_step", "s", &FmuParameters::communication_step,
+            "size H of the communication steps, for a spring with the same communication_step, which predicts the tip. "
+            "If > 0, tip_velocity_forecast, tip_response and tip_response_2 are computed")
       .at_least(0)
       .typical(1e-3);
 
@@ -254,18 +254,18 @@ fmi::Table fmi::make_table() {
     });
   };
   load(Loads::distributed, "N/m",
-       "distributed load f_b, its part that is uniform in x, positive upward; derivatives as for tip_force");
+       "uniform part of the distributed load f_b, positive upward; derivatives as for tip_force");
   for (std::size_t i = 1; i < Loads::point; ++i) {
     load(i, "N/m",
-         "distributed load f_b, its part that grows as (x/L)^" + std::to_string(i) +
+         "part of the distributed load f_b that grows as (x/L)^" + std::to_string(i) +
              ": f_b is the sum of all four; derivatives as for tip_force");
   }
   for (std::size_t i = Loads::point; i < Loads::tip; ++i) {
     load(i, "N", "force at x = L*" + position(i - Loads::point) + ", positive upward; derivatives as for tip_force");
   }
   load(Loads::tip, "N",
-       "force on the tip, positive upward, that is a load: unlike that of tip_force its work is part of load_work; "
-       "derivatives as for tip_force");
+       "load on the tip, positive upward: its work is part of load_work, that of tip_force is not; derivatives as for "
+       "tip_force");
   load(Loads::base_acceleration, "m/s2",
        "acceleration a of the clamp, upward; all displacements are relative to it, so that it acts as a distributed "
        "load of -density*area*a; derivatives as for tip_force");
@@ -286,7 +286,7 @@ fmi::Table fmi::make_table() {
       .from({"density", "area", "length", "initial_velocity_slope", "mass_matrix", "element_degree", "n_elements",
              "initial_state"});
   add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy), of(&Beam::strain_power)).from_all();
-  add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Beam::dissipated_energy),
+  add.output("dissipated_energy", "J", "energy dissipated by the damping since the start", of(&Beam::dissipated_energy),
              of(&Beam::dissipated_power));
   add.output("load_potential", "J",
              "potential of the loads distributed_load, gravity and tip_load_coefficient, as if they were constant",
@@ -294,33 +294,37 @@ fmi::Table fmi::make_table() {
       .from_all();
   add.depends("distributed_load",
               unless_at_rest([](const BeamModel& m) { return -m.beam->load_work_per_unit(Loads::distributed); }));
-  add.output(
-      "load_work", "J",
-      "work of all loads on the beam since the start, where it is 0: distributed_load, point_force, tip_load, "
-      "base_acceleration and tip_load_coefficient, not tip_force or tip_impulse. A load that is there at the start "
-      "acts suddenly from then on, unless initial_state = 2. kinetic_energy + strain_energy + "
-      "dissipated_energy - load_work changes by the work of tip_force and tip_impulse alone",
-      of(&Beam::load_work), of(&Beam::load_power));
-  add.output("warnings", "", "steps so far that were discarded; restored states do not take it back",
+  add.output("load_work", "J",
+             "work of all loads on the beam since the start: distributed_load, point_force, tip_load, "
+             "base_acceleration and tip_load_coefficient, not tip_force or tip_impulse. A load that is present at the "
+             "start is applied suddenly, unless initial_state = 2. kinetic_energy + strain_energy + "
+             "dissipated_energy - load_work changes by the work of tip_force and tip_impulse alone",
+             of(&Beam::load_work), of(&Beam::load_power));
+  add.output("warnings", "", "number of discarded steps; restoring a state does not lower it",
              [](const BeamModel& m) { return m.refused; })
       .steps_only();
-  add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam", of(&Beam::tip_mass))
+  add.output("tip_mass", "kg",
+             "effective mass of the tip, 1/(e'M^-1 e) of the discrete beam: an impulse J on the tip changes "
+             "tip_velocity by J/tip_mass",
+             of(&Beam::tip_mass))
       .from({"density", "area", "second_moment_of_area", "young_modulus", "shear_modulus", "length",
              "shear_coefficient", "n_elements", "element_degree", "n_modes", "reduced_integration", "integrator",
              "mass_matrix"});
   add.output(
          "tip_velocity_forecast", "m/s",
-         "mean velocity of the tip over the next two steps of communication_step were there no tip_force; 0 if that is "
-         "0",
+         "predicted mean velocity of the tip over the next two steps of size communication_step without a tip_force; 0 "
+         "if communication_step = 0",
          [](const BeamModel& m) { return m.forecast().velocity; }, [](const BeamModel& m) { return m.forecast_rate(); })
       .from_all();
   for (std::size_t i = 0; i < load_names.size(); ++i) {
     add.depends(load_names[i], unless_at_rest([i](const BeamModel& m) { return m.forecast_per_load(i); }));
   }
   add.local("tip_response", "m/N",
-            "what 1 N held over one communication_step adds to tip_displacement at its end; 0 if that is 0",
+            "change of tip_displacement at the end of a step of size communication_step, per newton of constant tip "
+            "force in that step; 0 if communication_step = 0",
             [](const BeamModel& m) { return m.tip_response[0]; });
-  add.local("tip_response_2", "m/N", "the same at the end of the step after, without a force meanwhile",
+  add.local("tip_response_2", "m/N",
+            "as tip_response, but at the end of the following step, in which no tip force acts",
             [](const BeamModel& m) { return m.tip_response[1]; });
   // What follows forces without delay, as linear functions of the response.
   const auto instant = [&](const char* name, const char* unit, const char* text, auto of_response) {
@@ -357,7 +361,7 @@ fmi::Table fmi::make_table() {
   shape("rotation", "rad", "rotation of the cross-section", [](M m) -> S { return m.line().rotation; });
   shape("bending_moment", "N.m", "bending moment, positive where it bends the beam upwards",
         [](M m) -> S { return m.response().forces.moment; });
-  shape("shear_force", "N", "shear force, upward on the part before it",
+  shape("shear_force", "N", "shear force of the part beyond the point on the part before it, positive upward",
         [](M m) -> S { return m.response().forces.shear; });
   return t;
 }

@@ -29,9 +29,9 @@ fmi::Table fmi::make_table() {
   t.step_size = 1e-3;
   t.ends_steps_early = true;
   t.choices.push_back({"ContactLaw",
-                       "where the contact force comes from",
+                       "source of the contact force",
                        {"external, the input contact_force",
-                        "normal_compliance, computed inside from tip_displacement and tip_velocity"}});
+                        "normal_compliance, computed here from tip_displacement and tip_velocity"}});
 
   fmi::TableBuilder<SpringModel> add(t);
   const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {
@@ -40,16 +40,17 @@ fmi::Table fmi::make_table() {
   parameter("mass", "kg", &Parameters::mass, "mass m").positive();
   parameter("damping", "N.s/m", &Parameters::damping, "viscous damping alpha_s").at_least(0);
   parameter("linear_stiffness", "N/m", &Parameters::linear_stiffness, "linear stiffness k1");
-  parameter("cubic_stiffness", "N/m3", &Parameters::cubic_stiffness, "cubic stiffness k2; < 0 softens");
+  parameter("cubic_stiffness", "N/m3", &Parameters::cubic_stiffness,
+            "cubic stiffness k2; negative for a softening spring");
   parameter("unloaded", "m", &Parameters::unloaded,
-            "position of the top where the spring is without force: the force is k1 x + k2 x^3, x = y - unloaded");
-  parameter(
-      "equilibrium", "m", &FmuParameters::equilibrium,
-      "position Psi of the top at the start, for whoever reads the parameters: the motion begins at the start value of "
-      "displacement, and the spring is without force at unloaded");
+            "position of the top at which the spring force is 0: the force is k1 x + k2 x^3 with x = y - unloaded");
+  parameter("equilibrium", "m", &FmuParameters::equilibrium,
+            "rest position Psi of the top, for information only: the motion begins at the start value of displacement, "
+            "and the spring force is 0 at unloaded");
   parameter("gravity", "m/s2", &FmuParameters::gravity,
-            "acceleration of gravity g, downward: a force of -mass*g, part of external_force in load_work");
-  parameter("contact_law", "", &Parameters::contact_law, "1 = external, 2 = normal compliance inside")
+            "gravitational acceleration g, downward: adds the force -mass*g, whose work is part of load_work");
+  parameter("contact_law", "", &Parameters::contact_law,
+            "1 = external (input contact_force), 2 = normal compliance, computed by this FMU")
       .range(1, 2)
       .choice = "ContactLaw";
   parameter("compliance_stiffness", "", &Parameters::compliance_stiffness,
@@ -57,21 +58,21 @@ fmi::Table fmi::make_table() {
       .at_least(0)
       .typical(1e4);
   parameter("compliance_exponent", "", &Parameters::compliance_exponent, "exponent p in the contact law").range(1, 100);
-  parameter("compliance_damping", "s/m", &Parameters::compliance_damping,
-            "damping chi of the contact law (Hunt and Crossley); what it takes is in dissipated_energy")
-      .at_least(0);
   parameter(
-      "communication_step", "s", &FmuParameters::communication_step,
-      "for contact_law = 2 beside a beam with the same communication_step: size of all communication steps. If > 0, "
-      "reaction is held over each step at the value that does the law's work, the tip being foreseen: no energy is "
-      "gained at any step size. 0: the law under the extrapolated tip")
+      "compliance_damping", "s/m", &Parameters::compliance_damping,
+      "damping chi of the contact law (Hunt and Crossley); the energy that it dissipates is part of dissipated_energy")
+      .at_least(0);
+  parameter("communication_step", "s", &FmuParameters::communication_step,
+            "size of all communication steps, for contact_law = 2 and a beam with the same communication_step. If > 0, "
+            "the tip is predicted, and reaction is constant over each step at the value that does the work of the "
+            "contact law: no step size adds energy. If 0, the contact law acts with the extrapolated tip")
       .at_least(0)
       .typical(1e-3);
   parameter("tip_response", "m/N", &FmuParameters::tip_response, "for communication_step > 0: tip_response of the beam")
       .at_least(0);
   parameter("tip_response_2", "m/N", &FmuParameters::tip_response_2,
             "for communication_step > 0: tip_response_2 of the beam");
-  parameter("stop_enabled", "", &Parameters::stop_enabled, "foundation inside, with impacts");
+  parameter("stop_enabled", "", &Parameters::stop_enabled, "whether this FMU has the rigid foundation, with impacts");
   parameter("stop_position", "m", &Parameters::stop_position, "position phi of the foundation");
   parameter("restitution", "", &Parameters::restitution, "coefficient of restitution at the foundation").range(0, 1);
   parameter("relative_tolerance", "", &Parameters::relative_tolerance,
@@ -98,14 +99,14 @@ fmi::Table fmi::make_table() {
         "acceleration a of the foundation, upward; all displacements are relative to it, so that it acts as a force of "
         "-mass*a; derivatives as for contact_force");
   add.input("tip_displacement", "m",
-            "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its derivatives or "
-            "else by tip_velocity",
+            "displacement of the beam's tip, used when contact_law = 2; extrapolated over the step with its "
+            "derivatives or, where the first is 0, with tip_velocity",
             [](SpringModel& m, const fmi::Polynomial& value) {
               m.tip_displacement = value;
               m.tip_is_set = true;
             });
   add.input("tip_velocity", "m/s",
-            "velocity of the beam's tip, read by contact_law = 2 where the derivative of tip_displacement is 0; its "
+            "velocity of the beam's tip, used when contact_law = 2 and the derivative of tip_displacement is 0; its "
             "derivative of order 1 is the tip's acceleration, that of order 2 is not used",
             [](SpringModel& m, const fmi::Polynomial& value) {
               m.tip_velocity = value;
@@ -121,7 +122,7 @@ fmi::Table fmi::make_table() {
   add.exact_start(&SpringModel::parameters, &FmuParameters::velocity);
   const std::vector<std::string> motion{"contact_law", "compliance_stiffness", "compliance_exponent",
                                         "compliance_damping", "displacement", "tip_displacement", "tip_velocity",
-                                        // with communication_step > 0, of which the first is foreseen:
+                                        // with communication_step > 0, of which the first is predicted:
                                         "communication_step", "tip_response", "tip_velocity_forecast", "velocity",
                                         "mass", "damping", "linear_stiffness", "cubic_stiffness", "unloaded",
                                         "external_force", "base_acceleration", "foundation_force", "stop_enabled",
@@ -132,7 +133,7 @@ fmi::Table fmi::make_table() {
   add.output("displacement_integral_2", "m.s2", "double integral of displacement over the last step",
              of(&Spring::displacement_integral_2), of(&Spring::displacement_integral));
   add.output(
-         "reaction", "N", "contact force of the law inside, 0 when contact_law = 1",
+         "reaction", "N", "contact force computed by this FMU; 0 when contact_law = 1",
          [](const SpringModel& m) { return m.reaction(); }, [](const SpringModel& m) { return m.reaction_rate(); })
       .from(motion);
   // What changes force and contact force at once: by an input, or by its derivative of that order.
@@ -160,13 +161,14 @@ fmi::Table fmi::make_table() {
     add.depends(name, [by = partial](M m) { return -m.mobility() * by(m); }, order);
   for (const auto& [name, partial, order] : loads)
     add.depends(name, [=, by = partial](M m) { return m.mobility() * by(m) * (1.0 - by_held(m)); });
-  add.output("seated", "", "1 while the top rests on the foundation inside, otherwise 0", of(&Spring::seated))
+  add.output("seated", "", "1 while the top rests on the foundation, otherwise 0", of(&Spring::seated)).steps_only();
+  add.output("number_of_impacts", "", "number of impacts on the foundation since the start", of(&Spring::impacts))
       .steps_only();
-  add.output("number_of_impacts", "", "impacts on the foundation inside since the start", of(&Spring::impacts))
-      .steps_only();
-  add.output("last_impact_time", "s", "time of the last of them; -1 if there was none", of(&Spring::last_impact));
-  add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
-  add.output("stop_impulse", "N.s", "sum of the foundation's impulses over the last step", of(&Spring::stop_impulse));
+  add.output("last_impact_time", "s", "time of the last impact; -1 if there was none", of(&Spring::last_impact));
+  add.output("stop_force", "N", "mean force of the foundation on the top over the last step, without impacts",
+             of(&Spring::stop_force));
+  add.output("stop_impulse", "N.s", "sum of the impulses of the foundation on the top over the last step",
+             of(&Spring::stop_impulse));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy),
              [](M m) { return m.kinetic_power(); })
       .from({"mass", "velocity"});
@@ -174,24 +176,22 @@ fmi::Table fmi::make_table() {
              [](M m) { return m.potential_power(); })
       .from({"linear_stiffness", "cubic_stiffness", "unloaded", "displacement"});
   add.output(
-         "contact_energy", "J", "energy stored in the contact law inside", [](M m) { return m.contact_energy(); },
+         "contact_energy", "J", "energy stored in the contact", [](M m) { return m.contact_energy(); },
          [](M m) { return m.contact_power(); })
       .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement"});
   add.depends("tip_displacement", [](M m) { return m.contact_energy_by_tip_displacement(); });
   add.output(
-      "dissipated_energy", "J", "work of the damping force and of the contact's damping since the start",
+      "dissipated_energy", "J", "energy dissipated since the start by the damping of the spring and of the contact",
       [](M m) { return m.dissipated_energy(); }, [](M m) { return m.dissipated_power(); });
   add.output("load_work", "J",
-             "work of external_force and base_acceleration since the start, where it is 0, impacts and rest on the "
-             "foundation inside included",
+             "work of external_force, gravity and base_acceleration since the start, also across impacts and while the "
+             "top rests on the foundation",
              of(&Spring::load_work), [](M m) { return m.load_power(); });
-  add.local("impact_loss", "J", "energy lost in impacts on the foundation inside since the start",
-            of(&Spring::impact_loss));
-  add.output(
-         "warnings", "",
-         "steps so far in which something was missed or refused: the wiring is wrong, or a step was discarded. Many "
-         "tools hide the messages that say what; restored states do not take it back",
-         [](M m) { return m.warnings(); })
+  add.local("impact_loss", "J", "energy lost in impacts on the foundation since the start", of(&Spring::impact_loss));
+  add.output("warnings", "",
+             "number of steps with a warning: the FMUs are connected wrongly, or a step was discarded. Many tools hide "
+             "the messages that say which; restoring a state does not lower the number",
+             [](M m) { return m.warnings(); })
       .steps_only();
   add.local("internal_steps", "",
             "internal steps since the start: parts with a Taylor series of their own, and steps of IDA",

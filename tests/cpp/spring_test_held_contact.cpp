@@ -48,9 +48,9 @@ struct Collision {
   Collision(const Compliance& law, double gap, double H)
       : tip{m_tip, gap, v}, top{m_top, 0.0, 0.0}, H(H), contact(law, m_top, H, response(m_tip, H)) {
     seen = {tip.x, tip.v};
-    contact.begin(seen, true, top.x, foresee());
+    contact.begin(seen, true, top.x, predict());
   }
-  HeldContact::Top foresee() const {
+  HeldContact::Top predict() const {
     return [top = top, H = H](double force) mutable {
       FreeMass trial = top;
       trial.step(H, -force);
@@ -61,7 +61,7 @@ struct Collision {
     const double force = contact.force();
     tip.step(H, force);
     top.step(H, -force);
-    contact.advance(seen, top.x, foresee());
+    contact.advance(seen, top.x, predict());
     seen = {tip.x, tip.v};  // a free mass has the velocity ahead that it has now
   }
   double energy() const {
@@ -152,7 +152,7 @@ TEST(HeldContact, ZerosBeforeTheFirstStepAreNoMessage) {
   Collision told(Compliance(1e6, 1.5), 0.0, H);
   EXPECT_GT(told.contact.force(), 0.0);
   Collision untold = told;
-  untold.contact.begin({0.0, 0.0}, false, 0.0, untold.foresee());
+  untold.contact.begin({0.0, 0.0}, false, 0.0, untold.predict());
   EXPECT_TRUE(untold.contact.unanswered({0.0, 0.0}));
   EXPECT_FALSE(untold.contact.unanswered(told.seen));
   untold.seen = {0.0, 0.0};
@@ -179,7 +179,7 @@ TEST(HeldContact, EnergyIsConservedThroughImpactsOfTheTop) {
   p.stop_position = -2e-4;
   spring::Spring top(p);
   FreeMass tip{m_tip, 0.0, v};
-  const auto foresee = [&] {
+  const auto predict = [&] {
     const spring::Spring::State state = top.state();
     return [&top, state, H](double force) {
       spring::Inputs inputs;
@@ -194,7 +194,7 @@ TEST(HeldContact, EnergyIsConservedThroughImpactsOfTheTop) {
   const double g = 5.0;  // presses the tip down: it comes again and again
   const auto ahead = [&] { return TipMessage{tip.x, tip.v - g * H}; };  // u(t+2H) = u + 2H (v − gH)
   TipMessage seen = ahead();
-  contact.begin(seen, true, 0.0, foresee());
+  contact.begin(seen, true, 0.0, predict());
   double before = 0.0, impulses = 0.0;
   for (int i = 0; i < 100; ++i) {
     spring::Inputs inputs;
@@ -204,11 +204,11 @@ TEST(HeldContact, EnergyIsConservedThroughImpactsOfTheTop) {
     tip.x -= g * H * H / 2;
     top.step(H, inputs);
     impulses += top.stop_impulse();
-    contact.advance(seen, top.displacement(), foresee());
+    contact.advance(seen, top.displacement(), predict());
     seen = ahead();
     const double energy = 0.5 * tip.mass * tip.v * tip.v + tip.mass * g * tip.x + top.kinetic_energy() +
                           top.potential_energy() + contact.energy(top.displacement());
-    if (i == 1) before = energy;  // the first step is foreseen by the mean velocity over two
+    if (i == 1) before = energy;  // the first step is predicted by the mean velocity over two
     if (i > 1) {
       EXPECT_NEAR(energy, before, 1e-11 * 0.5 * m_tip * v * v) << i;
     }
@@ -225,7 +225,7 @@ TEST(HeldContact, WhereTheTopGoesMayBeUnknown) {
   Collision limited(Compliance(1e6, 1.5), 0.5, 1e-3);
   EXPECT_EQ(limited.contact.force(), 0.0);
   limited.contact.begin(c.seen, true, 0.0,
-                        [top = c.foresee(), force](double C) { return C > 1.01 * force ? unknown : top(C); });
+                        [top = c.predict(), force](double C) { return C > 1.01 * force ? unknown : top(C); });
   EXPECT_NEAR(limited.contact.force(), force, 1e-12 * force);
   c.contact.advance(c.seen, c.top.x, [](double) { return unknown; });
   EXPECT_FALSE(std::isfinite(c.contact.force()));
@@ -241,7 +241,7 @@ TEST(HeldContact, AForceTakesTwoTrials) {
     c.tip.step(c.H, force);
     c.top.step(c.H, -force);
     trials = 0;
-    c.contact.advance(c.seen, c.top.x, [&trials, top = c.foresee()](double C) {
+    c.contact.advance(c.seen, c.top.x, [&trials, top = c.predict()](double C) {
       ++trials;
       return top(C);
     });
@@ -261,7 +261,7 @@ TEST(HeldContact, EnergyIsConservedOnAStiffSpring) {
     spring::Spring top(p);
     const TipMessage seen{1e-4, 0.0};
     long trials = 0;
-    const auto foresee = [&] {
+    const auto predict = [&] {
       const spring::Spring::State state = top.state();
       return [&top, &trials, state, H](double force) {
         ++trials;
@@ -277,14 +277,14 @@ TEST(HeldContact, EnergyIsConservedOnAStiffSpring) {
     const auto energy = [&] {
       return top.kinetic_energy() + top.potential_energy() + contact.energy(top.displacement());
     };
-    contact.begin(seen, true, top.displacement(), foresee());
+    contact.begin(seen, true, top.displacement(), predict());
     const double before = energy();
     const int steps = omegaH < 10.0 ? 100 : 10;
     for (int i = 0; i < steps; ++i) {
       spring::Inputs inputs;
       inputs.contact_force[0] = contact.force();
       top.step(H, inputs);
-      contact.advance(seen, top.displacement(), foresee());
+      contact.advance(seen, top.displacement(), predict());
       EXPECT_NEAR(energy(), before, 1e-7 * before) << omegaH;  // IDA's over 100 … 1000 rad
     }
     EXPECT_LT(trials, 9 * (steps + 1)) << omegaH;
@@ -294,10 +294,10 @@ TEST(HeldContact, EnergyIsConservedOnAStiffSpring) {
 TEST(HeldContact, AForceOutOfRangeIsNoForce) {
   Collision c(Compliance(1e6, 1.5), 0.0, 1e-3);
   const double force = c.contact.force();
-  c.contact.begin({-1e300, 0.0}, true, 0.0, c.foresee());
+  c.contact.begin({-1e300, 0.0}, true, 0.0, c.predict());
   EXPECT_FALSE(std::isfinite(c.contact.force()));
   const auto state = c.contact.state();
-  c.contact.begin(c.seen, true, 0.0, c.foresee());
+  c.contact.begin(c.seen, true, 0.0, c.predict());
   EXPECT_NEAR(c.contact.force(), force, 1e-12 * force);
   c.contact.restore(state);
   EXPECT_EQ(numbers(c.contact.state()), numbers(state));
@@ -305,7 +305,7 @@ TEST(HeldContact, AForceOutOfRangeIsNoForce) {
 
 TEST(HeldContact, ATipThatLeavesTheRangeIsNoForce) {
   Collision c(Compliance(1e6, 1.5), 0.0, 1e3);
-  c.contact.begin({1e300, 1e306}, true, 0.0, c.foresee());
+  c.contact.begin({1e300, 1e306}, true, 0.0, c.predict());
   EXPECT_FALSE(std::isfinite(c.contact.force()));
 }
 

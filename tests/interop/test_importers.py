@@ -94,7 +94,7 @@ class System:
             difference = np.abs(rows - self._of_master[:n]).max()
             print(f"error {error:.3e} m, from springbeam run {difference:.3e} m")
             assert error < 1.1 * np.abs(self._of_master - self._reference).max()
-            assert difference < 4e-5  # the first step, whose tip is foreseen by its mean velocity over two
+            assert difference < 4e-5  # the first step, whose tip is predicted by its mean velocity over two
 
     def by_hand(self):
         """Return the output at every step: FMUs stepped, and exchanged by hand the way these importers do."""
@@ -297,7 +297,7 @@ def test_java(system, java, importer):
         *(f"{name}={str(value).lower() if isinstance(value, bool) else value}" for name, value in values.items()),
         *(f"{start}>{end}" for start, end in system.connections),
     )
-    # The spring alone warns that its tip is not where it was foreseen; FMI4j prints that in between.
+    # The spring alone warns that its tip is not where it was predicted; FMI4j prints that in between.
     (rows,) = (line.removeprefix("ROWS ") for line in output.splitlines() if line.startswith("ROWS "))
     system.check(np.array(rows.split(), dtype=float))
 
