@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 from .results import recording, totals
 from .results.files import load_trajectory as load
 from .results.trajectory import Trajectory
-from .run.accuracy import simulate
 from .run.outcome import RunStopped
 from .run.runner import Simulation
+from .studies.accuracy import simulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

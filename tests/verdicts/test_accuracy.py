@@ -14,11 +14,11 @@ from springbeam import RunStopped, SceneError, load_scene, with_changes
 from springbeam.results.distance import Distance, distance
 from springbeam.results.files import load_trajectory
 from springbeam.results.recording import MemoryRecorder
-from springbeam.run import accuracy as search
-from springbeam.run.accuracy import simulate
 from springbeam.run.runner import run
 from springbeam.scene import as_scene
 from springbeam.scene.files import tomllib
+from springbeam.studies import accuracy as search
+from springbeam.studies.accuracy import simulate
 from springbeam.studies.crosscheck import orders
 from springbeam.studies.stability.judge import ERRORS, Reference, judge
 

@@ -111,8 +111,8 @@ def picked(scene: Scene, *, silent: bool) -> Trajectory | None:
     """Return the run with the accuracy of the scene; ``None`` if the scene has none."""
     if scene.accuracy is None:
         return None
-    from ..run.accuracy import pick
     from ..run.outcome import RunStopped
+    from ..studies.accuracy import pick
 
     try:
         with progress_of_run(scene.time.t_end, "pilot runs", silent=silent) as show:

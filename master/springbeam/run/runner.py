@@ -239,7 +239,7 @@ def _refuse_accuracy(scene: Scene) -> None:
     if scene.accuracy is not None:
         raise SceneError(
             f"accuracy = {scene.accuracy:g}: is kept by settings that pilot runs pick, and a body of your own can be "
-            "run once; run springbeam.run.accuracy.pick(scene).scene, or give coupling.scheme, degree and "
+            "run once; run springbeam.studies.accuracy.pick(scene).scene, or give coupling.scheme, degree and "
             "macro_step instead"
         )
 

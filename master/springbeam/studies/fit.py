@@ -18,12 +18,12 @@ import numpy as np
 from rich.text import Text
 from scipy.special import chdtri, fdtri, stdtrit
 
-from ..run.accuracy import simulate
 from ..run.outcome import RunStopped
 from ..scene import ArgumentError, Scene, SceneError, key_kind, with_changes
 from ..scene.scene import split_key
 from ..scene.tables import TOLERANCE_KEYS
 from ..signals.measured import ALIKE, EQUAL, Measured, aligned, correlated, read_measured, reading_of
+from .accuracy import simulate
 from .design import parse_axis, with_keys
 from .least import SHIFT, Minimum, Search
 from .study import Make, Study

@@ -28,9 +28,9 @@ from pydantic_core import from_json, to_json
 
 from ..bodies.factory import fingerprints
 from ..results.directory import ResultsExist, ResultsUnreadable, RunDirectory, lock
-from ..run.accuracy import simulate
 from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, load_scene
+from .accuracy import simulate
 from .engine import Measure, Report, lost, record_all
 from .metrics import Metric, costs
 from .tables import Findings, Row

@@ -37,8 +37,9 @@ def strokes(interface: Interface, steps: StepRecords, events: Sequence[Event]) -
         else:
             gained = (steps.ends["z"] - steps.before["z_after"]) / steps.size
             changed = e * gained[at] + np.append(gained, 0.0)[at + 1]
-        turns[at] = np.divide(changed, speed, out=np.zeros(len(at)), where=speed != 0.0)
-        most[at] = (1.0 + e) * np.abs(speed)
+        # Several may be at one time.
+        np.add.at(turns, at, np.divide(changed, speed, out=np.zeros(len(at)), where=speed != 0.0))
+        np.add.at(most, at, (1.0 + e) * np.abs(speed))
     return Strokes(share, turns, most)
 
 

@@ -12,13 +12,13 @@ from ...bodies.protocol import FmuError
 from ...monolithic import event_driven
 from ...results.distance import distance
 from ...results.trajectory import Trajectory
-from ...run.accuracy import pick
 from ...run.ledger import EXACT, bounds
 from ...run.outcome import RunStopped
 from ...run.resolution import MESH_DECIDES
 from ...run.runner import Simulation
 from ...scene import Scene, SceneError
 from ...scene.suspicions import suspicions
+from ..accuracy import pick
 from ..comparison import perturbed
 from ..tables import Row
 

@@ -20,14 +20,14 @@ from ..bodies.protocol import Body
 from ..results.dense import at
 from ..results.distance import distance
 from ..results.trajectory import Trajectory
+from ..run import runner
+from ..run.ledger import CHANGED
+from ..run.outcome import Progress, RunStopped
+from ..run.resolution import LAW_MISSED, NOT_RESOLVED
+from ..run.setup import Setup, set_up
 from ..scene import Scene, SceneError, as_scene, with_changes
 from ..scene.frequencies import DIES_OUT
 from ..scene.laws import stiffest
-from . import runner
-from .ledger import CHANGED
-from .outcome import Progress, RunStopped
-from .resolution import LAW_MISSED, NOT_RESOLVED
-from .setup import Setup, set_up
 
 #: Fewest and most macro steps of a run.
 _FEWEST, _MOST = 8.0, 50_000
