@@ -64,7 +64,7 @@ def test_steps_are_halved_until_the_estimate_of_each_error_does(name, monkeypatc
     given = itertools.chain(apart, itertools.repeat(apart[-1]))  # as far from the coarser run once more
     sizes = []
 
-    def made(prepared):
+    def made(prepared, progress):
         sizes.append(prepared.coupling.H)
         if len(sizes) == 3 and {} in apart:
             next(given)
@@ -87,7 +87,7 @@ def test_a_pilot_that_stopped_early_is_not_returned_however_near_it_is(monkeypat
     whole = simulate(with_changes(scene, accuracy=None, coupling={"macro_step": 0.01}))
     sizes = []
 
-    def made(prepared):
+    def made(prepared, progress):
         sizes.append(prepared.coupling.macro_step)
         if sizes[-1] < sizes[0]:
             return replace(whole, scene=prepared)
