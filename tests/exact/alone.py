@@ -6,20 +6,18 @@ The beam has ρA = ρI = L = 1, EI = KAG = κ, unless a function says otherwise;
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise, product
-from math import cos, pi, sqrt
+from math import pi
 from typing import Any
 
 import numpy as np
-from scipy.linalg import expm, hankel, svd
+from scipy.linalg import expm
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from springbeam.bodies.fmu_bodies import FmuBeam
-from springbeam.bodies.protocol import NO_FORCE, StepRefused
+from springbeam.bodies.protocol import StepRefused
 from springbeam.run.outcome import RunStopped
 from springbeam.run.runner import run_in_memory
 from springbeam.scene import Beam, Spring, scene_from_dict
@@ -86,8 +84,6 @@ def section(title, *cases):
 
 # -- each FMU alone --------------------------------------------------------------------------------------------------
 
-#: Half the rows in which frequencies are looked for, and what of them is rounding.
-_SAMPLES, _ROUNDING = 300, 1e-11
 _VARIANTS = {
     "full, all modes": {},
     "full, 1 mode": {"n_modes": 1},
@@ -120,23 +116,6 @@ def static_deflection(kag, variant):
     yield Check(name, share, deflection / true, (2 * n) ** 2 * EPS * share, reason)
 
 
-def _bar(unknowns, mass_matrix, dispersed):
-    """Return a case of `frequencies`: a bar of c = 1 (θ kept at rest by a huge ρI) on linear elements.
-
-    ``dispersed`` is the ω h of a wave that turns by kh over h; k = (j − ½)π.
-    """
-    n, mesh = unknowns // 2, {"n_elements": unknowns // 2, "mass_matrix": mass_matrix}
-    exact = {j: n * dispersed((j - 0.5) * pi / n) for j in (1, 3, 6)}
-    return f"bar, {mass_matrix} mass", {**mesh, "second_moment_of_area": 1e14, "young_modulus": 1e3}, 0.1, exact
-
-
-def _stiff(kappa):
-    """Return a case of `frequencies`: EI = KAG = κ on 8 elements of degree 8, exact to rounding."""
-    exact = {i: sqrt(kappa) * w for i, w in enumerate(clamped_free_frequencies()[:6], 1)}
-    mesh = {"n_elements": 8, "element_degree": 8, "young_modulus": kappa, "shear_modulus": kappa}
-    return f"κ = {kappa:g}", mesh, 0.1 / sqrt(kappa), exact
-
-
 @lru_cache(maxsize=1)
 def clamped_free_frequencies():
     """Return those up to 30 rad/s of EI = KAG = ρA = ρI = L = 1: zeros of det X, X of `free_end`."""
@@ -167,42 +146,6 @@ def transfer_rate(w, softer=1.0):
     θ' = M/EI,  M' = −Q − ρI ω² θ,  u' = Q/KAG + θ,  Q' = −ρA ω² u; EI = KAG = 1/``softer``, ρA = ρI = 1.
     """
     return np.array([[0, softer, 0, 0], [-w * w, 0, 0, -1], [1, 0, 0, softer], [0, 0, -w * w, 0]])
-
-
-def _measured_frequencies(beam, size):
-    """Return the frequencies [rad/s] in the tip's velocity after an impulse, from rows at steps of ``size`` [s].
-
-    By ESPRIT (Roy & Kailath 1989): shifted by a row, the space that the rows span turns by the angles ωH.
-    """
-    with closing(FmuBeam(beam, 0.0, 0.0)) as body:
-        body.apply_impulse(1.0)
-        velocity = [body.motion().velocity]
-        for step in range(2 * _SAMPLES):
-            body.advance(step * size, size, NO_FORCE)
-            velocity.append(body.motion().velocity)
-    vectors, shares, _ = svd(hankel(velocity[:_SAMPLES], velocity[_SAMPLES - 1 :]))
-    space = vectors[:, shares > _ROUNDING * shares[0]]
-    turns = np.linalg.eigvals(np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0])
-    return np.asarray(np.abs(np.angle(turns)) / size)
-
-
-@section(
-    "Beam: clamped–free frequencies, from the motion of the tip",
-    *(_stiff(kappa) for kappa in (1.0, 3.6e10)),
-    _bar(100, "consistent", lambda kh: sqrt(6.0 * (1.0 - cos(kh)) / (2.0 + cos(kh)))),
-    _bar(100, "averaged", lambda kh: sqrt(12.0 * (1.0 - cos(kh)) / (5.0 + cos(kh)))),
-)
-def frequencies(name, beam, size, exact):
-    """Clamped–free frequencies of the beam, and of a bar, whose waves the mesh disperses.
-
-    Consistent mass: ω h/c = √(6(1 − cos kh)/(2 + cos kh)), too fast by (kh)²/24 of it; averaged mass:
-    √(12(1 − cos kh)/(5 + cos kh)), too slow by (kh)⁴/480.
-    """
-    mesh = Beam.with_ones(n_modes=6, **beam)
-    measured = _measured_frequencies(mesh, size)
-    for i, w in exact.items():
-        nearest = float(measured[np.argmin(np.abs(measured - w))])
-        yield Check(f"{name}: ω{i} [rad/s]", w, nearest, mesh.unknowns**2 * EPS * w, "rounding: ε N², N unknowns")
 
 
 IDA = "IDA: BDF of order ≤ 5 takes some ε^(−1/6) internal steps a radian, each of error ε: ωT·ε^(5/6)"

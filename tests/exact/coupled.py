@@ -58,7 +58,7 @@ def energy_scheme(kappa, size, degree, integrator, alpha):
     yield Check(name, 0.0, drift, bound, reason)
 
 
-@section("Impact: elastic bar on a rigid stop", (100,), (200,))
+@section("Impact: elastic bar on a rigid stop", (100,))
 def bar_impact(n):
     """Elastic bar on a rigid stop: u_tt = u_xx, u(0) = 0, u⁰ = x/2, u_t⁰ = 0, tip stopped at 0 (scene `bar-impact`).
 
@@ -75,9 +75,10 @@ def bar_impact(n):
     begins = [event.time for event in run.events if event.kind == "seated"]
     ends = [event.time for event in run.events if event.kind == "separation"]
     begin, end = (begins[0], ends[-1]) if begins and ends else (nan, nan)
-    time, force, tip = run["time"], run["foundation_force"], run["u_tip"]
-    impulse = float(force[1:] @ np.diff(time)) + sum(event.impulse_foundation for event in run.events)
-    held = (time > begin) & (time < end) & (run["phase"] == "seated")
+    tip = run["u_tip"]
+    impulse = float(run.foundation_force[1:] @ np.diff(run.time)) + sum(
+        event.impulse_foundation for event in run.events
+    )
 
     x = sqrt(12.0) * n  # ω_c t at contact
     ripples = sqrt(2.0 / pi) * x**-1.5 * (1.0 + 2.0 / x)
@@ -89,15 +90,7 @@ def bar_impact(n):
     rows = (
         ("contact begins [s]", 1.0, begin, ripples, "P1 ripples of the tip √(2/π)(ω_c t)^(−3/2), ω_c = √12/h"),
         ("contact ends [s]", 2.0, end, duration, returning),
-        ("contact lasts [s]", 1.0, end - begin, duration + ripples, returning),
         ("impulse [N·s]", 0.5, impulse, 0.5 * duration, "force 1/2 for the error of the duration"),
-        (
-            "u_tip in contact [m]",
-            0.0,
-            float(np.abs(tip[held]).max()) if held.any() else nan,
-            scene.coupling.tolerance,
-            "coupling.tolerance of the motion in a step, which is < 1 m",
-        ),
         ("u_tip(3) [m]", 0.5, float(tip[-1]), front[3.0], "velocity turns by 1 m/s over the Airy width at t = 3"),
         (
             "energy at t = 3 [J]",
@@ -179,23 +172,3 @@ def slow_ramp(name, load, exact):
     yield Check(
         f"{name}: u_tip [m]", exact, float(run.u_tip[-1]), _N**2 * EPS, "rounding: ε N², N unknowns of the beam"
     )
-
-
-@section("Loads: a moving base and the equivalent loads")
-def moving_base():
-    """A base that accelerates by a(t) is the load −ρA a(t) on the beam and −m a(t) on the spring, through an impact."""
-    beam = Beam.with_ones(density=2.0, area=1.5, n_elements=6, young_modulus=100.0, initial_velocity_slope=-1.0)
-    signal = {"signal": "harmonic", "frequency": 12.0, "amplitude": 5.0}
-    spring = Spring.with_ones(mass=0.7, linear_stiffness=3.0)
-    equivalent = [
-        {**signal, "on": "beam", "amplitude": -5.0 * 2.0 * 1.5},
-        {**signal, "on": "spring", "amplitude": -5.0 * 0.7},
-    ]
-    runs = [
-        run_in_memory(scene_of(0.2, 1e-3, loads, beam=beam, spring=spring))
-        for loads in ([{**signal, "on": "base"}], equivalent)
-    ]
-    reason = "rounding of the modes and IDA's tolerance, 200 steps"
-    for column in ("u_tip", "y", "z"):
-        by_base, by_loads = (float(run[column][-1]) for run in runs)
-        yield Check(f"{column}(0.2 s)", by_loads, by_base, 200 * 1e-12, reason)

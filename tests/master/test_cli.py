@@ -116,12 +116,10 @@ def test_many_events_of_a_kind_push_out_no_others():
     ]
     events = [*bounces[:-1], Event(94.1, EventKind.SEPARATION, 0.0, 0.0), bounces[-1]]
     table = _event_table(events, load_scene("soft"))
-    columns = [list(column.cells) for column in table.columns]
-    kinds = [str(cell) for cell in columns[0]]
+    kinds = [str(cell) for cell in table.columns[0].cells]
     assert kinds.count("stop_impact") == kinds.count("unseated") == 8
     assert kinds[-3:] == ["separation", "+87 stop_impact, until", "+87 unseated, until"]
-    assert [str(cell) for cell in columns[1]][-2:] == ["94.00000000", "94.50000000"]
-    assert [str(cell) for cell in columns[5]][-2:] == ["87", "87"]
+    assert [str(cell) for cell in table.columns[5].cells][-2:] == ["87", "87"]  # impulses
 
 
 def test_an_interrupt_that_is_lost_in_a_finaliser_is_not_the_last(capsys):

@@ -107,6 +107,15 @@ def test_ends_that_the_law_would_have_elsewhere_are_said(degree, share, resolved
         assert resolved or ("a higher coupling.degree" in told) is (degree < 2)
 
 
+@pytest.mark.parametrize("seen", [{"misplaced": 4.0 * 0.006}, {"between": 2.0 * 0.005}])
+def test_the_steps_that_resolve_it_are_named(seen):
+    """An error four times the limit falls with H², one of the curves with H; half of what that allows is named."""
+    told = judged(with_changes(STIFF, coupling={"degree": 0}), **seen)
+    named = float(told.split("coupling.macro_step <= ")[1].split()[0])
+    assert named == pytest.approx(0.95 * 0.25 * STIFF.coupling.H, rel=0.03)
+    assert told.endswith("a higher coupling.degree allows longer ones") is ("misplaced" in seen)
+
+
 @pytest.mark.parametrize("degree", [0, 1, 2])
 def test_a_beam_without_inertia_is_as_late_as_is_said(degree):
     """It swings with the spring on it 5 times; a step of the coupling is late as Gauss collocation is."""

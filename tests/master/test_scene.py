@@ -183,8 +183,6 @@ def test_what_is_wrong_or_doubtful_of_a_load_names_it(tmp_path):
     assert told.startswith("[loads.1] file = ")
     assert "closer than a quarter of [coupling] macro_step = 0.001, so steps do not end on them" in told
     assert suspicions(scene_from_dict({**fine, "coupling": {"macro_step": 3e-4}})) == []
-    with pytest.raises(SceneError, match=r"^scene: \[loads\.1\] on = \"beam\": acts on a \[beam\], and .* none$"):
-        scene_from_dict(changed(beam=None, loads=[push, {"on": "beam"}, push]))
     late = {"beam": {"initial_deflection_slope": 0.6}, "stop": None}
     assert scene_from_dict(changed(**late, loads=[{**push, "amplitude": 0.0}])).contact_time == 0.6
     with pytest.raises(SceneError, match=r"signal = \"constant\": acts before the tip arrives at t = 0\.6 s"):

@@ -26,14 +26,13 @@ def test_the_fmus_meet_the_exact_solution(section):
 
 @pytest.fixture
 def changed(monkeypatch):
-    """Let every body of a kind get ``key`` times ``change``, or another name, instead of what it was asked to have."""
+    """Let every body of a kind get ``key`` times ``change`` instead of what it was asked to have."""
 
     def change(body, key, change):
         right = body.__init__
 
         def wrong(self, parameters, *rest):
-            value = change if isinstance(change, str) else change * getattr(parameters, key)
-            right(self, parameters.model_copy(update={key: value}), *rest)
+            right(self, parameters.model_copy(update={key: change * getattr(parameters, key)}), *rest)
 
         monkeypatch.setattr(body, "__init__", wrong)
 
@@ -44,7 +43,6 @@ def changed(monkeypatch):
     ("section", "body", "key", "change"),
     [
         (exact.static_deflection, FmuBeam, "young_modulus", 1.01),
-        (exact.frequencies, FmuBeam, "mass_matrix", "consistent"),  # its sixth frequency is 0.5 % higher
         (exact.duffing, FmuSpring, "cubic_stiffness", 1.01),
         (exact.bar_impact, FmuBeam, "density", 1.01),
         (exact.compliant_impact, FmuSpring, "mass", 1.01),
@@ -78,11 +76,6 @@ def hardly_damped(law, p, rate):
     return RESISTANCE(replace(law, damping=0.99 * law.damping), p, rate)
 
 
-def base_as_force(self, load):
-    """The spring takes the acceleration of its base for a force."""
-    return [("external_force", 1.0)]
-
-
 @pytest.mark.parametrize(
     ("section", "owner", "method", "wrong"),
     [
@@ -91,9 +84,8 @@ def base_as_force(self, load):
         (exact.energy_scheme, FmuBeam, "energies", partialmethod(energies, "potential")),
         (exact.energy_scheme, FmuBeam, "energies", partialmethod(energies, "dissipated")),
         (exact.hunt_crossley, Compliance, "resistance", hardly_damped),
-        (exact.moving_base, FmuSpring, "_inputs_of", base_as_force),
     ],
-    ids=["force", "kinetic", "potential", "dissipated", "damping", "base"],
+    ids=["force", "kinetic", "potential", "dissipated", "damping"],
 )
 def test_a_part_that_is_wrong_fails(section, owner, method, wrong, monkeypatch, none_kept):
     monkeypatch.setattr(owner, method, wrong)
