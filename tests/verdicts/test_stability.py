@@ -259,15 +259,17 @@ def test_a_hypercube_covers_its_range():
 
 
 def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else():
-    """A record is that of its cell, whatever has been computed before; of errors near rounding the digits differ, and a
-    busy machine may give a reference up."""
+    """A record is that of its cell, whatever has been computed before.
+
+    But for errors near rounding, whose digits differ, and how far a run goes that stops: it is checked every second.
+    """
     part = Part()
     records = part.computed()
     for name in ("9", "6", "5", "2"):
         again = part.record(part.cases()[name])
         errors = [record.pop("error_motion") or 0.0 for record in (again, records[name])]
         assert errors[0] == pytest.approx(errors[1], abs=1e-6)
-        assert records[name] == again
+        assert records[name] | {"do_steps": None} == again | {"do_steps": None}
     assert [(r["kind"], r["reason"]) for r in records.values() if r["kind"] == "garbage"] == []
     assert {r["kind"] for r in records.values()} >= {"conserved", "dissipative", "approximate", "stopped"}
 
