@@ -131,6 +131,21 @@ def test_a_beam_without_inertia_is_as_late_as_is_said(degree):
     assert run.summary["misplaced_ends"] == pytest.approx(wrong, rel=(0.2, 0.2, 0.6)[degree])
 
 
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_waves_that_the_midpoint_rule_makes_late_have_a_limit(share):
+    """Without an impact 0.01 rad: of those of a load at 20 Hz, of which n steps that turn by x make n x³/12."""
+    load = {"on": "tip", "signal": "harmonic", "frequency": 20.0}
+    beam = {"n_elements": 10, "integrator": "midpoint"}
+    scene = with_changes(PAIR, beam=beam, loads=[load], coupling={"degree": 0}, contact={"law": "compliance"})
+    count = 50
+    H = share * (12.0 * 0.01 / count) ** (1.0 / 3.0) / (40.0 * np.pi)
+    upper, lower = load_bodies(scene, 0.0, 0)
+    told = why_not_resolved(Pair(set_up(scene), upper, lower), records(count, H), 0.0, 0.0)
+    upper.close()
+    lower.close()
+    assert (told is None) is (share < 1.0)
+
+
 @pytest.mark.parametrize("start", [{}, {"initial_velocity_slope": 0.0, "initial_deflection_slope": 0.03}])
 def test_a_beam_that_lags_behind_its_own_waves_is_said(start):
     """Nothing strikes, no energy is lost, and tolerances see a smooth tip: the modal integrator is exact."""
