@@ -7,6 +7,7 @@ is tested by itself:
 * `DuffingBody`: m ÿ + α ẏ + k1 y + k2 y³ = −C + N + f_s by Taylor series of order 22.
 """
 
+from contextlib import contextmanager
 from functools import cache, partial, reduce
 from typing import NamedTuple
 
@@ -24,6 +25,7 @@ from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
 from springbeam.run.outcome import RunStopped
 from springbeam.run.setup import set_up
+from springbeam.run.stepping import Pair
 from springbeam.run.summary import summary
 from springbeam.scene import Beam
 from springbeam.scene.statics import tip_reach
@@ -257,6 +259,18 @@ def interface_of(scene, tip_mass=0.01, mass=1.0, equilibrium=0.0):
     upper.mass, lower.mass = tip_mass, mass
     alone = not setup.lower
     return Interface(upper, lower, setup.law, equilibrium, setup.floor, setup.restitution, alone)
+
+
+@contextmanager
+def pair_of(scene):
+    """The FMUs of a scene, as its run has them at the start."""
+    made = load_bodies(scene, scene.contact_time or 0.0, scene.degree)
+    try:
+        yield Pair(set_up(scene), *made)
+    finally:
+        for body in made:
+            if body is not None:
+                body.close()
 
 
 def bodies(scene):

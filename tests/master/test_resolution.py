@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, Upper, bodies
+from bodies import DuffingBody, Upper, pair_of
 from scenes import scene_from_dict
 
 from springbeam import simulate
-from springbeam.bodies.factory import load_bodies
 from springbeam.contact.phases import Joint, Phase
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.results.records import STEP
@@ -58,8 +57,8 @@ def records(count=2, size=1e-3):
 
 def judged(scene, misplaced=0.0, between=0.0, steps=None):
     """Return why a run of ``scene`` would not be resolved."""
-    pair = Pair(set_up(scene), *bodies(scene))
-    return why_not_resolved(pair, records() if steps is None else steps, misplaced, between)
+    with pair_of(scene) as pair:
+        return why_not_resolved(pair, records() if steps is None else steps, misplaced, between)
 
 
 @pytest.mark.parametrize("turn", [1.0, 3.0, 2.0 * np.pi, 8.0])
@@ -139,11 +138,7 @@ def test_waves_that_the_midpoint_rule_makes_late_have_a_limit(share):
     scene = with_changes(PAIR, beam=beam, loads=[load], coupling={"degree": 0}, contact={"law": "compliance"})
     count = 50
     H = share * (12.0 * 0.01 / count) ** (1.0 / 3.0) / (40.0 * np.pi)
-    upper, lower = load_bodies(scene, 0.0, 0)
-    told = why_not_resolved(Pair(set_up(scene), upper, lower), records(count, H), 0.0, 0.0)
-    upper.close()
-    lower.close()
-    assert (told is None) is (share < 1.0)
+    assert (judged(scene, steps=records(count, H)) is None) is (share < 1.0)
 
 
 @pytest.mark.parametrize("start", [{}, {"initial_velocity_slope": 0.0, "initial_deflection_slope": 0.03}])
@@ -234,13 +229,8 @@ def test_a_peak_force_that_depends_on_the_mesh_is_told(factor, told):
     """Fastest shear wave √12 c/h, c = √(KG/ρ) = 10 m/s, h = 1/50: 2.5 of its periods are 9.07 ms."""
 
     def doubt(window, **changes):
-        scene = with_changes(load_scene("soft"), **changes)
-        made = load_bodies(scene, 0.0, 0)
-        try:
-            return peak_force_doubt(Pair(set_up(scene), *made), window)
-        finally:
-            for body in made:
-                body.close()
+        with pair_of(with_changes(PAIR, **changes)) as pair:
+            return peak_force_doubt(pair, window)
 
     window = factor * 2.5 * 2.0 * np.pi / (np.sqrt(12.0) * 10.0 * 50.0)
     said = doubt(window)

@@ -2,16 +2,14 @@
 
 import numpy as np
 import pytest
-from bodies import bodies
+from bodies import pair_of
 
-from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.motion.events import Event, EventKind
 from springbeam.results.records import STEP
 from springbeam.results.totals import totals
 from springbeam.run.observed import force_window
-from springbeam.run.setup import set_up
-from springbeam.run.stepping import Pair
 from springbeam.scene import load_scene, with_changes
+from springbeam.scene.frequencies import slowest_frequency
 
 SCENE = load_scene("soft")
 
@@ -113,20 +111,17 @@ def moving(ends, path):
 
 
 def test_the_window_is_a_fiftieth_of_the_slowest_period():
-    nothing = np.zeros(0, STEP)
-
     def window_of(scene):
-        return force_window(Pair(set_up(scene), *bodies(scene)), nothing)
+        with pair_of(scene) as pair:
+            return force_window(pair, np.zeros(1, STEP))
 
-    slowest = modal_beam(SCENE.beam).omega[0]
+    slowest = slowest_frequency(SCENE.beam)
     assert window_of(SCENE) == pytest.approx(2.0 * np.pi / slowest / 50.0, rel=1e-12)
     assert window_of(with_changes(SCENE, contact={"force_window": 0.25})) == 0.25
     # 1/k of the beam is 3.3e-3 + 1e-2 m/N: with the spring's 3 N/m it holds 1 kg.
     massless = with_changes(SCENE, beam={"fidelity": "quasi_static"})
     stiffness = 3.0 + 1.0 / (1.0 / 300.0 + 1.0 / 100.0)
-    at_rest = np.zeros(1, STEP)
-    window = force_window(Pair(set_up(massless), *bodies(massless)), at_rest)
-    assert window == pytest.approx(2.0 * np.pi / np.sqrt(stiffness) / 50.0, rel=1e-12)
+    assert window_of(massless) == pytest.approx(2.0 * np.pi / np.sqrt(stiffness) / 50.0, rel=1e-12)
 
 
 WINDOWS = {
