@@ -58,6 +58,19 @@ def test_the_parts_of_a_distance_are_those_of_runs_made_different():
     assert distance(none, run, 1e-4).impulses == distance(run, none, 1e-4).impulses == 1.0
 
 
+def test_curves_are_compared_between_the_rows_too_and_the_peaks_of_a_soft_force():
+    """Beside 2001 times; in steps of 4 ms, between whose rows most of the difference lies."""
+    contact = {"law": "compliance", "stiffness": 1e4, "exponent": 1.0}
+    scene = with_changes(load_scene("soft"), contact=contact, beam={"n_elements": 4}, time={"t_end": 0.05})
+    coarse, fine = (simulate(with_changes(scene, coupling={"macro_step": size})) for size in (4e-3, 1e-3))
+    found = distance(coarse, fine, 5e-5)
+    peaks = [run.summary["contact_force_max"] for run in (coarse, fine)]
+    assert found.force == pytest.approx(1.0 - min(peaks) / max(peaks), rel=1e-12)
+    times = np.linspace(0.0, 0.05, 2001)
+    assert found.motion == pytest.approx(motion(coarse.at(times).columns, fine.at(times).columns), rel=0.05)
+    assert found.motion > 1.2 * motion(coarse.at(coarse.time).columns, fine.at(coarse.time).columns)
+
+
 def test_a_tip_that_loads_hold_is_judged_by_the_deflection_of_its_beam():
     """Its row is made 0: 1e-13 m is the whole of what it moves, and next to nothing of what the beam does."""
     run = simulate(load_scene("soft", ["time.t_end=0.02", "beam.n_elements=4"]))

@@ -60,6 +60,17 @@ def test_locate_finds_the_event_whatever_rate_it_is_told(level, slope, tolerance
     assert len(f.sizes) - 2 <= most
 
 
+def test_locate_does_not_take_a_zero_that_the_function_rises_from():
+    """f = τ² cos τ rises from a rounding below zero; the cubic through (0, π) falls from there."""
+
+    def f(size):
+        return size**2 * math.cos(size) - 1e-15, 2.0 * size * math.cos(size) - size**2 * math.sin(size)
+
+    assert Path.through(f(0.0), f(math.pi), math.pi).falls_through_zero() < 1e-12
+    # ḟ(π/2) = −(π/2)²
+    assert located(f, math.pi, 1e-14, 0.0) == pytest.approx(0.5 * math.pi, abs=1e-14)
+
+
 RISING = (Motion(0.3, 1.0, 0.0, 0.0), Motion(0.2, 0.5, 0.0, 0.0))
 HAPPENS = table("master/cases.toml")["happens"]
 

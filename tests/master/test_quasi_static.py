@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
-from bodies import simulate
+from bodies import pair_of, simulate
+from references import reference
 from scenes import scene_from_dict
 from scipy.sparse.linalg import spsolve
 
+from springbeam.bodies.protocol import Motion
 from springbeam.bodies.quasi_static import QuasiStaticBeam
+from springbeam.contact.events import Holding
 from springbeam.monolithic.semi_discrete import assemble, constant_forces
 from springbeam.scene import Beam, statics
 from springbeam.scene.schemes import EnergyCoupling
@@ -103,3 +106,16 @@ def test_where_the_force_vanishes_as_the_spring_falls_through_its_equilibrium_th
     lags = coupling == {"macro_step": 0.02, "degree": 0}
     assert off < (0.03 if lags else 1e-3)
     assert run.summary["resolved"] is not lags
+
+
+def test_what_holds_the_ends_is_the_force_of_the_reference_over_the_stiffness():
+    """C/k and its rate, by the accelerations of the reference."""
+    given = scene(stop={"position": -0.05}, beam={"alpha_b": 0.02})
+    exact = reference(given)
+    compliance = statics.tip_compliance(given.beam)
+    alpha = given.beam.alpha_b
+    joined = np.isin(exact.phase, ("tied", "touch"))
+    y, z, force, acceleration = (exact[name][joined] for name in ("y", "z", "contact_force", "a_y"))
+    with pair_of(given) as pair:
+        found = Holding(*pair.bodies)((None, Motion(y, z, 0.0, 0.0)))
+    np.testing.assert_allclose(found, [compliance * force, z + alpha * acceleration], rtol=1e-9, atol=1e-12)

@@ -100,6 +100,15 @@ def test_the_deepest_place_is_between_the_rows(ends):
     assert numbers["deepest_tip_time"] == pytest.approx(0.46, abs=1e-6)  # where u is flat to 1e-12 m
 
 
+def test_the_deepest_place_may_follow_an_event():
+    """At 0.5 the tip is thrown down from −1: it goes on as −1 − (t − ½) + 2 (t − ½)², lowest at 0.75."""
+    before, after = np.polynomial.Polynomial([-2.0, 2.0]), np.polynomial.Polynomial([0.0, -3.0, 2.0])
+    steps = np.append(moving([0.0, 0.5], before), moving([0.5, 1.0], after)[1:])
+    steps["v_tip_after"][1] = -1.0
+    numbers = found(steps, Event(0.5, "separation", y=-2.0, z=0.0, u_tip=-1.0, v_tip=-1.0))
+    assert numbers["deepest_tip"] == -2.0
+
+
 def moving(ends, path):
     """Steps between ``ends`` of a tip on ``path``, a polynomial."""
 
@@ -108,6 +117,15 @@ def moving(ends, path):
         return once(b), once.integ(lbnd=a)(b)
 
     return steps_with(lambda t: (0.0, 0.0, 0.0), ends, path, path.deriv(), integrals)
+
+
+def test_of_windows_with_one_mean_the_first_is_told():
+    """Whatever rounding makes of a force that is constant from 0.3 on, in steps that are no binary fractions."""
+    force = 0.7
+    ends = np.unique(np.append(0.3, np.linspace(0.0, 1.7, 38)))
+    numbers = found(steps_with(lambda t: (force if t >= 0.3 else 0.0, 0.0, 0.0), ends), window=0.19)
+    assert numbers["contact_force_max"] == pytest.approx(force, rel=1e-12)
+    assert numbers["contact_force_max_time"] == pytest.approx(0.3, rel=1e-12)
 
 
 def test_the_window_is_a_fiftieth_of_the_slowest_period():

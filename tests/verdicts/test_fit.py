@@ -2,6 +2,7 @@
 
 import json
 import re
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from scenes import scene_from_dict
 from scipy.stats import t as student
 
-from springbeam import SceneError, load_scene, simulate, with_changes
+from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
 from springbeam.signals.measured import read_measured, residuals
 from springbeam.studies import fit
 
@@ -147,6 +148,23 @@ def test_a_clock_that_the_data_does_not_tell_is_named(tmp_path):
     place, speed = fitted(path, begins, scene, shift=5e-3)["keys"]
     assert place["value"] == pytest.approx(5e-3, rel=1e-6)
     assert speed["value"] == pytest.approx(0.4, rel=1e-6)
+
+
+def test_a_trial_that_cannot_be_run_turns_the_search_back(tmp_path, monkeypatch):
+    """The first run of a search: after those all over the ranges, and two for the first derivatives."""
+    right = fit.simulate
+    runs = count()
+
+    def stops_once(scene):
+        if next(runs) == 18:
+            raise RunStopped("diverges", 0.1)
+        return right(scene)
+
+    monkeypatch.setattr(fit, "simulate", stops_once)
+    found = fitted(written(tmp_path / "m.csv", "time,y", TIMES, exact()), shift=0.0)
+    (error,) = [row["error"] for row in found["runs"] if row["error"]]
+    assert "diverges" in error
+    assert {row["key"]: row["value"] for row in found["keys"]} == pytest.approx(TRUE, rel=1e-6)
 
 
 def test_curves_weigh_by_what_is_left_of_them(tmp_path):
