@@ -26,6 +26,15 @@ def test_a_scene_asks_of_a_body_what_it_needs_and_no_more(what):
     assert [line.partition(" = ")[0].partition(":")[0] for line in lines] == asks
 
 
+@pytest.mark.parametrize(("law", "refused"), [("compliance", 0), ("transmission", 2)])
+def test_an_elastic_stop_asks_a_body_for_no_impulses(law, refused):
+    """It pushes by a law; a rigid one strikes the tip."""
+    contact = {"law": law, "stiffness": 1e4, "exponent": 1.0}
+    setup = set_up(with_changes(load_scene("beam-on-stop"), contact=contact, stop={"restitution": 1.0}))
+    lines = refusals(setup, {"beam": replace(Abilities(), impulse=False, velocity=False)})
+    assert [line.partition(":")[0] for line in lines] == refused * ["[stop]"]
+
+
 class Unstruck(DuffingBody):
     apply_impulse = Body.apply_impulse
 
