@@ -42,10 +42,15 @@ def times_of(trajectory: Trajectory, kind: str) -> list[float]:
     return [event.time for event in trajectory.events if event.kind.value == kind]
 
 
-def largest(trajectory: Trajectory, column: str, samples: int = 200_000) -> float:
-    """Return the largest absolute value of a column on its curve."""
-    times = np.linspace(trajectory.time[0], trajectory.time[-1], samples)
-    return float(np.abs(trajectory.at(times)[column]).max())
+def largest(trajectory: Trajectory, column: str) -> float:
+    """Return the largest absolute value of a column on its curve, in the steps beside its largest rows."""
+    last = len(trajectory) - 1
+    found = 0.0
+    for row in np.abs(trajectory[column]).argsort()[-20:]:
+        begin = trajectory.time[max(row - 1, 0)]
+        end = trajectory.time[min(row + 1, last)]
+        found = max(found, float(np.abs(trajectory.at(np.linspace(begin, end, 201))[column]).max()))
+    return found
 
 
 def lines() -> Iterator[Line]:

@@ -5,14 +5,13 @@ import os
 import signal
 import subprocess
 import sys
-from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 import tomli_w
 from commands import HANGS, command, written
-from faulty import NAMES, Fault, installed
+from faulty import Fault, installed
 
 from springbeam.results.files import load_trajectory
 from springbeam.scene.files import tomllib
@@ -81,7 +80,7 @@ def test_a_lasting_fault_stops_the_run(run, fmu, law, where, function, kind, cau
     check_stopped(code, directory, expected, cause)
 
 
-@pytest.mark.parametrize("function", ["fmi2SetReal", "fmi2SetRealInputDerivatives", "fmi2DoStep", "fmi2GetReal"])
+@pytest.mark.parametrize("function", ["fmi2DoStep", "fmi2GetReal"])
 def test_a_warning_is_no_fault(run, function):
     warning = Fault("spring", function, "tied", "Warning")
     code, directory, _ = run("energy 2", warning)
@@ -89,12 +88,6 @@ def test_a_warning_is_no_fault(run, function):
 
 
 PASSING = [("fmi2DoStep", "Discard"), ("fmi2GetReal", "nan")]
-
-
-def alternating(*axes):
-    """All cases of these axes, with one FMU or the other at fault in turn along each of them."""
-    cases = product(*(enumerate(axis) for axis in axes))
-    return [(FMUS[sum(k for k, _ in case) % 2], *(value for _, value in case)) for case in cases]
 
 
 @pytest.mark.parametrize(
@@ -119,7 +112,10 @@ def test_a_fault_that_passes_is_stepped_over(run, fmu, place, fault):
         assert trajectory.summary["max_energy_residual"] < 1e-10
 
 
-@pytest.mark.parametrize(("fmu", "law", "kind"), alternating(list(LAWS)[:-1], [*NAMES, "raise"]))
+@pytest.mark.parametrize(
+    ("fmu", "law", "kind"),
+    [("beam", "energy", "Discard"), ("spring", "energy 2", "raise"), ("beam", "compliance", "Fatal")],
+)
 def test_a_rollback_that_fails_stops_the_run(run, fmu, law, kind):
     expected = whole(run, law)
     discard = Fault(fmu, "fmi2DoStep", "touch", "Discard", once=True)
@@ -128,7 +124,7 @@ def test_a_rollback_that_fails_stops_the_run(run, fmu, law, kind):
     check_stopped(code, directory, expected, "nobody expected" if kind == "raise" else "cannot restore the state")
 
 
-@pytest.mark.parametrize(("fmu", "law"), alternating(list(LAWS)[:-1]))
+@pytest.mark.parametrize(("fmu", "law"), [("beam", "energy"), ("spring", "energy 2"), ("beam", "compliance")])
 def test_wild_numbers_stop_the_run(run, fmu, law):
     """1e300 m is a finite number: it is recorded, as it came, and ends the run by its energy or by its events."""
     code, directory, script = run(law, Fault(fmu, "fmi2GetReal", "touch", "1e300", skip=2))
@@ -139,10 +135,14 @@ def test_wild_numbers_stop_the_run(run, fmu, law):
     assert any(cause in trajectory.summary["cause"] for cause in ("has changed the energy", "the contact chatters"))
 
 
-@pytest.mark.parametrize("fmu", ["beam", "spring"])
 @pytest.mark.parametrize(
-    ("function", "kind"),
-    [*product(("fmi2SetupExperiment", "fmi2GetReal"), NAMES), ("fmi2GetReal", "nan")],
+    ("fmu", "function", "kind"),
+    [
+        ("beam", "fmi2SetupExperiment", "Discard"),
+        ("spring", "fmi2SetupExperiment", "Fatal"),
+        ("beam", "fmi2GetReal", "Error"),
+        ("spring", "fmi2GetReal", "nan"),
+    ],
 )
 def test_an_fmu_that_does_not_start_is_refused(run, fmu, function, kind):
     code, directory, script = run("energy", Fault(fmu, function, "start", kind, skip=0))

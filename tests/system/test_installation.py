@@ -101,7 +101,7 @@ def audit(event, arguments):
 sys.addaudithook(audit)
 from springbeam import cli
 try:
-    cli.app(["run", "soft", "--set", "time.t_end=0.05", "--out", sys.argv[1], "-q"])
+    cli.app(["run", "soft", "--set", "time.t_end=0.05", "--out", sys.argv[1], "--no-plots", "-q"])
 except SystemExit as end:
     print(end.code, sockets)
 """
