@@ -61,21 +61,21 @@ class Recorded:
         lines = list(enumerate(self._text(path.read_bytes()).splitlines(), 1))[self._reading.skip_lines :]
         kept = [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
         self._numbers = [number for number, _ in kept]
-        rows = self._rows([line for _, line in kept])
-        first = [cell.strip() for cell in rows[0]] if rows else []
+        columns = self._columns([line for _, line in kept])
+        first = [cells[0] for cells in columns]
         named = bool(first) and isnan(self._number(first[0]))
         #: Names of the columns, none where the file has none.
         self.names = [_NAME_AND_UNIT.sub(r"\1", cell) for cell in first if named]
         #: Their units, "" where the file has none.
         self.units = [_NAME_AND_UNIT.sub(r"\2\3", cell) if named else "" for cell in first]
         if self._reading.units_row:
-            if not named or len(rows) < 2:
+            if not named or len(kept) < 2:
                 raise ValueError("units_row: the first line must name the columns, and the second one have their units")
-            self.units = [cell.strip().strip("[]()") for cell in rows[1]]
+            self.units = [cells[1].strip("[]()") for cells in columns]
         self._labels = self.names or [str(k + 1) for k in range(len(first))]
         above = named + self._reading.units_row
         self._numbers = self._numbers[above:]
-        self._cells = list(zip(*rows[above:], strict=True))
+        self._cells = [cells[above:] for cells in columns]
         if len(self._numbers) < 2:
             raise ValueError(f"{len(self._numbers)} lines with numbers; there must be two at least")
 
@@ -92,8 +92,8 @@ class Recorded:
             what = f"line {line}: it is no text in {encoding} (byte {content[error.start]:#04x})"
             raise ValueError(f'{what}; give its encoding, as encoding = "latin-1"') from error
 
-    def _rows(self, lines: list[str]) -> list[tuple[str, ...]]:
-        """Return the cells of lines, all of as many columns."""
+    def _columns(self, lines: list[str]) -> list[list[str]]:
+        """Return the cells of lines, all of as many columns, without spaces around them."""
         if not lines:
             return []
         import pyarrow as arrow  # takes a tenth of a second: only if there is a file
@@ -121,7 +121,7 @@ class Recorded:
         if odd:
             row, number = odd[0]
             raise ValueError(f"line {self._numbers[row - 1]}: {number} columns; there must be {what} between")
-        return list(zip(*(column.to_pylist() for column in found.columns), strict=True))
+        return [[cell.strip() for cell in column.to_pylist()] for column in found.columns]
 
     def read(self, wanted: Mapping[int, str]) -> "tuple[np.ndarray, dict[int, np.ndarray]]":
         """Return the times [s], ascending, shape (n,), and columns by their numbers, shapes (n,).
@@ -140,7 +140,7 @@ class Recorded:
     def _values(self, k: int, wanted: str) -> "np.ndarray":
         """Return column ``k`` in the unit ``wanted``, as it is without any; NaN where a value is missing."""
         label = f"column {self._labels[k]}"
-        cells = [cell.strip() for cell in self._cells[k]]
+        cells = self._cells[k]
         values = np.array([self._number(cell) for cell in cells])
         for row in np.flatnonzero(~np.isfinite(values)):
             place = f"line {self._numbers[row]}, {label}"
@@ -178,7 +178,7 @@ class Recorded:
             return values
         if self._reading.repeats == "refuse":
             row = self._lines[int(np.argmax(late))]
-            place = f"line {self._numbers[row]}: time {self._cells[0][row].strip()}"
+            place = f"line {self._numbers[row]}: time {self._cells[0][row]}"
             remedy = 'repeats = "first" leaves such lines out, "mean" sorts them and takes means'
             raise ValueError(f"{place} is not after that of the line before; {remedy}")
         if self._reading.repeats == "first":
