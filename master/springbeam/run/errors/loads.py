@@ -6,7 +6,7 @@ resonance with it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -40,17 +40,23 @@ def left_out(loads: Sequence[tuple[Load, float]], terms: Terms, steps: StepRecor
     P = np.polynomial.legendre.legvander(nodes, 2)
     found = np.zeros((len(steps.size), len(terms.rates)), complex)
     moved = 0.0
-    for first in range(0, len(steps.size), _TOGETHER):
-        some = slice(first, first + _TOGETHER)
-        half = 0.5 * steps.size[some, None]
-        left = half * (1.0 - nodes)
-        signal = sum(force * load.value(steps.ends["time"][some, None] - left) for load, force in loads)
-        missing = (signal - (signal * shares) @ P * _NORMS @ P.T) * shares * half
-        moved += float(np.abs(missing).sum())
-        for k in slow.tolist():
-            found[some, k] = terms.impulse[k] * (missing * np.exp(terms.rates[k] * left)).sum(axis=1)
+    for size, rows in _by_size(steps.size):
+        left = 0.5 * size * (1.0 - nodes)
+        grown = np.exp(np.outer(left, terms.rates[slow])) * terms.impulse[slow]
+        for some in np.array_split(rows, len(rows) // _TOGETHER + 1):
+            signal = sum(force * load.value(steps.ends["time"][some, None] - left) for load, force in loads)
+            missing = (signal - (signal * shares) @ P * _NORMS @ P.T) * shares * (0.5 * size)
+            moved += float(np.abs(missing).sum())
+            found[np.ix_(some, slow)] = missing @ grown
     bound = moved * float(np.abs(terms.shown[0] * terms.impulse)[slow].sum())
     return found if bound > quiet else None
+
+
+def _by_size(sizes: np.ndarray) -> Iterator[tuple[float, np.ndarray]]:
+    """Yield each of ``sizes`` once, and the numbers of those that are equal to it."""
+    order = np.argsort(sizes, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(sizes[order])) + 1):
+        yield float(sizes[rows[0]]), rows
 
 
 def _changes(load: Load) -> float:
