@@ -124,6 +124,12 @@ def test_quick_compares_the_first_quarter_and_leaves_the_last_halving_out(here, 
     assert [float(row["order_H"]) for row in rows] == [row["order_H"] for row in found["orders"]]
 
 
+def test_quick_counts_from_the_arrival_of_the_tip():
+    """It arrives at 0.1 s."""
+    late = with_changes(SOFT, beam={"initial_deflection_slope": 0.1, "n_elements": 3}, time={"t_end": 0.3})
+    assert crosscheck(late, quick=True).document["t_end"] == pytest.approx(0.15, rel=1e-14)
+
+
 def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
     """Results stay as they are until they are to be replaced."""
     out = tmp_path / "both"

@@ -231,6 +231,8 @@ def test_a_cell_is_the_scene_that_its_parameters_tell():
     assert scene.contact.stiffness * (0.1 * reach) ** 1.5 == pytest.approx(k * reach, rel=1e-14)
     steps = 200 * 0.01 / max(slowest_frequency(scene.beam), np.sqrt(scene.spring.linear_stiffness / 6.0))
     assert (scene.contact_time, scene.duration) == pytest.approx((0.3 * reach / 2.0, steps), rel=1e-12)
+    for elasticity, e in (("given", 0.3), ("plastic", 0.0), ("elastic", 1.0)):
+        assert scene_dict(cell | {"elasticity": elasticity})["stop"]["restitution"] == e
     near = scene_from_dict(scene_dict(cell | {"approach": "elastic"}))
     assert near.initial_clearance == pytest.approx(0.1 * 2.0 * steps, rel=1e-12)  # a tenth of the run is so high
     light = scene_from_dict(scene_dict(AT_REST | {"mass": 1e-6, "k2_kind": "hardening", "k2": 1e4, "macro_step": 1e3}))
