@@ -45,6 +45,14 @@ def test_the_response_to_a_chirp_is_that_of_whole_pairs_of_its_turns():
     assert len(response(0, chirp, time[:900], values[:900]).frequency) == 0  # a run that ends before it
 
 
+@pytest.mark.parametrize("rows", [4, 4001])
+def test_turns_of_a_chirp_between_two_rows_have_no_response(rows):
+    chirp = load_of(on="tip", signal="chirp", frequency=100.0, frequency_end=10.0, duration=1.0)
+    time = np.append(np.linspace(0.0, 0.3, rows), 1.0)  # from 0.3 s on it turns 33 times
+    found = response(0, chirp, time, np.sin(time))
+    assert len(found.frequency) == len(found.amplitude) == (13 if rows == 4001 else 0)
+
+
 # -- shock response spectra ---------------------------------------------------------------------------------------
 
 #: Half-sine of 100 m/s² in 11 ms.

@@ -107,6 +107,9 @@ def test_the_deepest_place_may_follow_an_event():
     steps["v_tip_after"][1] = -1.0
     numbers = found(steps, Event(0.5, "separation", y=-2.0, z=0.0, u_tip=-1.0, v_tip=-1.0))
     assert numbers["deepest_tip"] == -2.0
+    numbers = found(moving([0.5, 1.0], after), Event(0.5, "separation", y=-2.0, z=0.0, u_tip=-1.0, v_tip=-1.0))
+    assert numbers["deepest_tip"] == pytest.approx(-1.125, abs=1e-13)
+    assert numbers["deepest_tip_time"] == pytest.approx(0.75, abs=1e-6)
 
 
 def moving(ends, path):
