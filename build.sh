@@ -64,6 +64,14 @@ or name a prefix that has them: SPRINGBEAM_PREFIX=/path ./build.sh …"
 
 python_is_recent() { "$1" -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null; }
 
+# get_uv — uv installs in a third of pip's time; an index that is set for pip counts for it, too.
+get_uv() {
+  local index=${PIP_INDEX_URL:-$($python -m pip config get global.index-url 2>/dev/null || true)}
+  [ -z "$index" ] || export UV_DEFAULT_INDEX=${UV_DEFAULT_INDEX:-$index}
+  [ -x $venv/bin/uv ] || $python -m pip install --quiet --no-compile --disable-pip-version-check "uv>=0.5" ||
+    die "pip could not install uv (is there a network, or PIP_INDEX_URL to set?)"
+}
+
 make_environment() {
   local base=${PYTHON:-python3}
   if ! [ -x $python ] || ! $python -m pip --version >/dev/null 2>&1; then
@@ -78,18 +86,18 @@ make_environment() {
       "$base" -m venv $venv || die "$base -m venv failed"
     fi
   fi
+  get_uv
 }
 
-# install NAME PACKAGE… — with pip, once for each state of pyproject.toml.
+# install NAME PACKAGE… — once for each state of pyproject.toml.
 install() {
   local installed=$venv/.installed-$1 stamp
   stamp=$(cksum <pyproject.toml)" $*"
   [ "$(cat "$installed" 2>/dev/null)" != "$stamp" ] || return 0
   say "installing Python packages ($1)"
   shift
-  # Python compiles what it imports: to compile all that there is would take as long as to install it.
-  $python -m pip install --quiet --no-compile --disable-pip-version-check "$@" ||
-    die "pip could not install $* (is there a network, or PIP_INDEX_URL to set?)"
+  $venv/bin/uv pip install --quiet --python $python "$@" ||
+    die "uv could not install $* (is there a network, or UV_DEFAULT_INDEX to set?)"
   printf '%s' "$stamp" >"$installed"
 }
 
@@ -144,9 +152,8 @@ build() {
   exec 9<.
   command -v flock >/dev/null && { flock -n 9 || { say "waiting for another build"; flock 9; }; }
   make_environment
-  # What the build takes comes first, FMPy for its headers; all else is installed while the compiler works, by a pip that
-  # is not as slow as those that come with older versions of Python.
-  install build --no-deps "pip>=25" cmake ninja fmpy
+  # What the build takes comes first, FMPy for its headers; all else is installed while the compiler works.
+  install build --no-deps cmake ninja fmpy
   if [ "$packages" = run ]; then install run -e . & else install dev -e ".[dev]" & fi
   local configured installing=$!
   rm -f build/ninja.log
@@ -267,7 +274,7 @@ print(*(name for name in extra if has[name]))')
   wheel)
     build dev fmus
     get_sundials || true
-    $python -m pip install --quiet --disable-pip-version-check build wheel
+    install wheel build wheel
     rm -rf dist
     $python -m build --outdir dist .
     # What is compiled in it loads with glibc 2.14, see fmus/adapter/old_glibc.cpp.
