@@ -64,14 +64,6 @@ or name a prefix that has them: SPRINGBEAM_PREFIX=/path ./build.sh …"
 
 python_is_recent() { "$1" -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null; }
 
-# get_uv — uv installs in a third of pip's time; an index that is set for pip counts for it, too.
-get_uv() {
-  local index=${PIP_INDEX_URL:-$($python -m pip config get global.index-url 2>/dev/null || true)}
-  [ -z "$index" ] || export UV_DEFAULT_INDEX=${UV_DEFAULT_INDEX:-$index}
-  [ -x $venv/bin/uv ] || $python -m pip install --quiet --no-compile --disable-pip-version-check "uv>=0.5" ||
-    die "pip could not install uv (is there a network, or PIP_INDEX_URL to set?)"
-}
-
 make_environment() {
   local base=${PYTHON:-python3}
   if ! [ -x $python ] || ! $python -m pip --version >/dev/null 2>&1; then
@@ -86,17 +78,20 @@ make_environment() {
       "$base" -m venv $venv || die "$base -m venv failed"
     fi
   fi
-  get_uv
 }
 
-# install NAME PACKAGE… — once for each state of pyproject.toml.
+# install NAME PACKAGE… — once for each state of pyproject.toml, by uv, which takes a third of pip's time. An index that is
+# set for pip counts for it, too.
 install() {
-  local installed=$venv/.installed-$1 stamp
+  local installed=$venv/.installed-$1 stamp index
   stamp=$(cksum <pyproject.toml)" $*"
   [ "$(cat "$installed" 2>/dev/null)" != "$stamp" ] || return 0
   say "installing Python packages ($1)"
   shift
-  $venv/bin/uv pip install --quiet --python $python "$@" ||
+  [ -x $venv/bin/uv ] || $python -m pip install --quiet --no-compile --disable-pip-version-check "uv>=0.5" ||
+    die "pip could not install uv (is there a network, or PIP_INDEX_URL to set?)"
+  index=${UV_DEFAULT_INDEX:-${PIP_INDEX_URL:-$($python -m pip config get global.index-url 2>/dev/null || true)}}
+  UV_DEFAULT_INDEX=${index:-https://pypi.org/simple} $venv/bin/uv pip install --quiet --python $python "$@" ||
     die "uv could not install $* (is there a network, or UV_DEFAULT_INDEX to set?)"
   printf '%s' "$stamp" >"$installed"
 }

@@ -23,7 +23,7 @@ from .laws import ReferencePhase, Watch
 from .rows import Rows
 from .transitions import HybridState
 
-__all__ = ["ReferenceFailure", "integrate", "refuse"]
+__all__ = ["Equations", "ReferenceFailure", "integrate", "refuse"]
 
 #: More events than this at one time are a fault, not physics.
 _AT_ONCE = 20
@@ -35,8 +35,24 @@ _SAMPLES = 1000
 _CLOSE = 1e-6
 
 
+class Equations:
+    """The equations of a scene and their modes, which several runs of it can share."""
+
+    def __init__(self, scene: Scene) -> None:
+        refuse(scene)
+        self.scene = scene
+        self.system = (QuasiStaticSystem if scene.massless else HybridSystem)(scene)
+        self._forms: dict[ReferencePhase, LinearForm] = {}
+
+    def form(self, phase: ReferencePhase) -> LinearForm:
+        """Return a phase in its modes."""
+        if phase not in self._forms:
+            self._forms[phase] = LinearForm(self.system, phase)
+        return self._forms[phase]
+
+
 def integrate(
-    scene: Scene,
+    scene: Scene | Equations,
     *,
     sample_times: Sequence[float] | np.ndarray | None = None,
     velocity_perturbation: float = 0.0,
@@ -47,6 +63,8 @@ def integrate(
 
     Parameters
     ----------
+    scene
+        The scene, or its equations where another run has them.
     sample_times
         Times of the rows [s], as far as they lie in the run. Default: multiples of ``coupling.macro_step`` from the
         start (1000 of them where the scene gives tolerances instead), and a row before and after each event.
@@ -72,9 +90,10 @@ def integrate(
     ValueError
         If no row lies in the run.
     """
-    refuse(scene)
-    end = scene.time.t_end if t_end is None else min(t_end, scene.time.t_end)
-    return _Run(scene, velocity_perturbation, end, sample_times, time_limit).execute()
+    equations = scene if isinstance(scene, Equations) else Equations(scene)
+    last = equations.scene.time.t_end
+    end = last if t_end is None else min(t_end, last)
+    return _Run(equations, velocity_perturbation, end, sample_times, time_limit).execute()
 
 
 def refuse(scene: Scene) -> None:
@@ -91,13 +110,14 @@ class _Run:
 
     def __init__(
         self,
-        scene: Scene,
+        equations: Equations,
         velocity_perturbation: float,
         t_end: float,
         sample_times: Sequence[float] | np.ndarray | None,
         time_limit: float | None,
     ) -> None:
-        self.system = (QuasiStaticSystem if scene.massless else HybridSystem)(scene)
+        self._form = equations.form
+        self.system = equations.system
         self.t_end = t_end
         self.state = HybridState(self.system, *initial(self.system, velocity_perturbation))
         self.rows = Rows(self.state)
@@ -105,7 +125,6 @@ class _Run:
         self._due = self._samples(sample_times)
         self._limit = time_limit
         self._began = clock.process_time()
-        self._forms: dict[ReferencePhase, LinearForm] = {}
         self._counts = {"steps": 0, "phases": 0}
 
     def execute(self) -> Trajectory:
@@ -137,9 +156,7 @@ class _Run:
         watched = self.state.watched()
         self._counts["phases"] += 1
         end = min(s.loads.smooth_from(begin), self.t_end)
-        if state.phase not in self._forms:
-            self._forms[state.phase] = LinearForm(s, state.phase)
-        propagator = ExponentialPropagator(self._forms[state.phase], state.X)
+        propagator = ExponentialPropagator(self._form(state.phase), state.X)
         while state.time < end:
             if self._limit is not None and clock.process_time() - self._began > self._limit:
                 raise ReferenceFailure(f"takes more than {self._limit:g} s; it is at t = {state.time:.6g} s")

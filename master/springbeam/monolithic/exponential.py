@@ -104,8 +104,9 @@ class LinearForm:
             self.c = s.alpha_b * self.omega2
             #: Damping of the spring that ``c`` does not hold [N·s/m].
             self.damping = s.spring.damping - s.alpha_b * s.spring.linear_stiffness
-        #: What is known beforehand acts on the modes: a constant, and a unit of each load, (1 + loads, p).
-        self.known = np.vstack([load - omega2 * self.offset, s.patterns]) @ self.basis
+        #: What a constant and a unit of each load add to ξ̈, (p,) and (loads, p).
+        self.constant = (load - omega2 * self.offset) @ self.basis
+        self.patterns = s.patterns @ self.basis
         ends = np.array([s.tip, s.top])
         self.ends = ends @ self.basis
         self.at = ends @ self.offset + [0.0, s.floor]
@@ -122,11 +123,6 @@ class LinearForm:
     def modal(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (ξ, ξ̇) of a state."""
         return (X[self.system.A] - self.offset) @ self.inverse, X[self.system.V] @ self.inverse
-
-    def loads_at(self, times: np.ndarray) -> np.ndarray:
-        """Return how much of each of ``known`` acts at ``times`` [s] of shape (...), (..., 1 + loads)."""
-        values = self.system.loads.values(times)
-        return np.concatenate([np.ones((*values.shape[:-1], 1)), values], axis=-1)
 
     def ends_at(self, moved: np.ndarray) -> np.ndarray:
         """Return u and y, v and z at modes (2, k, p): (2, k, 2)."""
@@ -145,18 +141,22 @@ class LinearForm:
             found.append(self.system.law.force(y - u, z - v))
         return np.asarray(np.reshape(found, (len(found), len(u))).T)
 
-    def _weights(self, size: float) -> tuple[StepWeights, np.ndarray]:
-        """Return the weights of a step, and what they make of the forces r at the ends: r.ravel() → `ends_at`."""
+    def _weights(self, size: float) -> tuple[StepWeights, np.ndarray, np.ndarray]:
+        """Return the weights of a step, and what they make of r and of the constant.
+
+        That is r.ravel() → `ends_at`, and ξ and ξ̇ at `TARGETS`.
+        """
         weights = self.oscillators.weights(size)
         onto = (self.ends[:, None] * self.inputs).reshape(2 * len(self.inputs), len(self.omega2))
         of_ends = np.reshape(weights.force[:, :-1] @ onto.T, (2, STAGES, STAGES, 2, len(self.inputs)))
-        return weights, np.moveaxis(of_ends, 3, 2).reshape(2 * STAGES * 2, STAGES * len(self.inputs))
+        constant = weights.forced(np.ones((STAGES, 1)), self.constant[None])
+        return weights, np.moveaxis(of_ends, 3, 2).reshape(2 * STAGES * 2, STAGES * len(self.inputs)), constant
 
     def longest_step(self, X: np.ndarray) -> float:
         """Return the step [s] that resolves the free motion from X, but for amplitudes as small as rounding."""
         xi, xi_dot = self.modal(X)
         r = self.forces(self.ends_at(np.array([[xi], [xi_dot]])))[0]
-        force = r @ self.inputs + self.loads_at(X[self.system.T]) @ self.known
+        force = r @ self.inputs + self.constant + self.system.loads.values(X[self.system.T]) @ self.patterns
         amplitudes = self.oscillators.amplitudes(xi, xi_dot, force)
         silent = NOISE * self.reach.max(initial=0.0) * max(np.linalg.norm(xi), amplitudes.max(initial=0.0))
         fastest = self.oscillators.rates[self.reach * amplitudes > silent].max(initial=0.0)
@@ -169,10 +169,12 @@ class LinearForm:
         ReferenceFailure if the step is too long to find these.
         """
         s = self.system
-        weights, of_ends = self.weights(float(f"{size:.12e}"))  # sizes recur but for rounding
+        weights, of_ends, constant = self.weights(float(f"{size:.12e}"))  # sizes recur but for rounding
         times = X[s.T] + size * TARGETS
         xi, xi_dot = self.modal(X)
-        moved = weights.free(xi, xi_dot) + weights.forced(self.loads_at(times[:-1]), self.known)
+        moved = weights.free(xi, xi_dot) + constant
+        if len(s.loads):
+            moved += weights.forced(s.loads.values(times[:-1]), self.patterns)
         without = self.ends_at(moved[:, :-1])
         r = self._resolved(without, of_ends, self.forces(self.ends_at(np.array([[xi], [xi_dot]]))))
         moved += weights.forced(r, self.inputs)

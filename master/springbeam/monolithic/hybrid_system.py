@@ -16,6 +16,7 @@ Dynamics, with u = tip·x, y = top·x and p = f(t) − ω² x − c ẋ − k2 (
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -91,6 +92,8 @@ class HybridSystem:
         self.floor = self.stop.position * self.scene.elastic_stop
         #: What counts of ẋ²/2 as kinetic energy.
         self.inertia = np.ones(self.n)
+        #: `held` of a phase, made once.
+        self.constraints = cache(self.held)
         #: Strain energy [J] under the constant loads that does not depend on x.
         self._hidden = 0.0
         self.size = 2 * self.n + 3
@@ -148,7 +151,7 @@ class HybridSystem:
             own = own + self.loads.values(X[..., self.T]) @ self.patterns
         if self.spring.cubic_stiffness:
             own = own - (self.spring.cubic_stiffness * (y - self.spring.unloaded) ** 3)[..., None] * self.top
-        held = self.held(phase)
+        held = self.constraints(phase)
         C = np.zeros_like(u)
         N = np.zeros_like(u)
         if self.joined(phase) and len(held.rows):
@@ -163,6 +166,8 @@ class HybridSystem:
 
     def load_power(self, X: np.ndarray) -> np.ndarray:
         """Return the power of the loads that vary [W] on states of shape (..., 2n + 3)."""
+        if not len(self.loads):
+            return np.zeros(X.shape[:-1])
         return np.asarray(np.sum(self.loads.values(X[..., self.T]) * (X[..., self.V] @ self.patterns.T), axis=-1))
 
     def dissipation_rate(self, phase: ReferencePhase, X: np.ndarray) -> np.ndarray:

@@ -214,9 +214,11 @@ def _compare_events(
 
 def reference_and_perturbed(scene: Scene, times: np.ndarray, done: Done = unseen) -> tuple[Trajectory, Trajectory]:
     """Return the reference at ``times`` [s], and once more from initial velocities changed by `PERTURBATION`."""
-    reference = event_driven.integrate(scene, sample_times=times)
+    equations = event_driven.Equations(scene)
+    reference = event_driven.integrate(equations, sample_times=times)
     done()
-    moved = next(perturbed(scene, PERTURBATION, sample_times=times))
+    change = PERTURBATION * initial_speed(scene)
+    moved = event_driven.integrate(equations, sample_times=times, velocity_perturbation=change)
     done()
     return reference, moved
 
