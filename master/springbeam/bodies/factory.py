@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 from contextlib import ExitStack
 from math import inf
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..scene import Beam, Scene, SceneError, Spring
 from ..scene.linearised import hilltop
-from ..scene.loads import TableLoad
 from ..scene.partners import ForeignFmu, Partner, RigidWallElement, SpringDamperElement
 from ..scene.statics import resting_height, tip_compliance, tip_load_deflection
-from .archive import fmu_directory, own_fmu
 from .elements import ELEMENTS
 from .fmu_bodies import FmuBeam, FmuSpring
 from .protocol import Body, FmuError
@@ -148,18 +144,3 @@ def findings(scene: Scene) -> dict[str, Findings]:
     H = scene.coupling.macro_step or 1e-3 * scene.time.t_end
     times = 0.0, scene.time.t_end
     return {table: examined(spec, table == "beam", times, H) for table, spec in scene.foreign.items()}
-
-
-def fingerprints(scene: Scene) -> dict[str, str]:
-    """Return SHA-256 by name of the files that ``scene`` needs: FMUs and tables. Raises FmuError if one is missing."""
-    files = {path.name: path for path in map(own_fmu, scene.fmus)}
-    files |= {spec.fmu: Path(spec.fmu) for spec in scene.foreign.values()}
-    files |= {load.file: Path(load.file) for load in scene.loads if isinstance(load, TableLoad)}
-    found = {}
-    for name, path in files.items():
-        try:
-            found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
-        except OSError as error:
-            remedy = "; ./build.sh fmus builds it" if path.parent == fmu_directory() else ""
-            raise FmuError(f"{path}: {error.strerror}{remedy}") from error
-    return found

@@ -25,6 +25,17 @@ _PACKAGES = (
     "distributed",  # for clusters
 )
 
+#: Abilities in words: (ability, how a body shows it, possible couplings with it, and without it).
+_OFFERED = (
+    ("state", "canGetAndSetFMUstate", 'scheme "energy", tie, transmission, foundation', '"jacobi", "gauss_seidel"'),
+    ("any_size", "canHandleVariableCommunicationStepSize", "events, adaptive steps", "equal macro steps only"),
+    ("slopes", "canInterpolateInputs", "degree 1, 2", "degree 0"),
+    ("integrals", "integral, integral_2", "degree 1, 2; adaptive steps", "degree 0"),
+    ("velocity", "velocity", "events, adaptive steps, the force at an instant", "the mean over a step in its place"),
+    ("impulse", "impulse", "rigid impacts, foundation", '"compliance", "link", "tie" of equal velocities'),
+    ("energies", "kinetic_energy, potential_energy", "the whole ledger", "the ledger of the interface"),
+)
+
 
 def doctor(
     scene: Annotated[
@@ -94,7 +105,7 @@ def _examine(scene: Scene) -> Findings:
     """Return the abilities of the bodies of ``scene``; it is an error if the scene cannot be run with them."""
     from ..bodies.factory import findings
     from ..bodies.units import described
-    from ..run.gate import OFFERED, refusals
+    from ..run.gate import refusals
     from ..run.setup import set_up
     from ..scene.partners import kind_of
 
@@ -115,7 +126,7 @@ def _examine(scene: Scene) -> Findings:
         has = asdict(finding.abilities)
         rows = [
             ("yes", key, shown_by, having) if has[key] > 0 else ("no", key, shown_by, lacking)
-            for key, shown_by, having, lacking in OFFERED
+            for key, shown_by, having, lacking in _OFFERED
         ]
         shown.append(table(names, rows))
     able = {table: finding.abilities for table, finding in found.items()}

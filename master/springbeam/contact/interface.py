@@ -44,11 +44,6 @@ class Interface:
     alone: bool = False
 
     @cached_property
-    def rigid(self) -> bool:
-        """Whether a rigid law acts between two ends."""
-        return isinstance(self.law, Rigid)
-
-    @cached_property
     def lasting(self) -> bool:
         """Whether the law joins the ends from the start and for good."""
         return self.law is not None and self.law.lasting

@@ -230,12 +230,12 @@ class Automaton:
 
 def joins(interface: Interface) -> bool:
     """a rigid law between two ends"""
-    return interface.rigid
+    return isinstance(interface.law, Rigid)
 
 
 def lets_part(interface: Interface) -> bool:
     """the law `transmission`"""
-    return interface.rigid and not interface.lasting
+    return joins(interface) and not interface.lasting
 
 
 def has_foundation(interface: Interface) -> bool:
@@ -258,7 +258,7 @@ def carries_the_tip(interface: Interface) -> bool:
 
 def _share(interface: Interface, phase: Phase) -> float:
     """Return the tip's part in the rate of the lower end's height."""
-    return interface.tip_share if interface.rigid and phase.joint is not Joint.FREE else 0.0
+    return interface.tip_share if joins(interface) and phase.joint is not Joint.FREE else 0.0
 
 
 def gap_above_zero(interface: Interface, phase: Phase) -> EventFunction:

@@ -253,8 +253,8 @@ class Detector:
         cut = self._pair.attempt(state, inside * step.size, step.start)
         return cut if any(cut.contact) else step
 
-    def soft_changes(self, state: State, step: Step) -> list[tuple[Joint, Event]]:
-        """Return where contact by a soft law opens or closes in ``step``, also for a part of it, and what it leads to.
+    def soft_changes(self, state: State, step: Step) -> list[Event]:
+        """Return where contact by a soft law opens or closes in ``step``, also for a part of it.
 
         Nothing special happens there: the zeros are those of the path of the gap.
         """
@@ -279,9 +279,8 @@ class Detector:
             kind, joint = SOFT_TRANSITIONS[joint]
             (u, v), (y, z) = (_inside(*motions, step.size, at) for motions in zip(step.start, step.end, strict=True))
             if all(map(isfinite, (u, v, y, z))):  # else the energies of the row are out of range too and stop the run
-                found.append(
-                    (joint, Event(step.time + at * step.size, kind, y, z, u, v, joint=joint, seated=state.phase.seated))
-                )
+                time = step.time + at * step.size
+                found.append(Event(time, kind, y, z, u, v, joint=joint, seated=state.phase.seated))
         return found
 
 

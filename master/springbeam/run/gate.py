@@ -31,18 +31,6 @@ _TO_BE_STRUCK = ("state", "any_size", "velocity", "impulse")
 _ALL = Abilities()
 _LEFT_OUT = 'leave it out, or use scheme = "energy"'
 
-#: Abilities in words: (ability, how a body shows it, possible couplings with it, and without it).
-OFFERED = (
-    ("state", "canGetAndSetFMUstate", 'scheme "energy", tie, transmission, foundation', '"jacobi", "gauss_seidel"'),
-    ("any_size", "canHandleVariableCommunicationStepSize", "events, adaptive steps", "equal macro steps only"),
-    ("slopes", "canInterpolateInputs", "degree 1, 2", "degree 0"),
-    ("integrals", "integral, integral_2", "degree 1, 2; adaptive steps", "degree 0"),
-    ("velocity", "velocity", "events, adaptive steps, the force at an instant", "the mean over a step in its place"),
-    ("impulse", "impulse", "rigid impacts, foundation", '"compliance", "link", "tie" of equal velocities'),
-    ("energies", "kinetic_energy, potential_energy", "the whole ledger", "the ledger of the interface"),
-)
-
-
 #: What a run needs: the key that asks for it, what may be given instead, and the abilities.
 Need = tuple[str, str, tuple[str, ...]]
 

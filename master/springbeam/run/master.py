@@ -236,8 +236,8 @@ class Master:
 
     def _note_soft_contact(self, step: Step) -> None:
         state = self.state
-        for joint, change in self._detector.soft_changes(state, step):
-            state.phase = Phase(joint, state.phase.seated)
+        for change in self._detector.soft_changes(state, step):
+            state.phase = Phase(change.joint, change.seated)
             state.events += 1
             self._log.events.append(change)
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from math import inf, sqrt
 
 import numpy as np
 
+from ..bodies.protocol import Body
 from ..scene.laws import stiffest
 from .resolution import window_of
 from .stepping import Pair
@@ -17,12 +19,12 @@ _STORED = ("beam_kinetic", "beam_potential", "spring_kinetic", "spring_potential
 def unknown(pair: Pair) -> str | None:
     """Return a warning that names what cannot be judged, since a body does not say how stiff it is."""
     setup = pair.setup
-    places = {"beam": (setup.upper, pair.upper), "spring": (setup.lower, pair.lower)}
-    silent = [f"[{table}]" for table, (there, body) in places.items() if there and body.oscillation() is None]
+    there = [body for body, is_given in zip(pair.bodies, (setup.upper, setup.lower), strict=True) if is_given]
+    silent = _tables_of(pair, [body for body in there if body.oscillation() is None])
     if not silent:
         return None
     said = (
-        f"the body in {' and '.join(silent)} does not say its stiffness and damping; how far ends are misplaced, and "
+        f"the body in {silent} does not say its stiffness and damping; how far ends are misplaced, and "
         "how far it turns in a macro step, is not known"
     )
     if setup.force_window is None and setup.law is not None:
@@ -30,14 +32,19 @@ def unknown(pair: Pair) -> str | None:
     return said
 
 
+def _tables_of(pair: Pair, bodies: Collection[Body]) -> str:
+    """Return the tables of ``bodies`` in words."""
+    tables = zip(("[beam]", "[spring]"), pair.bodies, strict=True)
+    return " and ".join(table for table, body in tables if body in bodies)
+
+
 def coarse_force(pair: Pair) -> str | None:
     """Return a warning that names a body of unknown acceleration or damping, so that C is that of the steps."""
-    places = (("beam", pair.upper), ("spring", pair.lower))
-    silent = [f"[{table}]" for table, body in places if body in pair.without_acceleration]
+    silent = _tables_of(pair, pair.without_acceleration)
     if not silent:
         return None
     return (
-        f"the body in {' and '.join(silent)} does not say its acceleration, or how damping changes it; the force "
+        f"the body in {silent} does not say its acceleration, or how damping changes it; the force "
         "between joined ends, and when they part, is only as exact as the force of a step: name its variable in "
         "acceleration, or take a smaller coupling.macro_step"
     )

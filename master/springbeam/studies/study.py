@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -26,10 +27,12 @@ from typing import Any, ClassVar
 from pydantic import BaseModel, ConfigDict
 from pydantic_core import from_json, to_json
 
-from ..bodies.factory import fingerprints
+from ..bodies.archive import fmu_directory, own_fmu
+from ..bodies.protocol import FmuError
 from ..results.directory import ResultsExist, ResultsUnreadable, RunDirectory, lock
 from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, load_scene
+from ..scene.loads import TableLoad
 from .accuracy import simulate
 from .engine import Measure, Report, lost, record_all
 from .metrics import Metric, costs
@@ -112,7 +115,7 @@ class Study(BaseModel, ABC):
         return {
             "study": self.kind,
             "springbeam": metadata.version("springbeam"),
-            "files": fingerprints(self.scene or load_scene("soft")),
+            "files": _fingerprints(self.scene or load_scene("soft")),
             "settings": self.model_dump(mode="json", exclude_none=True),
         }
 
@@ -214,4 +217,19 @@ def troubles(records: Mapping[str, Row]) -> list[str]:
         if said:
             name, text = said[0]
             found.append(f"{kind:<10}in {len(said)} cases, first in {name}: {text.splitlines()[0]}")
+    return found
+
+
+def _fingerprints(scene: Scene) -> dict[str, str]:
+    """Return SHA-256 by name of the files that ``scene`` needs: FMUs and tables. Raises FmuError if one is missing."""
+    files = {path.name: path for path in map(own_fmu, scene.fmus)}
+    files |= {spec.fmu: Path(spec.fmu) for spec in scene.foreign.values()}
+    files |= {load.file: Path(load.file) for load in scene.loads if isinstance(load, TableLoad)}
+    found = {}
+    for name, path in files.items():
+        try:
+            found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
+        except OSError as error:
+            remedy = "; ./build.sh fmus builds it" if path.parent == fmu_directory() else ""
+            raise FmuError(f"{path}: {error.strerror}{remedy}") from error
     return found
