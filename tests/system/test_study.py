@@ -46,8 +46,10 @@ def test_another_study_is_not_mixed_in(tmp_path):
         Records(other, tmp_path / "s")
     with Records(other, tmp_path / "s", replace=True):  # results stay until there are new ones
         assert len(Records(plan(), tmp_path / "s").by_name) == len(plan().cases())
+    (tmp_path / "s" / "sweep.png").touch()
     with Records(other, tmp_path / "s", replace=True) as records:
         other.computed(records)
+    assert not (tmp_path / "s" / "sweep.png").exists()  # of the one before
     assert len(Records(other, tmp_path / "s").by_name) == len(other.cases())
     (tmp_path / "t").mkdir()
     (tmp_path / "t" / "thesis.txt").write_text("mine")

@@ -52,6 +52,8 @@ def test_a_latin_hypercube_has_one_sample_in_each_of_its_rows():
     assert sorted(v[2] for v in values) == [1] * 10 + [2] * 10 + [4] * 10
     assert design(axes, 30, 7, "latin_hypercube") == values
     assert design(axes, 30, 8, "latin_hypercube") != values
+    by_chance = design(axes, 300, 7, "random")
+    assert np.mean([v[1] for v in by_chance]) == pytest.approx(0.5, abs=3.0 / np.sqrt(12.0 * 300.0))
 
 
 def test_each_metric_is_the_number_that_it_names():

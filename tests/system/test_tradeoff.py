@@ -35,6 +35,7 @@ def test_what_a_configuration_costs_and_where_it_errs_is_that_of_its_run():
     row = {**costs(run), **tradeoff._errors(run, exact)}
     summary = run.summary
     assert row["cost_do_steps"] == summary["beam_steps"] + summary["spring_steps"]
+    assert row["cost_rollbacks"] == summary["beam_rollbacks"] + summary["spring_rollbacks"]
     assert row["error_energy"] == summary["max_energy_residual"]
     assert kinds(run) == kinds(exact) == ["impact", "stop_impact"]
     assert row["error_event_time"] == pytest.approx(abs(run.events[1].time - exact.events[1].time), rel=1e-9)

@@ -108,6 +108,11 @@ def test_a_preloaded_spring_rests_on_its_stop_with_its_force():
     assert np.ptp(run.y) == 0.0
 
 
+def test_the_frequency_of_a_spring_is_the_root_of_its_stiffness_over_its_mass():
+    slow = with_changes(scene_from_dict(ALONE), spring={"linear_stiffness": 0.125, "cubic_stiffness": 0.0})
+    assert spring_frequency(slow) == pytest.approx(0.5, rel=1e-14)
+
+
 def test_what_is_known_before_a_run_moves_with_the_spring():
     for k2, load in ((900.0, 0.0), (-100.0, 0.3)):
         scene = with_changes(scene_from_dict(ALONE), spring={"cubic_stiffness": k2, "external_force": load})
