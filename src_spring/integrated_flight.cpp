@@ -61,10 +61,14 @@ void IntegratedFlight::launch() {
   const Compliance::Slopes slopes = touching_ ? law.slopes(start_.depth, rate) : Compliance::Slopes{};
   const double change = equation_.rates(std::abs(equation_.elongation(start_.y)), slopes).sum();
   const double span = H * change > 1.0 ? 1.0 / change : H;
-  const double velocity = std::abs(z) + std::abs(a) * span, displacement = std::abs(start_.y) + velocity * span;
+  // What F's rates add is all that moves a top from rest where F begins at 0.
+  const double mass = equation_.mass(), part = span / H;
+  const double jerk = part * std::abs(loads_.force[1]) / mass, snap = part * part * std::abs(loads_.force[2]) / mass;
+  const double velocity = std::abs(z) + (std::abs(a) + jerk / 2 + snap / 6) * span,
+               displacement = std::abs(start_.y) + (std::abs(z) + (std::abs(a) + jerk / 6 + snap / 24) * span) * span;
   // Rounding of the forces, but that of damping, which grows no larger than that of the velocity.
   const double forces = std::abs(F) + std::abs(equation_.spring_force(start_.y)) + force;
-  const double noise = noise_margin * epsilon * forces / equation_.mass() * span;
+  const double noise = noise_margin * epsilon * forces / mass * span;
   const auto tolerance = [&](double size, double least) {
     const double wanted = share * (parameters_.relative_tolerance * size + parameters_.absolute_tolerance);
     return std::max({wanted, least, least_tolerance});
@@ -73,7 +77,7 @@ void IntegratedFlight::launch() {
   double* tolerances = solver_.absolute_tolerance();
   tolerances[q] = tolerances[A] = tolerances[B] = of_y;
   tolerances[p] = H * of_z;
-  tolerances[e] = equation_.mass() * (velocity + of_z) * of_z;
+  tolerances[e] = mass * (velocity + of_z) * of_z;
 
   double* Y = solver_.initial_value();
   double* Yp = solver_.initial_derivative();
