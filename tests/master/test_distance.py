@@ -8,9 +8,9 @@ from runs import a_trajectory
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.motion.events import Event, EventKind
-from springbeam.results.contact_times import contact_changes
-from springbeam.results.distance import HELD, apart, distance, motion
 from springbeam.results.records import joined
+from springbeam.studies.contact_changes import contact_changes
+from springbeam.studies.distance import HELD, apart, distance, motion
 
 TIMES = np.linspace(0.0, 1.0, 11)
 

@@ -1,80 +1,17 @@
-"""Times of contact and of impacts on the foundation, their impulses, and the differences of two runs in them.
-
-Contacts shorter than a window with a negligible impulse are ignored: rounding decides whether they close at all.
-"""
+"""Contacts of tip and spring and with the foundation, as intervals of the phases that events begin."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from itertools import dropwhile, groupby, pairwise, zip_longest
-from math import inf, nan
-from typing import NamedTuple
+from collections.abc import Iterable
+from itertools import dropwhile, groupby, zip_longest
 
 import numpy as np
 
 from ..motion.events import Event
 from ..scene import Scene
-from .records import impulse
-from .trajectory import Trajectory
-
-#: Share of the impulse of a run below which a contact or a stroke is negligible.
-SLIGHT = 2e-3
 
 #: Beginning and end of a contact [s]; an impact that separates at once has no length.
 Interval = tuple[float, float]
-
-
-class ContactChange(NamedTuple):
-    """Tip and spring meet (``closes``) or part (``opens``); the foundation is reached (``strikes``) or left after a
-    rest on it (``leaves``)."""
-
-    kind: str
-    time: float  #: [s]
-
-
-def contact_changes(run: Trajectory, window: float) -> list[ContactChange]:
-    """Return the changes of contact in their order, without contacts and flights shorter than ``window`` [s].
-
-    Strokes on the foundation that follow each other within ``window`` are one.
-    """
-    changes = []
-    for since, until in _merged(tip_contacts(run.scene, run.events, inf), window):
-        if until - since >= window:
-            changes += [ContactChange("closes", since), ContactChange("opens", until)]
-    for since, until in _merged(foundation_contacts(run.events, inf), window):
-        changes += [ContactChange("strikes", since)]
-        if until > since:
-            changes += [ContactChange("leaves", until)]
-    return sorted((change for change in changes if change.time < inf), key=lambda change: change.time)
-
-
-def contact_time_difference(first: Trajectory, second: Trajectory, window: float) -> float:
-    """Return the largest difference of the times of contact of two runs [s].
-
-    Each beginning and end of a contact is compared with the nearest one of the other run, or with the end of the run,
-    if it is the later. Contacts closer than ``window`` [s] to each other are one. Shorter ones with less than `SLIGHT`
-    of the impulse are left out; so are all short ones of tip and spring in a run without steps, as of a reference,
-    whose impulses are not known.
-    """
-    end = float(second.time[-1])
-    worst = 0.0
-    for ours, theirs in zip(_contacts_and_strokes(first, end), _contacts_and_strokes(second, end), strict=True):
-        for one, other in ((ours, theirs), (theirs, ours)):
-            worst = max(worst, _furthest(_lasting(*one, window), other[0], end))
-    return worst
-
-
-def impulse_difference(run: Trajectory, reference: Trajectory) -> float:
-    """Return the relative difference of the sums of all impacts' impulses to ``reference``; NaN if it has none.
-
-    The sums are of the impulses on the tip and of those of the foundation.
-    """
-    found, exact = (
-        np.sum([(0.0, 0.0), *((event.impulse_contact, event.impulse_foundation) for event in of.events)], axis=0)
-        for of in (run, reference)
-    )
-    scale = float(np.abs(exact).sum())
-    return float(np.abs(found - exact).sum()) / scale if scale > 0.0 else nan
 
 
 def tip_contacts(scene: Scene, events: Iterable[Event], end: float) -> list[Interval]:
@@ -82,17 +19,6 @@ def tip_contacts(scene: Scene, events: Iterable[Event], end: float) -> list[Inte
     if not scene.coupled:
         return []
     return _intervals(((event.time, event.joint != "free") for event in events), end)
-
-
-def touches(events: Iterable[Event]) -> list[Interval]:
-    """Return the intervals in which ends that are not tied touch until they part [s]."""
-    joints = groupby(events, key=lambda event: event.joint)
-    phases = [(joint, next(alike).time) for joint, alike in joints]
-    return [
-        (since, until)
-        for (joint, since), (following, until) in pairwise(phases)
-        if (joint, following) == ("touch", "free")
-    ]
 
 
 def foundation_contacts(events: Iterable[Event], end: float) -> list[Interval]:
@@ -112,55 +38,7 @@ def _intervals(changes: Iterable[tuple[float, bool]], end: float) -> list[Interv
     return list(zip_longest(edges[::2], edges[1::2], fillvalue=end))
 
 
-def _merged(intervals: list[Interval], window: float) -> list[Interval]:
-    """Join intervals closer than ``window`` [s]."""
-    merged: list[Interval] = []
-    for begin, end in intervals:
-        if merged and begin - merged[-1][1] < window:
-            begin, _ = merged.pop()
-        merged.append((begin, end))
-    return merged
-
-
-def _contacts_and_strokes(run: Trajectory, end: float) -> Iterator[tuple[list[Interval], np.ndarray, np.ndarray]]:
-    """Yield the contacts of tip and spring, and those with the foundation, in a run that ends at ``end`` [s].
-
-    With them are times [s] and the magnitude of the impulse up to each since the one before [N·s]; none if unknown.
-    """
-    times = np.empty(0)
-    passed = np.empty(0)
-    if run.steps is not None:
-        times = run.steps["time"]
-        passed = np.abs(impulse(run.steps)) + np.abs(kicks(times, run.events))
-    yield tip_contacts(run.scene, run.events, end), times, passed
-    times = np.array([event.time for event in run.events])
-    yield (
-        foundation_contacts(run.events, end),
-        times,
-        np.array([abs(e.impulse_foundation) for e in run.events]),
-    )
-
-
-def _lasting(intervals: list[Interval], times: np.ndarray, passed: np.ndarray, window: float) -> list[Interval]:
-    """Join ``intervals`` closer than ``window`` [s]; return those longer or transmitting `SLIGHT` of all impulses.
-
-    Other parameters as of `_contacts_and_strokes`.
-    """
-    least = SLIGHT * passed.sum() if times.size else inf
-
-    def lasts(since: float, until: float) -> bool:
-        within = slice(np.searchsorted(times, since, "left"), np.searchsorted(times, until, "right"))
-        return until - since > window or passed[within].sum() >= least
-
-    return [interval for interval in _merged(intervals, window) if lasts(*interval)]
-
-
 def kicks(times: np.ndarray, events: Iterable[Event]) -> np.ndarray:
     """Return the events' impulses on the tip [N·s] at each of ``times`` [s], those of one time at its last row."""
     at = np.array([(event.time, event.impulse_contact) for event in events]).reshape(-1, 2)
     return np.bincount(np.searchsorted(times, at[:, 0], side="right") - 1, at[:, 1], len(times))
-
-
-def _furthest(ours: list[Interval], theirs: list[Interval], end: float) -> float:
-    """Return the largest distance of a beginning or an end from the nearest one of the others [s]."""
-    return max((min([end - i[k], *(abs(i[k] - j[k]) for j in theirs)]) for i in ours for k in (0, 1)), default=0.0)

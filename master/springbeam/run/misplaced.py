@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..motion.events import Event
-from ..results.distance import HELD
 from .errors.ends import Ends, Terms
 from .errors.loads import left_out
 from .errors.records import StepRecords
@@ -25,6 +24,8 @@ from .errors.tie import tie
 from .loads import ON_BEAM, ON_SPRING
 from .stepping import Pair
 
+#: A tip that moves less than this share of the beam's largest deflection does not move: it is held, or loads balance.
+HELD = 1e-9
 #: Relative error of an end from which on nothing more can be learnt.
 _LOST = 1e3
 #: A gap inside a step, or what a load adds, that is this share of the motion of an end does not count.

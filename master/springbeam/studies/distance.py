@@ -8,12 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .contact_times import contact_time_difference, impulse_difference
-from .dense import at
-from .trajectory import Trajectory
+from ..results.dense import at
+from ..results.trajectory import Trajectory
+from ..run.misplaced import HELD
+from .contact_changes import contact_time_difference, impulse_difference
 
-#: A tip that moves less than this share of the beam's largest deflection does not move: it is held, or loads balance.
-HELD = 1e-9
 #: Shares of the time from one row to the next, of either run, at which two runs are compared.
 _BETWEEN = np.arange(4.0) / 4.0
 
