@@ -100,7 +100,8 @@ def static_deflection(kag, variant):
     1/3EI + 1/KAG. Kelvin–Voigt damping brings the FMU to rest: its slowest rate is at least 1/2 s⁻¹ here, so that
     after 200 s what is left has decayed below e⁻¹⁰⁰.
     """
-    n, h = 10, 0.1
+    n = 10
+    h = 0.1
     true = 1.0 / 3.0 + 1.0 / kag
     beam = Beam.with_ones(shear_modulus=kag, n_elements=n, alpha_b=1.0, **_VARIANTS[variant])
     if beam.reduced_integration:
@@ -111,7 +112,8 @@ def static_deflection(kag, variant):
         "tip deflection over that of the beam, 1/3EI + 1/KAG (n = 10). Rounding: ε N² in an eigenproblem or "
         "factorisation of N = 2n unknowns"
     )
-    name, pull = f"KAG/EI {kag:g}: {variant}", {"on": "tip", "amplitude": 1.0}
+    name = f"KAG/EI {kag:g}: {variant}"
+    pull = {"on": "tip", "amplitude": 1.0}
     deflection = float(run_in_memory(scene_of(200.0, 1.0, [pull], beam=beam)).u_tip[-1])
     yield Check(name, share, deflection / true, (2 * n) ** 2 * EPS * share, reason)
 
@@ -171,7 +173,8 @@ def duffing(k1, k2, amplitude):
     """
     period = duffing_period(k1, k2, amplitude)
     spring = Spring.with_ones(linear_stiffness=k1, cubic_stiffness=k2, equilibrium=amplitude)
-    name, relative = f"({k1:g}, {k2:g}, {amplitude:g})", ida_error(2.0 * pi)
+    name = f"({k1:g}, {k2:g}, {amplitude:g})"
+    relative = ida_error(2.0 * pi)
     run = run_in_memory(scene_of(period, period / 20.0, spring=spring))
     yield Check(f"{name}: y(T) [m]", amplitude, float(run.y[-1]), relative * amplitude, IDA)
     yield Check(f"{name}: ẏ(T) [m/s]", 0.0, float(run.z[-1]), relative * amplitude * 2.0 * pi / period, IDA)

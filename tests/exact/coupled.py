@@ -39,7 +39,8 @@ def energy_scheme(kappa, size, degree, integrator, alpha):
 
     A constant load pulls the spring down from rest, so that the pair swings below Ψ and stays tied.
     """
-    steps, n = 100, 50
+    steps = 100
+    n = 50
     reason = "relative drift in 100 steps: coupling.tolerance of each step's work, at most twice the energy; and " + IDA
     spring = Spring.with_ones(linear_stiffness=3.0, cubic_stiffness=100.0, external_force=-0.1 * kappa)
     stiff = Beam.with_ones(young_modulus=kappa, shear_modulus=kappa, n_elements=n)
@@ -121,7 +122,8 @@ def resonance(factor):
 
     Exact, of the beam itself: a transfer matrix with EI and KAG times 1 + iωα_b.
     """
-    alpha, per_period = 0.4, 64
+    alpha = 0.4
+    per_period = 64
     first = clamped_free_frequencies()[0]
     w = factor * first
     H = 2.0 * pi / w / per_period

@@ -23,7 +23,8 @@ from springbeam.scene import Beam, scene_from_dict
 from .alone import IDA, Check, ida_error, section
 
 #: Stiffness [N, N·m²] that leaves the tip of a beam a free mass for a second, and rotary inertia that keeps θ at rest.
-_LIMP, _RIGID = 1e-13, 1e14
+_LIMP = 1e-13
+_RIGID = 1e14
 
 
 def impact(mass, speed, stiffness, exponent, damping=0.0):
@@ -65,7 +66,9 @@ def held(tip, top, **start):
 
 #: A tip of 0.5 kg, too limp to be held, that meets 2 kg at 1 m/s; their reduced mass [kg]; and λ_nc [N/m^q].
 _TIP = {"density": 1.5, "young_modulus": _LIMP, "shear_modulus": _LIMP, "initial_velocity_slope": -1.0}
-_MEETING, _REDUCED, _STIFFNESS = (_TIP, {"mass": 2.0, "linear_stiffness": 0.0}), 0.4, 1e4
+_MEETING = (_TIP, {"mass": 2.0, "linear_stiffness": 0.0})
+_REDUCED = 0.4
+_STIFFNESS = 1e4
 _HALVED = "how much the value changes when H is halved: at order 2 a triple of the error left, more at a higher one"
 _PROJECTED = (
     "a force without its Legendre terms above the degree d shifts the phase ωT by (2n+1) j_n(ωH/2)² of it, n = d + 1; "
@@ -81,7 +84,8 @@ def _phase(degree, angle):
 
 def _halving(quantities, scene, size, solver):
     """Yield checks of what a run at H = ``size``/2 gives, bounded by its change from H = ``size``."""
-    coarse, fine = run_in_memory(scene(macro_step=size)), run_in_memory(scene(macro_step=0.5 * size))
+    coarse = run_in_memory(scene(macro_step=size))
+    fine = run_in_memory(scene(macro_step=0.5 * size))
     for name, value, of in quantities:
         bound = abs(of(fine) - of(coarse)) + solver * abs(value)
         yield Check(name, value, of(fine), bound, f"{_HALVED}; and {IDA}")

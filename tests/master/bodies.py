@@ -51,7 +51,8 @@ class Double(Body):
 
     def _trial(self, time, size):
         before = {name: getattr(self, name) for name in self.CHANGES}
-        end, self.steps_made = self.advance_alone(time, size), self.steps_made - 1
+        end = self.advance_alone(time, size)
+        self.steps_made -= 1
         vars(self).update(before)
         return end
 
@@ -73,16 +74,21 @@ class ModalBody(Double):
 
     def __init__(self, omega, b, a, v, f=0.0, alpha=0.0, sampler=None):
         super().__init__()
-        self.omega, self.b = np.asarray(omega, float), np.asarray(b, float)
-        self.a, self.v = np.array(a, float), np.array(v, float)
+        self.omega = np.asarray(omega, float)
+        self.b = np.asarray(b, float)
+        self.a = np.array(a, float)
+        self.v = np.array(v, float)
         self.f = np.broadcast_to(np.asarray(f, float), self.omega.shape)
-        self._damping, self._sampler = alpha * self.omega**2, sampler
+        self._damping = alpha * self.omega**2
+        self._sampler = sampler
         self._responses = cache(partial(impulse_integrals, self.omega**2, self._damping))
         self.mass = 1.0 / float(self.b @ self.b)
 
     def advance(self, time, size, contact, foundation=NO_FORCE):
         self.steps_made += 1
-        a, v, S = self.a, self.v, self._responses(size)
+        a = self.a
+        v = self.v
+        S = self._responses(size)
         f = np.outer(contact, self.b)
         f[0] += self.f
         stored = sum(self.energies()[:2])
@@ -162,8 +168,13 @@ class DuffingBody(Double, EndLoaded):
 
     def __init__(self, mass=1.0, k1=3.0, k2=-0.2, y=0.0, z=0.0, damping=0.0, external=0.0):
         super().__init__()
-        self.mass, self.k1, self.k2, self.damping, self.external = mass, k1, k2, damping, external
-        self.y, self.z = float(y), float(z)
+        self.mass = mass
+        self.k1 = k1
+        self.k2 = k2
+        self.damping = damping
+        self.external = external
+        self.y = float(y)
+        self.z = float(z)
 
     def advance(self, time, size, contact, foundation=NO_FORCE):
         self.steps_made += 1
@@ -184,14 +195,16 @@ class DuffingBody(Double, EndLoaded):
                 self._dissipated += self.damping * float(polyval(h, polyint(polymul(z, z))))
             i2 += h * i1 + _value(twice, h)
             i1 += _value(once, h)
-            self.y, self.z = _value(y, h), _value(z, h)
+            self.y = _value(y, h)
+            self.z = _value(z, h)
         self._integrals = (i1, i2)
         self._acting = shifted(force, size)[0]
         self._work += work_on(self._on_end, start, self.motion(), size)
         return self.motion()
 
     def _series(self, f0, f1, f2):
-        y, z = [self.y, self.z], [self.z]
+        y = [self.y, self.z]
+        z = [self.z]
         squares = []
         for k, f in enumerate((f0 + self.external, f1, 0.5 * f2, *[0.0] * (_ORDER - 4))):
             f -= self.damping * z[k] + self.k1 * y[k]
@@ -221,7 +234,8 @@ class DuffingBody(Double, EndLoaded):
         return Motion(self.y, self.z, *self._integrals)
 
     def energies(self):
-        y, z = self.y, self.z
+        y = self.y
+        z = self.z
         return Energies(
             0.5 * self.mass * z * z,
             0.5 * self.k1 * y * y + 0.25 * self.k2 * y**4,
@@ -255,8 +269,10 @@ def _value(coefficients, h):
 def interface_of(scene, tip_mass=0.01, mass=1.0, equilibrium=0.0):
     """What may meet in ``scene``, of ends with these masses."""
     setup = set_up(scene)
-    upper, lower = Upper(), DuffingBody()
-    upper.mass, lower.mass = tip_mass, mass
+    upper = Upper()
+    lower = DuffingBody()
+    upper.mass = tip_mass
+    lower.mass = mass
     alone = not setup.lower
     return Interface(upper, lower, setup.law, equilibrium, setup.floor, setup.restitution, alone)
 
@@ -338,7 +354,8 @@ def couple(coupling, size, steps, upper, lower):
 
     rows = [row(NO_FORCE)]
     for i in range(steps):
-        guess, start = shifted(rows[-1].force, size), rows[-1][:2]
+        guess = shifted(rows[-1].force, size)
+        start = rows[-1][:2]
         contact = solve(coupling, size, upper, lower, guess, i * size)
         coupling.accept(Step(i * size, size, contact, NO_FORCE, start, (upper.motion(), lower.motion())))
         rows.append(row(contact))

@@ -64,7 +64,9 @@ def dips(restitution, turn):
         "stop": {"position": -0.08, "restitution": restitution},
         "coupling": {"macro_step": turn / 10.0},
     }
-    times, time, speed = [], np.arccos(-0.8) / 10.0, 0.6
+    times = []
+    time = np.arccos(-0.8) / 10.0
+    speed = 0.6
     while time < 5.0:
         times.append(float(time))
         speed *= restitution
@@ -90,18 +92,21 @@ def integrated_anew(scene, patch, t_end):
     patch.setattr(ExponentialPropagator, "_step", noted)
     run = integrate(scene, sample_times=np.linspace(0.0, t_end, 31), t_end=t_end)
     for propagator, segment in (one for some in kept.values() for one in some):
-        s, phase = propagator.form.system, propagator.form.phase
+        s = propagator.form.system
+        phase = propagator.form.phase
 
         def slope(_, X, s=s, phase=phase):
             m = s.motion(phase, X)
             return np.concatenate([X[s.V], m.a, [s.dissipation_rate(phase, X), s.load_power(X), 1.0]])
 
         options = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-18}
-        begin, end = segment.states[0], segment.states[-1]
+        begin = segment.states[0]
+        end = segment.states[-1]
         found = s.synchronise(phase, solve_ivp(slope, (0.0, segment.nodes[-1]), begin, **options).y[:, -1].copy())
         energy = sum(np.abs(part) for part in s.energies(np.stack([begin, end]), phase).values()).max()
         for parts in (s.A, s.V):
-            error, size = np.abs(found - end)[parts], np.abs([begin, end])[:, parts]
+            error = np.abs(found - end)[parts]
+            size = np.abs([begin, end])[:, parts]
             assert np.max(error) <= 1e-11 * np.max(size), (phase, parts)
         for part in (s.D, s.W):
             assert abs(found[part] - end[part]) <= 1e-11 * energy, (phase, part)

@@ -58,10 +58,15 @@ def block(n=300, scene=PAIR, t_end=3.0, begin=0):
     for name in STEP_COLUMNS:
         steps[name] = rng.normal(size=n)
     number = np.arange(begin, begin + n)
-    steps["time"], steps["size"] = t_end * number / max(begin + n - 1, 1), np.where(number % 7, t_end / n, 0.0)
-    steps["phase"], steps["events"], steps["energy_at_start"] = number % 6, (number + 9) // 10, 0.25
-    steps["reports"], steps["degree"] = BEAM_REPORTS + SPRING_REPORTS, 2.0
-    steps["tip_share"], steps["reduced_mass"] = 0.25, 0.75
+    steps["time"] = t_end * number / max(begin + n - 1, 1)
+    steps["size"] = np.where(number % 7, t_end / n, 0.0)
+    steps["phase"] = number % 6
+    steps["events"] = (number + 9) // 10
+    steps["energy_at_start"] = 0.25
+    steps["reports"] = BEAM_REPORTS + SPRING_REPORTS
+    steps["degree"] = 2.0
+    steps["tip_share"] = 0.25
+    steps["reduced_mass"] = 0.75
     happen = number[number % 10 == 1]
     events = [Event(float(steps["time"][i - begin]), "impact", 0.5, -1.0, None, 0.1 * i) for i in happen]
     shapes = np.column_stack([steps["time"], rng.normal(size=(n, 63))]) if scene.beam is not None else np.empty((0, 64))

@@ -25,11 +25,14 @@ def instant(phase, ends, contact=0.0, tolerance=1e-17, start=None, elapsed=0.0):
 @pytest.mark.parametrize(("kind", "v"), [(EventKind.RELEASE, 3.0), (EventKind.SEPARATION, -3.0)])
 def test_ends_that_part_have_one_velocity(kind, v):
     """That of their momentum."""
-    z, tip_mass, mass = 0.5, 0.01, 1.0
+    z = 0.5
+    tip_mass = 0.01
+    mass = 1.0
     ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, z, 0.0, 0.0)
     _, phase, impact = automaton_of().after(kind, instant(Phase(Joint.TIED), ends))
     assert phase.joint is Joint.FREE
-    v_after, z_after = v + impact.on_beam / tip_mass, z + impact.on_spring / mass
+    v_after = v + impact.on_beam / tip_mass
+    z_after = z + impact.on_spring / mass
     assert v_after == pytest.approx(z_after, rel=1e-14)
     assert tip_mass * v_after + mass * z_after == pytest.approx(tip_mass * v + mass * z, rel=1e-14)
 
@@ -125,7 +128,8 @@ def test_the_slopes_of_what_damping_adds_are_those_of_its_force(law, rate):
     def damping(p, rate):
         return law.force(p, rate) - law.force(p)
 
-    p, d = 0.01, 1e-6
+    p = 0.01
+    d = 1e-6
     slopes = (
         (damping(p + d, rate) - damping(p - d, rate)) / (2 * d),
         (damping(p, rate + d) - damping(p, rate - d)) / (2 * d),

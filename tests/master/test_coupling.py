@@ -23,7 +23,8 @@ DEGREES = [0, 1, 2]
 
 def after_impact(n, stiffness=100.0, **spring):
     """A beam that has just met a spring top at rest inelastically."""
-    beam, top = unit_beam(n, stiffness), DuffingBody(**spring)
+    beam = unit_beam(n, stiffness)
+    top = DuffingBody(**spring)
     j = 1.0 / (1.0 / beam.mass + 1.0 / top.mass)
     beam.apply_impulse(j)
     top.apply_impulse(-j)
@@ -74,7 +75,8 @@ class Grainy(DuffingBody):
 @pytest.mark.parametrize(("grain", "found"), [(1e-13, True), (1e-11, False)])
 def test_a_body_may_be_rounded_by_a_thousand_tolerances_and_no_more(grain, found):
     """The tolerance is 1e-12 of the distance in a step, 0.5 m/s · 1 ms; a gap of so many is left at most."""
-    upper, lower = Upper(1.0, 100.0, 0.0, z=0.5), Grainy(1.0, 50.0, 0.0, z=0.5)
+    upper = Upper(1.0, 100.0, 0.0, z=0.5)
+    lower = Grainy(1.0, 50.0, 0.0, z=0.5)
     lower.grain = grain
     if found:
         rows = couple(StepSolver(0, 1e-12), 1e-3, 20, upper, lower)
@@ -101,7 +103,10 @@ class Affine(Body):
     """Ends a step at ``free`` + ``response``·C [m]."""
 
     def __init__(self, free, response, size):
-        self.free, self.response, self.mass, self.state = free, response, 0.5 * size**2 / abs(response), 0.0
+        self.free = free
+        self.response = response
+        self.mass = 0.5 * size**2 / abs(response)
+        self.state = 0.0
 
     def advance(self, time, size, contact, foundation=NO_FORCE):
         self.state = self.free + self.response * contact[0]
@@ -126,14 +131,16 @@ def test_forces_are_found_however_far_they_move_the_ends(depth, response):
 def test_exchanged_forces_are_of_the_ends_as_they_were_exchanged(sequential, degree, pressed):
     """p = 2 mm grows by 0.5 m/s over 4 ms, λ = 1 kN/m: the mean force on the lower mass is λ p at the start, 2 N,
     half-way of its continuation, or with the tip where the force on it, 2 or 2 + 500 t N, has brought it."""
-    upper, lower = Upper(8.0, 0.0, 0.0, y=0.0, z=-0.25), DuffingBody(8.0, 0.0, 0.0, y=2e-3, z=0.25)
+    upper = Upper(8.0, 0.0, 0.0, y=0.0, z=-0.25)
+    lower = DuffingBody(8.0, 0.0, 0.0, y=2e-3, z=0.25)
     solve(Exchange(Compliance(1e3, 1.0), sequential, degree), 4e-3, upper, lower)
     assert 8.0 * (0.25 - lower.z) / 4e-3 == pytest.approx(pressed, abs=1e-9)
 
 
 # -- the projected law by itself: its work is what the law stores and takes, to rounding -----------------------------
 
-EPS, SMALLEST = float(np.finfo(float).eps), float(np.finfo(float).smallest_subnormal)
+EPS = float(np.finfo(float).eps)
+SMALLEST = float(np.finfo(float).smallest_subnormal)
 SIZE = 0.01
 
 

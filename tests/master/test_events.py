@@ -24,7 +24,8 @@ class Counted:
     """f = cos τ − level; falls through zero at acos(level). Its rate is told ``slope`` times as large."""
 
     def __init__(self, level, slope):
-        self.level, self.slope = level, slope
+        self.level = level
+        self.slope = slope
         self.sizes = []
 
     def __call__(self, size):
@@ -79,7 +80,8 @@ HAPPENS = table("master/cases.toml")["happens"]
 def test_what_may_happen_in_a_phase_is_as_far_away_as_it_is_and_comes_as_fast_as_the_ends(name):
     """Ψ is at 0.1 m, the stop at −15 mm; joined ends move with the velocity of their momentum."""
     changes = dict(HAPPENS[name])
-    scene, expected = load_scene(changes.pop("of")), changes.pop("expected")
+    scene = load_scene(changes.pop("of"))
+    expected = changes.pop("expected")
     phase = Phase(Joint(changes.pop("joint")), changes.pop("seated", False))
     automaton = Automaton(interface_of(with_changes(scene, **changes), equilibrium=0.1))
     samples = automaton.samples(phase, RISING)

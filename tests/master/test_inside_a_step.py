@@ -18,7 +18,8 @@ SIZE = 0.02
 
 def through(p, size=SIZE):
     """Path through what a step would tell of p(τ/H): values, rates and means."""
-    q, q0 = p.integ(), p.integ(2)
+    q = p.integ()
+    q0 = p.integ(2)
     samples = [(float(p(s)), float(p.deriv()(s)) / size) for s in (0.0, 1.0)]
     return Path.through(*samples, size, (float(q(1.0)), float(q0(1.0))))
 
@@ -26,7 +27,8 @@ def through(p, size=SIZE):
 @pytest.mark.parametrize(("even", "odd"), [(0.0, -1.0), (0.7, 0.4)])
 def test_path_and_cubic_are_apart_by_no_more_than_they_say(even, odd):
     """s²(1 − s)² [even + odd (2s − 1)] beside a cubic; one part alone is met."""
-    s, one = Polynomial((0.0, 1.0)), Polynomial((1.0,))
+    s = Polynomial((0.0, 1.0))
+    one = Polynomial((1.0,))
     beside = s**2 * (one - s) ** 2 * (even * one + odd * (2.0 * s - one))
     apart = np.abs(beside(np.linspace(0.0, 1.0, 2001))).max()
     told = through(Polynomial((0.3, -1.0, 2.0, 0.5)) + beside).beside_cubic
@@ -42,8 +44,12 @@ def test_the_last_moment_tells_how_far_an_end_may_be_off_between_rows_but_of_a_t
     """An end goes 1 m in a step of 1 s from rest to rest, and ∫∫ is 1e-5 m·s² beside the cubic's: the path is 420 times
     that times s²(1 − s)²(1 − 2s) beside it, which is at most 1/(25 √5)."""
     steps = np.zeros(2, STEP)
-    steps["phase"], steps["size"][1], steps[end][1], steps[f"{end}_after"][1] = phase, 1.0, 1.0, 1.0
-    steps[f"{end}_integral"][1], steps[f"{end}_integral_2"][1] = 0.5, 0.15 + 1e-5
+    steps["phase"] = phase
+    steps["size"][1] = 1.0
+    steps[end][1] = 1.0
+    steps[f"{end}_after"][1] = 1.0
+    steps[f"{end}_integral"][1] = 0.5
+    steps[f"{end}_integral_2"][1] = 0.15 + 1e-5
     found = between_rows(True, steps)
     assert found == pytest.approx(seen * 420e-5 / (25.0 * 5.0**0.5), rel=1e-7, abs=1e-15)
 

@@ -20,7 +20,8 @@ ASKED = table("master/cases.toml")["asked"]
 @pytest.mark.parametrize("what", ASKED)
 def test_a_scene_asks_of_a_body_what_it_needs_and_no_more(what):
     changes = dict(ASKED[what])
-    lacks, asks = changes.pop("lacks"), changes.pop("asks")
+    lacks = changes.pop("lacks")
+    asks = changes.pop("asks")
     setup = set_up(with_changes(load_scene("soft"), **changes, stop=None))
     lines = refusals(setup, {"spring": replace(Abilities(), **lacks)})
     assert [line.partition(" = ")[0].partition(":")[0] for line in lines] == asks

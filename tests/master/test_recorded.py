@@ -52,7 +52,8 @@ def test_what_a_bench_writes_is_read_as_it_is_said_to(file, what):
 @pytest.mark.parametrize("what", TABLE["refused"])
 def test_nothing_is_guessed(file, what):
     keys = dict(TABLE["refused"][what])
-    text, said = keys.pop("text"), keys.pop("said")
+    text = keys.pop("text")
+    said = keys.pop("said")
     with pytest.raises(ValueError, match=re.escape(said)):
         read(file, text.encode(), **keys)
 

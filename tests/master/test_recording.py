@@ -111,12 +111,14 @@ def all_of(run):
 def test_memory_and_files_hold_the_same_and_the_rows_are_its_columns(tmp_path, scene):
     kept = [block(300, scene), block(77, scene, 4.0, 300)]
     kept[0][0]["z_after"][:4] = -0.0, 5e-324, 1.7e308, 1.0 / 3.0
-    memory, files = MemoryRecorder(scene), FileRecorder(scene, RunDirectory.create(tmp_path / "run"))
+    memory = MemoryRecorder(scene)
+    files = FileRecorder(scene, RunDirectory.create(tmp_path / "run"))
     for recorder in (memory, files):
         for steps, events, shapes in kept:
             recorder.keep(steps, events, shapes)
         recorder.finish({"status": "done"})
-    run, loaded = memory.trajectory(), load_trajectory(tmp_path / "run")
+    run = memory.trajectory()
+    loaded = load_trajectory(tmp_path / "run")
     assert all_of(run) == all_of(loaded)
     assert (len(run), len(run.events), run.summary["status"]) == (377, 38, "done")
     assert loaded.scene == scene
@@ -131,7 +133,8 @@ def test_memory_and_files_hold_the_same_and_the_rows_are_its_columns(tmp_path, s
 
 def test_files_are_plain_csv_and_json(tmp_path):
     steps, _, shapes = block(2)
-    steps["u_tip_after"], steps["events"] = 1.0 / 3.0, [0, 1]
+    steps["u_tip_after"] = 1.0 / 3.0
+    steps["events"] = [0, 1]
     filed(tmp_path / "run", (steps, [Event(0.1, "impact", y=0.5, z=-1.0, energy_loss=0.25, joint="tied")], shapes))
     header, first, second, end = (tmp_path / "run" / "trajectory.csv").read_bytes().decode().split("\n")
     assert header.split(",") == [*COLUMNS, *(name for name in BODY_COLUMNS if name != "bending_stress")]
@@ -243,7 +246,8 @@ def test_tables_are_exported_as_parquet(tmp_path, scene):
     run = filed(tmp_path / "run", block(30, scene), scene=scene)
     files = export(tmp_path / "run", "parquet")
     assert [file.name for file in files] == list(PARQUET[: 2 + (scene.beam is not None)])
-    there, tables = load_trajectory(run.directory.path), [parquet.read_table(file).to_pydict() for file in files]
+    there = load_trajectory(run.directory.path)
+    tables = [parquet.read_table(file).to_pydict() for file in files]
     assert tables[0] == {name: values.tolist() for name, values in there.columns.items()}
     assert tables[1]["kind"] == ["impact"] * 3
     assert tables[1]["v_tip"] == [event.v_tip for event in there.events]
@@ -355,7 +359,8 @@ def test_rows_that_find_no_room_lose_no_record(tmp_path):
 
 def test_a_run_is_handed_over_up_to_where_it_goes_wrong():
     """A record of the second block is not finite: those before it are kept with their events."""
-    recorder, judged = MemoryRecorder(PAIR), []
+    recorder = MemoryRecorder(PAIR)
+    judged = []
 
     def judge(steps, first):
         judged.append((len(steps), first["time"].tolist()))

@@ -123,7 +123,8 @@ def test_the_order_of_the_frequencies_is_twice_the_degree(degree, n, reduced):
 def test_a_beam_of_few_modes_starts_and_answers_static_forces_as_that_of_all(n_modes):
     """Three shapes beside the modes: those of a tip force and of a uniform load, and the start u = x."""
     given = beam(4.0, 9.0, n_elements=30, n_modes=n_modes, distributed_load=-2.0)
-    few, every = modal_beam(given), modal_beam(given.model_copy(update={"n_modes": 0}))
+    few = modal_beam(given)
+    every = modal_beam(given.model_copy(update={"n_modes": 0}))
     assert len(few.omega) == n_modes + 3
     shears = beam(1e14, 9.0, n_elements=30, n_modes=n_modes)  # u = x is what a tip force makes of it
     assert len(modal_beam(shears).omega) == n_modes + 2
@@ -143,7 +144,8 @@ def test_units_do_not_matter(metre, second):
         mesh = {"n_elements": 22, "element_degree": 12, "n_modes": 19}
         return beam(1e4 * stiffness, 4e3 * stiffness, **scales, density=100.0 / metre**3, **mesh)
 
-    found, expected = modal_beam(slender(metre, second)).omega * second, modal_beam(slender(1.0, 1.0)).omega
+    found = modal_beam(slender(metre, second)).omega * second
+    expected = modal_beam(slender(1.0, 1.0)).omega
     assert found[:19] == pytest.approx(expected[:19], rel=1e-12)
     # The static shapes lie in the span of the modes but for some 1e-6 of them: what is left has lost so many digits.
     assert found[19:] == pytest.approx(expected[19:], rel=1e-8)

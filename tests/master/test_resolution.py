@@ -64,7 +64,8 @@ def judged(scene, misplaced=0.0, between=0.0, steps=None):
 @pytest.mark.parametrize("turn", [1.0, 3.0, 2.0 * np.pi, 8.0])
 def test_the_curve_of_an_oscillation_is_as_wrong_as_is_said(turn):
     """A mass on a spring, which rows show exactly: in 40 steps that are no whole period every phase comes by."""
-    omega, H = 10.0, turn / 10.0
+    omega = 10.0
+    H = turn / 10.0
     table = {"element": "spring_damper", "mass": 1.0, "stiffness": omega**2, "displacement": 0.5, "velocity": 3.0}
     coupling = {"macro_step": H, "degree": 0}
     run = simulate({"time": {"t_end": 40.0 * H}, "beam": table, "coupling": coupling})
@@ -194,7 +195,8 @@ def test_a_table_in_resonance_with_a_mode_that_turns_far_in_a_step_is_said(tmp_p
     slender = {**sizes, "n_elements": 8, "reduced_integration": True}
     beam = scene_from_dict({"time": {"t_end": 1.0}, "beam": slender}).beam
     first, _, third = modal_beam(beam).omega[:3]
-    end, file = 4.0 * np.pi / first, tmp_path / "table.csv"
+    end = 4.0 * np.pi / first
+    file = tmp_path / "table.csv"
     times = np.linspace(0.0, end, 800)
     np.savetxt(file, np.column_stack([times, np.sin(third * times)]), delimiter=",")
     load = {"on": on, "signal": "table", "file": str(file), "interpolation": "cubic"}
@@ -240,7 +242,8 @@ def test_a_peak_force_that_depends_on_the_mesh_is_told(factor, told):
 
 
 def test_ends_move_with_both_masses_unless_the_lower_one_is_held():
-    tip, top = 2.0, 1.0
+    tip = 2.0
+    top = 1.0
     both = Pair(set_up(PAIR), Upper(tip), DuffingBody(top))
     assert both.reduced_mass(Phase(Joint.TIED)) == pytest.approx(tip * top / (tip + top), rel=1e-15)
     assert both.reduced_mass(Phase(Joint.TIED, seated=True)) == tip

@@ -119,7 +119,8 @@ def test_any_value_of_a_key_is_allowed_or_explained(place, value):
 @pytest.mark.parametrize("stop", [None, -1.0, -10.0])
 def test_a_softening_spring_may_start_with_the_energy_of_its_lower_rim(load, stop):
     """Rims from a general root finder; a foundation inside the well bars the one below."""
-    k1, k2 = 3.0, -0.2
+    k1 = 3.0
+    k2 = -0.2
     low, _, high = sorted(np.roots([k2, 0.0, k1, -load]).real)
     rims = (high,) if stop == -1.0 else (low, high)
     depth = min(0.5 * k1 * y**2 + 0.25 * k2 * y**4 - load * y for y in rims)
@@ -168,7 +169,8 @@ def test_other_ways_to_give_a_beam_mean_the_same(given, follows):
 @pytest.mark.parametrize("name", DOUBTS)
 def test_what_can_hardly_be_meant_is_told(name):
     changes = dict(DOUBTS[name])
-    scene, said = load_scene(changes.pop("of")), changes.pop("said")
+    scene = load_scene(changes.pop("of"))
+    said = changes.pop("said")
     lines = suspicions(with_changes(scene, **without_false(changes)))
     assert len(lines) == len(said), lines
     assert all(fragment in line for fragment, line in zip(said, lines, strict=True)), lines

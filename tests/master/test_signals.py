@@ -56,7 +56,8 @@ def test_turns_of_a_chirp_between_two_rows_have_no_response(rows):
 # -- shock response spectra ---------------------------------------------------------------------------------------
 
 #: Half-sine of 100 m/s² in 11 ms.
-PEAK, PULSE = 100.0, 0.011
+PEAK = 100.0
+PULSE = 0.011
 
 
 def half_sine_velocity(times):
@@ -71,7 +72,8 @@ def spectrum(frequencies, quality, step=PULSE / 4000.0):
 
 def duhamel(frequency, quality, time):
     """ẍ at ``time`` by the convolution of the pulse with the impulse response of H."""
-    omega, zeta = 2.0 * np.pi * frequency, 0.5 / quality
+    omega = 2.0 * np.pi * frequency
+    zeta = 0.5 / quality
     swing = omega * np.sqrt(1.0 - zeta**2)
 
     def kernel(t):

@@ -32,8 +32,10 @@ def soft(n=6, **tables):
 def test_a_bouncing_mass_comes_to_rest_after_its_geometric_series(e, size):
     """Constant load g, from height d: rest after t₁ + 2 v₁ (e + e² + …)/g, where e ≥ 0.97 bounces hundreds of times at
     once. Cut off are rebounds below 1e-8 v₁ or over within 1e-9 H; all of the energy is booked as impact losses."""
-    g, d = 10.0, 0.05
-    v, t1 = (2.0 * g * d) ** 0.5, (2.0 * d / g) ** 0.5
+    g = 10.0
+    d = 0.05
+    v = (2.0 * g * d) ** 0.5
+    t1 = (2.0 * d / g) ** 0.5
     rest = t1 + 2.0 * v / g * e / (1.0 - e)
     scene = scene_from_dict({
         "time": {"t_end": rest + 5.0 * size},
@@ -89,7 +91,8 @@ def wrapped(**overrides):
 @pytest.mark.parametrize(("any_size", "halvings"), [(True, 20), (False, 0)])
 def test_a_step_that_stays_refused_is_halved_20_times(any_size, halvings):
     """If it may have any size. The run then stops where that step begins; what was made before is kept."""
-    scene, tried = with_changes(load_scene("duffing"), time={"t_end": 0.1}, coupling={"macro_step": 1e-3}), []
+    scene = with_changes(load_scene("duffing"), time={"t_end": 0.1}, coupling={"macro_step": 1e-3})
+    tried = []
 
     def advance(own, time, size, *forces):
         if time < 0.0495:
@@ -126,11 +129,9 @@ def test_a_diagnostic_column_that_overflows_does_not_stop_a_run(stiffness, expon
 def test_a_residual_is_relative_to_the_largest_energy_so_far_that_of_the_contact_included():
     """1 J at first; a load then does 99 J of work, which the contact stores but for 1 mJ; and all comes back."""
     steps = np.zeros(3, STEP)
-    steps["beam_kinetic"], steps["law_stored"], steps["beam_load"] = (
-        [1.0, 0.0, 1.0],
-        [0.0, 99.999, 0.0],
-        [0.0, -99.0, 0],
-    )
+    steps["beam_kinetic"] = [1.0, 0.0, 1.0]
+    steps["law_stored"] = [0.0, 99.999, 0.0]
+    steps["beam_load"] = [0.0, -99.0, 0]
     steps["energy_at_start"] = 1.0
     share, largest = errors(steps, steps[:1], 0.0)
     assert share == pytest.approx([0.0, -1e-3 / 99.999, 0.0], rel=1e-9)

@@ -55,7 +55,9 @@ def omega_max(p):
 def test_integrals_of_the_impulse_response(omega, c, h, bound):
     """Against the exponential of (ξ, ξ̇, F, Ḟ, F̈, ∫ξ, ∫∫ξ), whose own rounding is |A|h ulp."""
     A = np.zeros((7, 7))
-    A[0, 1], A[1, 0], A[1, 1] = 1.0, -(omega**2), -c
+    A[0, 1] = 1.0
+    A[1, 0] = -(omega**2)
+    A[1, 1] = -c
     A[1, 2] = A[2, 3] = A[3, 4] = A[5, 0] = A[6, 5] = 1.0
     E = expm(A * h)
     exact = [E[1, 1], E[0, 1], E[0, 2], E[0, 3], E[0, 4], E[5, 4], E[6, 4]]
@@ -71,7 +73,8 @@ def solved(p, scheme, degree, h):
 
     A closed contact is a link.
     """
-    r, mass = len(p.beam.b), p.spring.mass
+    r = len(p.beam.b)
+    mass = p.spring.mass
     columns = []
     for unit in np.eye(2 * r + 2):
         beam = ModalBody(np.sqrt(p.beam.omega2), p.beam.b, unit[:r], unit[r : 2 * r])
@@ -140,7 +143,8 @@ def test_a_scene_is_told_by_the_numbers_of_hand_calculation():
     scene = with_changes(load_scene("soft"), beam=beam, spring={"mass": 3.0, "linear_stiffness": 70.0})
     omega = modal_beam(scene.beam).omega
     p = predict(with_changes(scene, coupling={"macro_step": 0.999 / omega[2]}))
-    told, stiffness = p["estimates"], 1.0 / (0.125 / 360.0 + 0.5 / 56.0)
+    told = p["estimates"]
+    stiffness = 1.0 / (0.125 / 360.0 + 0.5 / 56.0)
     assert (told["beam_mass"], told["tip_stiffness"]) == pytest.approx((3.0, stiffness), rel=1e-14)
     assert (told["spring_mass"], told["spring_stiffness"]) == (3.0, 70.0)
     half_period = np.pi * np.sqrt((3.0 + tip_inertia(scene.beam)) / (70.0 + stiffness))

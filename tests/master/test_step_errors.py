@@ -52,8 +52,10 @@ def test_the_force_that_a_step_leaves_out_may_move_the_ends_by_the_tolerances(tu
     inside -= np.polynomial.Polynomial([0.5, 0.5]).convert(kind=np.polynomial.Legendre) * inside(1.0)
     largest = np.abs(inside(np.linspace(-1.0, 1.0, 2001))).max()
     a = share * (1e-3 * 0.5 + 2e-3) * 4.0 * 5.0 / largest
-    turning, sign = 1e3 * turned, (-1.0) ** degree
-    state.phase, state.present = Phase(Joint.TIED), Present(sign * (a - turning))
+    turning = 1e3 * turned
+    sign = (-1.0) ** degree
+    state.phase = Phase(Joint.TIED)
+    state.present = Present(sign * (a - turning))
     steps._pair.present = lambda *_: Present(-a - turning)
     end = Motion(0.5, 0.0, 0.75, 8.5 / 20.0)
     step = Step(0.0, 1.0, NO_FORCE, NO_FORCE, (Motion(1.0, 0.0, 0.0, 0.0),) * 2, (end, end))

@@ -17,7 +17,9 @@ SCENE = load_scene("soft")
 def steps_with(force, ends, tip=lambda t: -t, rate=lambda t: -1.0, once=None):
     """Steps between ``ends``; ``force(t)`` is (C, Ċ, C̈) of the step that starts at t, the tip moves as told."""
     steps = np.zeros(len(ends), STEP)
-    steps["time"], steps["u_tip"], steps["v_tip"] = ends, [tip(t) for t in ends], [rate(t) for t in ends]
+    steps["time"] = ends
+    steps["u_tip"] = [tip(t) for t in ends]
+    steps["v_tip"] = [rate(t) for t in ends]
     for k, start in enumerate(ends[:-1], start=1):
         steps["size"][k] = ends[k] - start
         for name, value in zip(
@@ -102,7 +104,8 @@ def test_the_deepest_place_is_between_the_rows(ends):
 
 def test_the_deepest_place_may_follow_an_event():
     """At 0.5 the tip is thrown down from −1: it goes on as −1 − (t − ½) + 2 (t − ½)², lowest at 0.75."""
-    before, after = np.polynomial.Polynomial([-2.0, 2.0]), np.polynomial.Polynomial([0.0, -3.0, 2.0])
+    before = np.polynomial.Polynomial([-2.0, 2.0])
+    after = np.polynomial.Polynomial([0.0, -3.0, 2.0])
     steps = np.append(moving([0.0, 0.5], before), moving([0.5, 1.0], after)[1:])
     steps["v_tip_after"][1] = -1.0
     numbers = found(steps, Event(0.5, "separation", y=-2.0, z=0.0, u_tip=-1.0, v_tip=-1.0))

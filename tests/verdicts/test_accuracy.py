@@ -108,7 +108,8 @@ def test_a_pilot_that_stopped_early_is_not_returned_however_near_it_is(monkeypat
 )
 def test_two_runs_and_the_law_show_how_wrong_a_peak_force_is(exponent, share):
     """A mass of 2 kg falls on a soft stop, in steps of which the window of its peak force is a ``share``."""
-    mass, stiffness = 2.0, 1e6
+    mass = 2.0
+    stiffness = 1e6
     deep = (0.5 * mass * (exponent + 1.0) / stiffness) ** (1.0 / (exponent + 1.0))  # at 1 m/s
     omega = np.sqrt(exponent * stiffness * deep ** (exponent - 1.0) / mass)
     H = 0.02 * 2.0 * np.pi / omega / share

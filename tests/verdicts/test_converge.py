@@ -37,7 +37,8 @@ def test_errors_are_from_the_limit_and_as_given_is_the_mesh_of_the_scene():
 
 def test_beyond_all_modes_there_is_nothing():
     """24 of 24 modes are the mesh's own solution. Its "error" was extrapolated from 6 and 12."""
-    values, sizes = (1.0, 1.5, 1.75), (6, 12, 24)
+    values = (1.0, 1.5, 1.75)
+    sizes = (6, 12, 24)
     assert extrapolated(values, sizes).limit == pytest.approx(2.0)
     assert extrapolated(values, sizes, complete=True) == (0.25, None, 1.75, 0.0)
     for elements, error in ((12, 0.0), (24, 0.25)):  # of 24 modes, of 48

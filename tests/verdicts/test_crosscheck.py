@@ -61,16 +61,19 @@ def test_any_elements_and_loads_pass(degree, loads, beam):
 )
 def test_an_error_may_be_four_times_what_halving_has_changed_so_far_and_the_floor(error, at, passed):
     """Told is the largest error or, where a bound is broken, the one that is furthest out of it."""
-    changed, floor = np.array([0.1, 0.0, 0.2]), np.full(3, 0.01)
+    changed = np.array([0.1, 0.0, 0.2])
+    floor = np.full(3, 0.01)
     found = _judged("y", np.array([1.0, 2.0, 3.0]), np.array(error), changed, floor)
-    rms, bound = np.sqrt(np.mean(np.square(error))), (0.41, 0.41, 0.81)[at]
+    rms = np.sqrt(np.mean(np.square(error)))
+    bound = (0.41, 0.41, 0.81)[at]
     assert (found["at"], found["error"], found["passed"]) == (at + 1.0, error[at], passed)
     assert (found["l2"], found["bound"]) == pytest.approx((rms, bound), rel=1e-14)
 
 
 def test_what_cannot_be_compared_has_not_agreed(tmp_path):
     """Tip and top touch at one velocity: the least change of it decides whether they are joined at once."""
-    beam, spring = {"n_elements": 3, "fidelity": "quasi_static"}, {"initial_velocity": -1.0}
+    beam = {"n_elements": 3, "fidelity": "quasi_static"}
+    spring = {"initial_velocity": -1.0}
     grazing = with_changes(SOFT, beam=beam, spring=spring, time={"t_end": 0.05}, coupling={"macro_step": 1e-3})
     found = crosscheck(grazing)
     assert (found.document["verdict"], found.document["quantities"]) == ("not comparable", [])

@@ -35,7 +35,8 @@ DUFFING = ["fit", "duffing", "m.csv", "--set", "time.t_end=0.6", "--set", *COARS
 
 def exact(times=TIMES):
     """y of the oscillator in closed form."""
-    decay, rate = 3.0, np.sqrt(4000.0 - 9.0)
+    decay = 3.0
+    rate = np.sqrt(4000.0 - 9.0)
     return 0.4 / rate * np.exp(-decay * times) * np.sin(rate * times)
 
 
@@ -84,7 +85,8 @@ def test_residuals_are_those_of_each_curve(tmp_path):
     run = simulate(OSCILLATOR)
     path = written(tmp_path / "m.csv", "time,y,z", TIMES + 0.2, 1.5 * exact(), np.zeros(len(TIMES)))
     of_y, of_z = residuals(run, read_measured(path, OSCILLATOR), -0.2)
-    rms, at = 0.5 * np.sqrt(np.mean(exact() ** 2)), int(np.argmax(np.abs(exact())))
+    rms = 0.5 * np.sqrt(np.mean(exact() ** 2))
+    at = int(np.argmax(np.abs(exact())))
     expected = (len(TIMES), rms, rms / np.std(1.5 * exact()), 0.5 * abs(exact()[at]), TIMES[at])
     assert of_y[1:] == pytest.approx(expected, rel=1e-6)
     assert of_z.relative == of_z.rms
@@ -177,7 +179,8 @@ def test_curves_weigh_by_what_is_left_of_them(tmp_path):
 
 def test_intervals_are_those_of_linear_least_squares(tmp_path):
     """y is linear in where the oscillator begins and how fast; an interval of a logarithm is as wide over the key."""
-    rate, scene = np.sqrt(4000.0 - 9.0), with_changes(OSCILLATOR, spring={"equilibrium": 5e-3})
+    rate = np.sqrt(4000.0 - 9.0)
+    scene = with_changes(OSCILLATOR, spring={"equilibrium": 5e-3})
     sines, cosines = (np.exp(-3.0 * TIMES) * wave(rate * TIMES) for wave in (np.sin, np.cos))
     of_keys = np.transpose([cosines + 3.0 / rate * sines, sines / rate])
     data = of_keys @ [5e-3, 0.4] + 2e-4 * np.random.default_rng(0).normal(size=len(TIMES))
@@ -225,7 +228,9 @@ FIT = [*DUFFING, "spring.linear_stiffness=3.2", "--out", "f"]
 def test_an_interrupted_fit_goes_on_where_it_was(here, monkeypatch):
     """No record is made twice, and what is found is what a fit at once finds, to the last bit."""
     written(here / "m.csv", "time,y", TIMES, simulate(load_scene("duffing")).at(TIMES)["y"])
-    interrupt, right, made = Interrupt(20), fit.simulate, []
+    interrupt = Interrupt(20)
+    right = fit.simulate
+    made = []
     monkeypatch.setattr(fit, "simulate", lambda scene: interrupt() or made.append(scene) or right(scene))
     cut = command(*FIT)
     assert cut.exit_code == 3

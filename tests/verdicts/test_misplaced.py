@@ -31,7 +31,8 @@ def both_ends(run, exact):
 @pytest.mark.parametrize("case", scenes.group("misplaced"))
 def test_ends_are_as_far_off_as_is_said(case):
     """Both fall with H² at degree 0. Three are known less well (`WITHIN`), all else within a tenth."""
-    scene, rel = scenes.named(f"misplaced/{case}"), WITHIN.get(case, 0.1)
+    scene = scenes.named(f"misplaced/{case}")
+    rel = WITHIN.get(case, 0.1)
     exact = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": 5e-4}))
     for degree, size in ((0, 2e-3), (1, 2e-3)):
         said, off = both_ends(simulate(with_changes(scene, coupling={"degree": degree, "macro_step": size})), exact)
@@ -49,7 +50,8 @@ TIED = {
 @pytest.mark.parametrize("case", TIED)
 def test_tied_ends_are_as_far_off_as_is_said(case):
     """The estimate is of the right size at degrees 0 and 1; at degree 2 it is above the error."""
-    scene, known = scenes.named(f"astray/{case}"), TIED[case]
+    scene = scenes.named(f"astray/{case}")
+    known = TIED[case]
     exact = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": 5e-4}))
     for degree in (0, 1, 2):
         said, off = both_ends(simulate(with_changes(scene, coupling={"degree": degree, "macro_step": 4e-3})), exact)
@@ -103,7 +105,8 @@ BOUNCES = [(0, 1.0), (0, 0.25), (2, 1.0)]
 def test_bounces_after_a_seat_that_is_left_early_or_late_are_counted(degree, share):
     """An error of the seat grows at each of a hundred bounces: by then it is known to a factor of 5, and said."""
     H = 1.495025e-3
-    exact, run = in_steps("seated twice, alone", 2, 0.25 * H), in_steps("seated twice, alone", degree, share * H)
+    exact = in_steps("seated twice, alone", 2, 0.25 * H)
+    run = in_steps("seated twice, alone", degree, share * H)
     said, off = both_ends(run, exact)
     assert off / 2.0 < said < 5.0 * off
     assert run.summary["resolved"] is (said < (0.0025, 0.002, 0.001)[degree])

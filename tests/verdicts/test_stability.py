@@ -119,7 +119,8 @@ def test_a_beam_that_is_given_another_force_is_garbage(monkeypatch, fault, law):
     assert right["kind"] in ("dissipative", "conserved")
     assert not right["warns"]
     assert right["error_motion"] < 1e-6
-    advance, seen = FmuBeam.advance, {"time": None, "force": NO_FORCE, "before": NO_FORCE}
+    advance = FmuBeam.advance
+    seen = {"time": None, "force": NO_FORCE, "before": NO_FORCE}
 
     def wrong(self, time, size, force, *foundation):
         if time != seen["time"]:
@@ -221,9 +222,11 @@ def test_a_cell_is_the_scene_that_its_parameters_tell():
     """In units of the beam and of the reach, the deflection in which both bodies hold ½ (m + m_tip) v²."""
     cell = AT_REST | TABLE["cell"] | {"coupling": ("compliance", "energy", 2)}
     scene = scene_from_dict(scene_dict(cell))
-    of_bending, of_shear = bending_stiffness(scene.beam), shear_stiffness(scene.beam)
+    of_bending = bending_stiffness(scene.beam)
+    of_shear = shear_stiffness(scene.beam)
     assert (of_bending * of_shear, of_shear / of_bending) == pytest.approx((100.0**2, 4.0 / 2.0**2), rel=1e-14)
-    m, k = 6.0 + tip_inertia(scene.beam), 1.04 / tip_compliance(scene.beam)
+    m = 6.0 + tip_inertia(scene.beam)
+    k = 1.04 / tip_compliance(scene.beam)
     reach = 2.0 * np.sqrt(m / k)
     assert scene.spring.mass == pytest.approx(6.0, rel=1e-14)
     assert scene.spring.linear_stiffness == pytest.approx(0.04 / 1.04 * k, rel=1e-14)
