@@ -54,6 +54,14 @@ def test_the_last_moment_tells_how_far_an_end_may_be_off_between_rows_but_of_a_t
     assert found == pytest.approx(seen * 420e-5 / (25.0 * 5.0**0.5), rel=1e-7, abs=1e-15)
 
 
+@pytest.mark.parametrize(("even", "odd", "beside"), [(1.0, 0.0, 1.0 / 30.0), (0.0, 1.0, 1.0 / 210.0), (0.0, 0.0, 0.0)])
+def test_moments_are_those_beside_the_cubic(even, odd, beside):
+    """The mean of s²(1 − s)² is 1/30 and twice its moment ∫(1 − s) … ds as well; that of (2s − 1) times it is −1/210."""
+    s = Polynomial((0.0, 1.0))
+    path = Polynomial((0.3, -1.0, 2.0, 7.0)) + s**2 * (1.0 - s) ** 2 * (even + odd * (2.0 * s - 1.0))
+    assert through(path).moments_beside_cubic == pytest.approx(beside, rel=1e-11, abs=1e-15)
+
+
 def test_of_two_falls_the_last_one_counts_and_a_dip_before_it_is_asked_for():
     """(s − 0.2)(s − 0.4)(0.9 − s): a path that rounding makes fall at its start as well is through where it ends so."""
     path = through(Polynomial.fromroots([0.2, 0.4]) * Polynomial((0.9, -1.0)))

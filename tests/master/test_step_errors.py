@@ -1,18 +1,32 @@
 """The error that a step tells of itself, which chooses adaptive steps, and events that crowd."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from bodies import DuffingBody, Upper
 
-from springbeam import load_scene, with_changes
+from springbeam import RunStopped, load_scene, with_changes
 from springbeam.bodies.protocol import NO_FORCE, Motion
 from springbeam.contact.phases import Joint, Phase
 from springbeam.coupling.protocol import Step
 from springbeam.run.macro_steps import AdaptiveSteps
 from springbeam.run.setup import set_up
 from springbeam.run.stepping import Pair, Present
+
+
+@pytest.mark.parametrize("apart", [0.99, 1.01])
+def test_events_that_crowd_stop_the_run(apart):
+    """20,000 in a row, each within a macro step of the one before, are none too many."""
+    H = 1e-3
+    most = 20_000
+    state = State(0.0, (Motion(0.0, 0.0, 0.0, 0.0),) * 2)
+    for k in range(most):
+        state.count_event(apart * k * H, H)
+    with pytest.raises(RunStopped, match=r"20000 .*within a macro") if apart < 1.0 else nullcontext():
+        state.count_event(apart * most * H, H)
+
 
 REST = Motion(0.0, 0.0, 0.0, 0.0)
 
