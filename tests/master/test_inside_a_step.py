@@ -56,7 +56,7 @@ def test_the_last_moment_tells_how_far_an_end_may_be_off_between_rows_but_of_a_t
 
 @pytest.mark.parametrize(("even", "odd", "beside"), [(1.0, 0.0, 1.0 / 30.0), (0.0, 1.0, 1.0 / 210.0), (0.0, 0.0, 0.0)])
 def test_moments_are_those_beside_the_cubic(even, odd, beside):
-    """The mean of s²(1 − s)² is 1/30 and twice its moment ∫(1 − s) … ds as well; that of (2s − 1) times it is −1/210."""
+    """The mean of s²(1 − s)² is 1/30, as is twice its moment ∫(1 − s) … ds; that of (2s − 1) times it is −1/210."""
     s = Polynomial((0.0, 1.0))
     path = Polynomial((0.3, -1.0, 2.0, 7.0)) + s**2 * (1.0 - s) ** 2 * (even + odd * (2.0 * s - 1.0))
     assert through(path).moments_beside_cubic == pytest.approx(beside, rel=1e-11, abs=1e-15)

@@ -13,7 +13,7 @@ from springbeam.contact.phases import Joint, Phase
 from springbeam.coupling.protocol import Step
 from springbeam.run.macro_steps import AdaptiveSteps
 from springbeam.run.setup import set_up
-from springbeam.run.stepping import Pair, Present
+from springbeam.run.stepping import Pair, Present, State
 
 
 @pytest.mark.parametrize("apart", [0.99, 1.01])
