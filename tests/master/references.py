@@ -14,7 +14,7 @@ from scenes import scene_from_dict
 from scipy.integrate import solve_ivp
 
 import springbeam
-from springbeam.monolithic.event_driven import integrate
+from springbeam.monolithic.event_driven import Equations, integrate
 from springbeam.monolithic.exponential import ExponentialPropagator
 
 #: Where references are kept between runs of the tests.
@@ -38,10 +38,11 @@ def folder_of_references():
 
 
 def reference(scene, **options):
-    """Return the event-driven reference of a scene: that of an earlier run of the tests if the code is the same."""
-    if any(load.signal == "table" for load in scene.loads):  # the file may have changed
+    """Return the event-driven reference of a scene or its equations: that of an earlier run if the code is the same."""
+    of = scene.scene if isinstance(scene, Equations) else scene
+    if any(load.signal == "table" for load in of.loads):  # the file may have changed
         return integrate(scene, **options)
-    asked = pickle.dumps((scene.model_dump_json(), {name: np.asarray(given) for name, given in options.items()}))
+    asked = pickle.dumps((of.model_dump_json(), {name: np.asarray(given) for name, given in options.items()}))
     file = folder_of_references() / hashlib.sha256(asked).hexdigest()
     if file.exists():
         return pickle.loads(file.read_bytes())
