@@ -87,8 +87,8 @@ def doctor(
 def _asked(name: str, version: str) -> dict[str, Any]:
     """Return the error of our FMU against an exact solution, or why it has none."""
     from ..bodies.archive import own_fmu
-    from ..bodies.known_answers import QUESTIONS
     from ..bodies.protocol import FmuError, StepRefused
+    from ..studies.known_answers import QUESTIONS
 
     question = QUESTIONS[name]
     path = own_fmu(name, version)

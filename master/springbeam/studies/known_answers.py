@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from math import pi, sqrt
 from sys import float_info
 
-from .archive import own_fmu
-from .fmu import Fmu, Value
-from .fmu_bodies import Port
+from ..bodies.archive import own_fmu
+from ..bodies.fmu import Fmu, Value
+from ..bodies.fmu_bodies import Port
 
 
 @dataclass(frozen=True)
