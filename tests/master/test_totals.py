@@ -161,8 +161,9 @@ WINDOWS = {
     ),
     # (0.9 − 0.19) + 0.19 < 0.9 in doubles.
     "an impulse beside rounding": (lambda t: (1.0, 0.0, 0.0), [0.0, 0.9], (0.9, 1.0), 0.19, 1.19 / 0.19, 0.71),
-    # It may begin before the run, where nothing acts, if the ends pull later.
-    "a pull later": (lambda t: (1.0 if t < 0.5 else -0.5, 0.0, 0.0), [0.0, 0.5, 1.0], None, 1.0, 0.5, 0.0),
+    # A window that began before the run, or ended after it, would have the mean 0.5.
+    "a pull later": (lambda t: (1.0 if t < 0.5 else -0.5, 0.0, 0.0), [0.0, 0.5, 1.0], None, 1.0, 0.25, 0.0),
+    "a pull before": (lambda t: (-0.5 if t < 0.5 else 1.0, 0.0, 0.0), [0.0, 0.5, 1.0], None, 1.0, 0.25, 0.0),
 }  # fmt: skip
 
 

@@ -214,7 +214,7 @@ def test_command(tmp_path):
 
 def test_an_accuracy_that_is_not_reached_says_how_far_it_was(monkeypatch):
     scene = load_scene("soft", ["time.t_end=0.05"], 1e-9)
-    for most, said in ((1, "a run that may do takes"), (30, "not reached with 30 steps, runs still differ by")):
+    for most, said in ((1, "a run that may do takes"), (30, "not reached with 30 steps, the error of motion is about")):
         monkeypatch.setattr(search, "_MOST", most)
         with pytest.raises(SceneError, match=said):
             search.pick(scene)

@@ -131,9 +131,9 @@ def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float
 
 
 def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tuple[float, float]:
-    """Return the largest mean of C [N] over all windows of ``window`` [s], and the time at which the first one begins.
+    """Return the largest mean of C [N] over windows of ``window`` [s] in the run, and when the first of these begins.
 
-    ``at_events`` are the impulses [N·s] that act at each row, as of `kicks`. One at the edge of a window belongs to it
+    A run that is shorter is one window, without a force after it. ``at_events`` are the impulses [N·s] that act at each row, as of `kicks`. One at the edge of a window belongs to it
     if that makes the mean larger.
     """
     rows = steps["time"]
@@ -158,9 +158,13 @@ def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tu
     with np.errstate(divide="ignore", invalid="ignore"):
         root = 2.0 * c / (np.sqrt(b**2 - 2.0 * twice_a * c) - b)
     inside = np.where(np.abs(root) < half, middle + root, edges[:-1])
-    first = np.concatenate([rows - window, rows, inside])
-    last = np.concatenate([rows, rows + window, inside + window])
+    first = np.maximum(np.concatenate([rows - window, rows, inside]), rows[0])
+    last = np.minimum(np.concatenate([rows, rows + window, inside + window]), rows[-1])
+    # Where the ends pull at each other, a window that the run cuts short would have the larger mean.
+    whole = last - first >= (1.0 - _ALIKE) * min(window, rows[-1] - rows[0])
+    first = first[whole]
+    last = last[whole]
     found = np.maximum(upto(last, "left"), upto(last, "right")) - np.minimum(upto(first, "left"), upto(first, "right"))
     largest = found.max()
     since = first[found >= largest - _ALIKE * np.abs(passed[0]).max()].min()  # of a constant force all are alike
-    return max(0.0, float(largest)) / window, max(float(since), float(rows[0]))
+    return max(0.0, float(largest)) / window, float(since)

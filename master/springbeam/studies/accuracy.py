@@ -102,6 +102,7 @@ def pick(scene: Scene, progress: Progress | None = None) -> Trajectory:
     pilots: list[Trajectory] = []
     coarse: Trajectory | None = None
     before: dict[str, float] = {}
+    errors: dict[str, float] = {}
     agreed = False
     while steps <= _MOST:
         prepared = _prepared(scene, scene.duration / steps)
@@ -114,6 +115,7 @@ def pick(scene: Scene, progress: Progress | None = None) -> Trajectory:
             pilots.append(error.run)
             coarse = None
             before = {}
+            errors = {}
             agreed = False
             continue
         if coarse is not None:
@@ -125,7 +127,8 @@ def pick(scene: Scene, progress: Progress | None = None) -> Trajectory:
             agreed = agrees
         pilots.append(fine)
         coarse = fine
-    reached = f"runs still differ by {max(before.values()):.1e}" if before else f"a run that may do takes {steps:.1g}"
+    worst = max(errors, key=lambda name: errors[name], default="")
+    reached = f"the error of {worst} is about {errors[worst]:.1e}" if worst else f"a run that may do takes {steps:.1g}"
     raise SceneError(
         f"accuracy = {asked:g}: not reached with {_MOST} steps, {reached}; ask for less, take a coarser mesh or fewer "
         "modes, or shorten [time] t_end"
