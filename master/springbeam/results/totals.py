@@ -133,8 +133,8 @@ def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float
 def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tuple[float, float]:
     """Return the largest mean of C [N] over windows of ``window`` [s] in the run, and when the first of these begins.
 
-    A run that is shorter is one window, without a force after it. ``at_events`` are the impulses [N·s] that act at each row, as of `kicks`. One at the edge of a window belongs to it
-    if that makes the mean larger.
+    A run that is shorter is one window, without a force after it. ``at_events`` are the impulses [N·s] that act at each
+    row, as of `kicks`. One at the edge of a window belongs to it if that makes the mean larger.
     """
     rows = steps["time"]
     # The impulse up to each row, including impacts there, and the powers of the time since then up to the next row;
