@@ -276,6 +276,17 @@ def test_a_search_follows_a_valley_to_its_end(tmp_path):
     assert len(found["runs"]) <= 80
 
 
+def test_a_search_along_a_valley_ends_where_the_range_does(tmp_path):
+    """Of the right stiffness, 3.1, and mass, 1, only the ratio shows; the search took 182 runs and had "not ended"."""
+    scene = load_scene("duffing", COARSE)
+    run = simulate(with_changes(scene, spring={"linear_stiffness": 3.1}))
+    path = written(tmp_path / "m.csv", "time,y", run.time, noisy(run["y"], 0.01))
+    found = fitted(path, ["spring.linear_stiffness=2:2.9", "spring.mass=0.5:2"], scene, shift=0.0)
+    assert [row["value"] for row in found["keys"]] == pytest.approx([2.9, 2.9 / 3.1], rel=2e-3)
+    assert all(" may be anything from " in why for why in found["undetermined"])
+    assert len(found["runs"]) <= 50
+
+
 def test_of_equal_shifts_of_the_clock_the_smallest_is_found(tmp_path):
     """A motion that repeats itself fits as well a period later or earlier: -3.59 s was found."""
     scene = load_scene("duffing", COARSE)

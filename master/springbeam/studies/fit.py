@@ -97,24 +97,27 @@ def undetermined(found: Found) -> list[str]:
     factor of two of its value.
     """
     why = [f"{name}: {doubt}" for name, left in found.left.items() if (doubt := no_noise(left))]
-    if not found.ended:
-        why.append("the search has not ended in a minimum; give a narrower range")
-    why += found.alike
+    if found.ended:
+        why += found.alike
     for rival in found.rivals:
         values = ", ".join(f"{name} = {value:.5g}" for name, value in rival.items())
         why.append(f"{values} fits as well; measure another curve, or give a narrower range")
+    any_wide = False
     for row in found.keys:
         name, value, low, high = row.values()
         if low is None or name == SHIFT:
             continue
         least, most = found.ranges[name]
         if max(abs(high), abs(low)) > _WIDE * abs(value) or min(abs(high), abs(low)) < abs(value) / _WIDE:
+            any_wide = True
             why.append(f"{name} may be anything from {low:.3g} to {high:.3g}")
         elif low <= least or high >= most:
             why.append(
                 f"{name}: its interval reaches the end of the range from {least:g} to {most:g}; give another range, "
                 f"as --vary {name}={least:g}:{most:g}"
             )
+    if not found.ended and not any_wide:  # in a valley that wide, its end is of no interest
+        why.append("the search has not ended in a minimum; give a narrower range")
     return why
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -198,8 +199,7 @@ class Search:
     def _ended(self, slopes: np.ndarray) -> bool:
         """Return whether a step by Newton's method from here has a negligible gain compared with noise."""
         left = self._residual(self.at)
-        step = np.linalg.lstsq(slopes, -left, _UNDETERMINED)[0]
-        step = self._within(step)
+        step = self._step(_newton, slopes, left)
         freedom = max(len(left) - len(step) - self._free, 1)
         noise = np.linalg.norm(left) * np.sqrt(len(step) / freedom)
         return bool(np.linalg.norm(slopes @ step) <= _SHARE * noise or np.abs(step).max() <= _LEAST)
@@ -217,7 +217,7 @@ class Search:
         """Move to a lower cost, by derivatives of the residual and of the shift; return whether there is one."""
         left = self._residual(self.at)
         while self._reach > _LEAST:
-            step = self._within(_levenberg_marquardt(slopes, left, self._reach))
+            step = self._step(partial(_levenberg_marquardt, reach=self._reach), slopes, left)
             length = float(np.linalg.norm(step))
             foreseen = left + slopes @ step
             before = np.inf
@@ -237,6 +237,23 @@ class Search:
             self._reach = 0.25 * min(length, self._reach)
         return False
 
+    def _step(self, method: Callable[..., np.ndarray], slopes: np.ndarray, left: np.ndarray) -> np.ndarray:
+        """Return the step of a ``method`` within the limits; unknowns that it takes beyond theirs end there.
+
+        The others make up for these, so that a search along a valley ends where its limit crosses it.
+        """
+        low, high = (limit - self.at for limit in self._limits)
+        step = np.zeros(len(self.at))
+        free = np.ones(len(self.at), bool)
+        while free.any():
+            step[free] = method(slopes[:, free], left + slopes[:, ~free] @ step[~free])
+            beyond = (step < low) | (step > high)
+            step = np.clip(step, low, high)
+            if not beyond.any():
+                break
+            free &= ~beyond
+        return step
+
     def _within(self, step: np.ndarray) -> np.ndarray:
         """Return a step that ends within the limits."""
         return np.asarray(np.clip(self.at + step, *self._limits) - self.at)
@@ -252,10 +269,15 @@ class Search:
         return Minimum(self.at, shift, self.row, self.part, self.cost, left, slopes, self._weights, ended)
 
 
+def _newton(slopes: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """Return the step that is foreseen to leave least."""
+    return np.asarray(np.linalg.lstsq(slopes, -left, _UNDETERMINED)[0])
+
+
 def _levenberg_marquardt(slopes: np.ndarray, left: np.ndarray, reach: float) -> np.ndarray:
     """Return the step that is foreseen to leave least, no longer than ``reach``."""
     turned, sizes, directions = np.linalg.svd(slopes, full_matrices=False)
-    known = sizes > _UNDETERMINED * sizes[0]
+    known = sizes > _UNDETERMINED * sizes.max(initial=0.0)
     aim = -(turned.T @ left)[known]
     sizes = sizes[known]
     directions = directions[known]
