@@ -6,7 +6,7 @@ import pytest
 from bodies import interface_of
 
 from springbeam import Motion, load_scene, with_changes
-from springbeam.contact.impacts import NO_IMPACT
+from springbeam.contact.impacts import NO_IMPACT, foundation_impact, meeting
 from springbeam.contact.phases import Automaton, Instant, Joint, Outcome, Phase
 from springbeam.motion.events import EventKind
 from springbeam.scene.laws import Compliance, Link, depth
@@ -35,6 +35,13 @@ def test_ends_that_part_have_one_velocity(kind, v):
     z_after = z + impact.on_spring / mass
     assert v_after == pytest.approx(z_after, rel=1e-14)
     assert tip_mass * v_after + mass * z_after == pytest.approx(tip_mass * v + mass * z, rel=1e-14)
+
+
+@pytest.mark.parametrize("impact", [meeting(-1.0, 0.4, 0.3, 1.2), foundation_impact(-1.0, 0.4, 0.3, 1.2, 0.3)])
+def test_an_impact_loses_the_kinetic_energy_that_it_takes(impact):
+    after = -1.0 + impact.on_beam / 0.3, 0.4 + impact.on_spring / 1.2
+    taken = 0.15 * (1.0 - after[0] ** 2) + 0.6 * (0.16 - after[1] ** 2)
+    assert impact.energy_loss == pytest.approx(taken, rel=1e-14)
 
 
 @pytest.mark.parametrize("seated", [False, True])

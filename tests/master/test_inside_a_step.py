@@ -6,7 +6,7 @@ from numpy.polynomial import Legendre, Polynomial
 
 from springbeam.bodies import force
 from springbeam.bodies.protocol import Motion
-from springbeam.motion.paths import Path, sign_changes
+from springbeam.motion.paths import Path, Place, sign_changes
 from springbeam.results.dense import between_rows
 from springbeam.results.records import STEP
 
@@ -24,17 +24,27 @@ def through(p, size=SIZE):
     return Path.through(*samples, size, (float(q(1.0)), float(q0(1.0))))
 
 
-@pytest.mark.parametrize(("even", "odd"), [(0.0, -1.0), (0.7, 0.4)])
+@pytest.mark.parametrize(("even", "odd"), [(0.0, -1.0), (0.7, 0.4), (0.1, 2.0)])
 def test_path_and_cubic_are_apart_by_no_more_than_they_say(even, odd):
     """s²(1 − s)² [even + odd (2s − 1)] beside a cubic; one part alone is met."""
     s = Polynomial((0.0, 1.0))
     one = Polynomial((1.0,))
     beside = s**2 * (one - s) ** 2 * (even * one + odd * (2.0 * s - one))
     apart = np.abs(beside(np.linspace(0.0, 1.0, 2001))).max()
-    told = through(Polynomial((0.3, -1.0, 2.0, 0.5)) + beside).beside_cubic
-    assert told >= apart * (1.0 - 1e-6)
+    path = through(Polynomial((0.3, -1.0, 2.0, 0.5)) + beside)
+    assert path.beside_cubic >= apart * (1.0 - 1e-6)
     if even * odd == 0.0:
-        assert told == pytest.approx(apart, rel=1e-4)
+        assert path.beside_cubic == pytest.approx(apart, rel=1e-4, abs=1e-14)
+    moments = abs(beside.integ()(1.0)), abs(2.0 * beside.integ(2)(1.0))
+    assert path.moments_beside_cubic == pytest.approx(max(moments), rel=1e-9, abs=1e-15)
+
+
+def test_the_path_between_two_places_of_a_step_is_that_of_the_step():
+    """A quintic from 0.2 to 0.9 s: means up to two places have those between them."""
+    p = Polynomial((0.3, -1.0, 2.0, 0.5, -3.0, 1.5))
+    first, last = (Place(t, (p(t), p.deriv()(t)), (p.integ()(t) / t, p.integ(2)(t) / t**2)) for t in (0.2, 0.9))
+    shares = np.linspace(0.0, 1.0, 7)
+    assert first.path_to(last).at(shares) == pytest.approx(p(0.2 + 0.7 * shares), rel=1e-11)
 
 
 @pytest.mark.parametrize(("end", "phase", "seen"), [("y", 1.0, 1.0), ("u_tip", 0.0, 1.0), ("u_tip", 1.0, 0.0)])
