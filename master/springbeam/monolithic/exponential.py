@@ -153,14 +153,20 @@ class LinearForm:
         return weights, np.moveaxis(of_ends, 3, 2).reshape(2 * STAGES * 2, STAGES * len(self.inputs)), constant
 
     def longest_step(self, X: np.ndarray) -> float:
-        """Return the step [s] that resolves the free motion from X, but for amplitudes as small as rounding."""
+        """Return the step [s] that resolves the motion from X, but for amplitudes as small as rounding.
+
+        That is the free motion, and what loads excite that are 0 at the start of the step, as a sine.
+        """
         xi, xi_dot = self.modal(X)
         r = self.forces(self.ends_at(np.array([[xi], [xi_dot]])))[0]
-        force = r @ self.inputs + self.constant + self.system.loads.values(X[self.system.T]) @ self.patterns
-        amplitudes = self.oscillators.amplitudes(xi, xi_dot, force)
+        loads = self.system.loads
+        longest = loads.longest_step
+        times = X[self.system.T] + np.array([0.0, longest][: 1 + (len(loads) > 0)])
+        forces = r @ self.inputs + self.constant + loads.values(times) @ self.patterns
+        amplitudes = np.max([self.oscillators.amplitudes(xi, xi_dot, force) for force in forces], axis=0)
         silent = NOISE * self.reach.max(initial=0.0) * max(np.linalg.norm(xi), amplitudes.max(initial=0.0))
         fastest = self.oscillators.rates[self.reach * amplitudes > silent].max(initial=0.0)
-        return min(_STEP_PHASE / fastest if fastest > 0.0 else np.inf, self.system.loads.longest_step)
+        return min(_STEP_PHASE / fastest if fastest > 0.0 else np.inf, longest)
 
     def step(self, X: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
         """Move from X over a step of ``size`` [s].
