@@ -8,7 +8,8 @@ from bodies import pair_of
 from springbeam import simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.results.records import STEP
-from springbeam.run.misplaced import _Terms, misplaced
+from springbeam.run.errors.ends import Terms
+from springbeam.run.misplaced import misplaced
 from springbeam.scene.modes import tip_modes
 
 SOFT = scenes.named("misplaced/base")
@@ -116,9 +117,9 @@ def test_bounces_after_a_seat_that_is_left_early_or_late_are_counted(degree, sha
 @pytest.mark.parametrize("damping", [0.2, 0.9, 20.0])
 def test_the_terms_of_a_mode_are_its_impulse_response(damping):
     """(exp r₁t − exp r₂t)/(r₁ − r₂) times the squared tip of the mode, also where it creeps slower than 1 rad/s."""
-    terms = _Terms.of((np.array([0.16]), np.array([damping]), np.array([1.5])), 1.0)
+    terms = Terms.of((np.array([0.16]), np.array([damping]), np.array([1.5])), 1.0)
     times = np.array([[0.3], [2.0], [7.0]])
     r1, r2 = np.roots([1.0, damping, 0.16]).astype(complex)
     exact = 2.25 * (np.exp(r1 * times) - np.exp(r2 * times)) / (r1 - r2)
-    found = (terms.shown * terms.impulse * np.exp(terms.rates * times)).sum(axis=1).real
+    found = (terms.shown[0] * terms.impulse * np.exp(terms.rates * times)).sum(axis=1).real
     assert found == pytest.approx(exact[:, 0].real, rel=1e-9)
