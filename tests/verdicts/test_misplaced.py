@@ -9,6 +9,7 @@ from springbeam import simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.results.records import STEP
 from springbeam.run.errors.ends import Terms
+from springbeam.run.errors.soft import _stretches
 from springbeam.run.misplaced import misplaced
 from springbeam.scene.modes import tip_modes
 
@@ -123,3 +124,9 @@ def test_the_terms_of_a_mode_are_its_impulse_response(damping):
     exact = 2.25 * (np.exp(r1 * times) - np.exp(r2 * times)) / (r1 - r2)
     found = (terms.shown[0] * terms.impulse * np.exp(terms.rates * times)).sum(axis=1).real
     assert found == pytest.approx(exact[:, 0].real, rel=1e-9)
+
+
+def test_a_contact_that_opens_at_the_end_of_a_step_to_rounding_belongs_to_its_last_part():
+    """The middle between there and the end is the end: a third part of two was asked for, and the run crashed."""
+    _, part, _, _ = _stretches(1, 2, {0: [1.0 - 2.0**-53]})
+    assert part.tolist() == [0, 1, 1]

@@ -74,7 +74,7 @@ def _stretches(steps: int, parts: int, kinks: dict[int, list[float]]) -> tuple[A
             for values, more in zip((step, low, high), zip(*divided, strict=True), strict=True)
         )
         step = step.astype(int)
-    part = (0.5 * (low + high) * parts).astype(int)
+    part = np.minimum((0.5 * (low + high) * parts).astype(int), parts - 1)  # a kink may be at the end to rounding
     return step, part, low, high
 
 
