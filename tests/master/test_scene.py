@@ -7,7 +7,7 @@ from copy import deepcopy
 import numpy as np
 import pytest
 import scenes
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import TABLE, scene_from_dict, without_false
 
@@ -98,6 +98,7 @@ def outcome(data):
         return str(refusal)
 
 
+@settings(max_examples=60)
 @given(
     place=st.sampled_from(
         [place for place in springbeam.scene.scene_keys() if place.startswith(("beam", "spring", "co"))]
