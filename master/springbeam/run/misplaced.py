@@ -145,17 +145,13 @@ def _by_loads(
     ``None`` where they move no end by ``quiet`` [m].
     """
     loads = pair.setup.loads
-    of_tip = left_out([(load, pair.upper.moved_by(load)) for load in loads if load.on in ON_BEAM], terms, steps, quiet)
-    of_low = None
     modes = pair.lower.modes(steps.last["y_after"])
-    if modes is not None:
-        lower = Terms.of(modes, duration)
-        of_low = left_out(
-            [(load, pair.lower.moved_by(load)) for load in loads if load.on in ON_SPRING], lower, steps, quiet
-        )
-    if of_tip is None and of_low is None:
+    if not loads or modes is None:
         return None
-    if of_tip is None:
-        of_tip = np.zeros((len(steps.size), len(terms.rates)), complex)
-    moved = np.zeros((2, len(steps.size))) if of_low is None else (lower.shown @ of_low.T).real
-    return list(zip(of_tip, *(terms.shown @ of_tip.T).real.tolist(), *moved.tolist(), strict=True))
+    lower = Terms.of(modes, duration)
+    of_tip = left_out([load for load in loads if load.on in ON_BEAM], pair.upper, terms, steps, quiet)
+    of_low = left_out([load for load in loads if load.on in ON_SPRING], pair.lower, lower, steps, quiet)
+    if not of_tip.any() and not of_low.any():
+        return None
+    shown = (*(terms.shown @ of_tip.T).real, *(lower.shown @ of_low.T).real)
+    return list(zip(of_tip, *(values.tolist() for values in shown), strict=True))

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ...bodies.protocol import Body
 from ...scene.loads import Load, TableLoad
 from .ends import Terms
 from .records import StepRecords
@@ -24,32 +25,32 @@ _TOGETHER = 1024
 _NORMS = [0.5, 1.5, 2.5]
 
 
-def left_out(loads: Sequence[tuple[Load, float]], terms: Terms, steps: StepRecords, quiet: float) -> np.ndarray | None:
-    """Return what the part of ``loads`` that each step leaves out adds to the terms of a body, (n of the steps, terms).
+def left_out(loads: Sequence[Load], body: Body, terms: Terms, steps: StepRecords, quiet: float) -> np.ndarray:
+    """Return what the part of ``loads`` on a ``body`` that each step leaves out adds to its terms, (n, terms).
 
-    The loads come with the force that each unit of them is at the end [N]. ``None`` where they move no end by ``quiet``
-    [m].
+    0 where they move no end by ``quiet`` [m].
     """
-    loads = [(load, force) for load, force in loads if force > 0.0]
-    if not loads:
-        return None
+    found = np.zeros((len(steps.size), len(terms.rates)), complex)
+    forces = [(load, body.moved_by(load)) for load in loads]
+    forces = [(load, force) for load, force in forces if force > 0.0]
+    if not forces:
+        return found
     slow = np.argsort(np.abs(terms.rates))[:_MOVED]
-    turns = float(np.abs(terms.rates[slow]).max()) + max(_changes(load) for load, _ in loads)
+    turns = float(np.abs(terms.rates[slow]).max()) + max(_changes(load) for load, _ in forces)
     points = int(np.clip(_DENSE * turns * float(steps.size.max()), *_POINTS))
     nodes, shares = np.polynomial.legendre.leggauss(points)
     P = np.polynomial.legendre.legvander(nodes, 2)
-    found = np.zeros((len(steps.size), len(terms.rates)), complex)
     moved = 0.0
     for size, rows in _by_size(steps.size):
         left = 0.5 * size * (1.0 - nodes)
         grown = np.exp(np.outer(left, terms.rates[slow])) * terms.impulse[slow]
         for some in np.array_split(rows, len(rows) // _TOGETHER + 1):
-            signal = sum(force * load.value(steps.ends["time"][some, None] - left) for load, force in loads)
+            signal = sum(force * load.value(steps.ends["time"][some, None] - left) for load, force in forces)
             missing = (signal - (signal * shares) @ P * _NORMS @ P.T) * shares * (0.5 * size)
             moved += float(np.abs(missing).sum())
             found[np.ix_(some, slow)] = missing @ grown
     bound = moved * float(np.abs(terms.shown[0] * terms.impulse)[slow].sum())
-    return found if bound > quiet else None
+    return found if bound > quiet else np.zeros_like(found)
 
 
 def _by_size(sizes: np.ndarray) -> Iterator[tuple[float, np.ndarray]]:
