@@ -51,7 +51,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     if rigid:  # ends that touch and part at once: a pulling force is no contact force
         contact = np.where(phase == "touch", np.maximum(contact, 0.0), contact)
     inside = zeros if rigid else contact
-    if scene.coupled and scene.contact.strikes:
+    if scene.coupled and scene.contact.impacts:
         inside = np.minimum(normal_compliance(scene, u, first), MOST_SHOWN)
     energies = ledger(steps)
     found = {
@@ -131,7 +131,7 @@ def normal_compliance(scene: Scene, u: np.ndarray, first: np.ndarray) -> np.ndar
 
 def not_shown(scene: Scene, steps: np.ndarray) -> str | None:
     """Return a warning if a compliance force beside a rigid law was too large for its column."""
-    if not (scene.coupled and scene.contact.strikes):
+    if not (scene.coupled and scene.contact.impacts):
         return None
     too_large = (normal_compliance(scene, steps["u_tip_after"], steps[:1]) > MOST_SHOWN).any()
     return _NOT_SHOWN if too_large else None

@@ -218,7 +218,7 @@ class Contact(Table):
         return self.soft and not self.lasting
 
     @property
-    def strikes(self) -> bool:
+    def impacts(self) -> bool:
         """Whether ends that meet have an impact: different velocities before it, one velocity after it."""
         return self.rigid and not self.lasting
 

@@ -147,7 +147,7 @@ def _beam_without_inertia(scene: Scene) -> Iterator[str]:
             "[beam.fidelity]: the tip between the beam and [contact.law] would have no inertia; use "
             f'law = "{rigid}" or fidelity = "dynamic"'
         )
-    if contact.strikes:
+    if contact.impacts:
         for key in ("fmu", "element"):
             if hasattr(scene.lower, key):
                 yield (
