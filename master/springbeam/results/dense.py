@@ -128,20 +128,24 @@ class Extremes(NamedTuple):
         return cls(float(values[low]), float(times[low]), float(values[high]), float(times[high]))
 
 
-def extremes(rigid: bool, steps: np.ndarray, name: str) -> Extremes:
-    """Return the lowest and the highest value of the motion on the curve that `at` follows.
+def extremes(rigid: bool, steps: np.ndarray, *names: str) -> list[Extremes]:
+    """Return the lowest and the highest value of each motion on the curve that `at` follows.
 
-    ``name`` is one of `MOTION`; ``steps`` are all records of a run, ``rigid`` as of `motion`.
+    ``names`` are of `MOTION`; ``steps`` are all records of a run, ``rigid`` as of `motion`.
     """
-    parts = [steps[f"{part}_after"] for part in (("u_tip", "y") if name == "gap" else (name,))]
-    found = list(Extremes.of_rows(steps["time"], parts[0] - parts[1] if name == "gap" else parts[0]))
+    found = []
+    for name in names:
+        parts = [steps[f"{part}_after"] for part in (("u_tip", "y") if name == "gap" else (name,))]
+        found.append([*Extremes.of_rows(steps["time"], parts[0] - parts[1] if name == "gap" else parts[0])])
     for after, curves in _curves(rigid, steps):
-        for place, sign in ((0, 1.0), (2, -1.0)):
-            lowest, step, share = _lowest(sign * curves[name], below=sign * found[place])
-            if step >= 0:
-                end = after[step]
-                found[place : place + 2] = sign * lowest, float(steps["time"][end - 1] + share * steps["size"][end])
-    return Extremes(*found)
+        for name, known in zip(names, found, strict=True):
+            for place, sign in ((0, 1.0), (2, -1.0)):
+                lowest, step, share = _lowest(sign * curves[name], below=sign * known[place])
+                if step >= 0:
+                    end = after[step]
+                    known[place] = sign * lowest
+                    known[place + 1] = float(steps["time"][end - 1] + share * steps["size"][end])
+    return [Extremes(*known) for known in found]
 
 
 def between_rows(rigid: bool, steps: np.ndarray) -> float:

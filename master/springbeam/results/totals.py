@@ -91,7 +91,8 @@ def totals(scene: Scene, steps: np.ndarray, events: Iterable[Event], window: flo
     if scene.coupled or (beam and stop):
         found |= _contact(scene, steps, events, window)
     if beam:
-        found["deepest_tip"], found["deepest_tip_time"] = extremes(scene.contact.rigid, steps, "u_tip")[:2]
+        (deepest,) = extremes(scene.contact.rigid, steps, "u_tip")
+        found |= {"deepest_tip": deepest.lowest, "deepest_tip_time": deepest.lowest_time}
     if stop:
         found["stop_strokes"] = sum(event.kind.strikes for event in events)
         held = impulse(steps, "foundation_force").sum()

@@ -38,19 +38,19 @@ def contradictions(setup: Setup, steps: np.ndarray, events: Sequence[Event], con
 
 
 def _ends(setup: Setup, steps: np.ndarray) -> Iterator[str]:
-    rigid = setup.soft is None
+    meeting = isinstance(setup.law, Rigid)
+    if setup.floor is None and not meeting:
+        return
+    tip, top, gap = extremes(setup.soft is None, steps, "u_tip", "y", "gap")
     if setup.floor is not None:
-        end, name = ("y", "the spring's top") if setup.lower else ("u_tip", "the tip")
-        places = extremes(rigid, steps, end)
+        places, name = (top, "the spring's top") if setup.lower else (tip, "the tip")
         if setup.floor - places.lowest > _MOST * _range(places):
             yield (
                 f"{name} is at {places.lowest:.6g} m at {places.lowest_time:.6g} s, below the rigid stop at "
                 f"{setup.floor:.6g} m"
             )
-    if isinstance(setup.law, Rigid):
-        gap = extremes(rigid, steps, "gap")
-        if -gap.lowest > _MOST * min(_range(extremes(rigid, steps, end)) for end in ("u_tip", "y")):
-            yield f"the tip is {-gap.lowest:.6g} m below the spring's top at {gap.lowest_time:.6g} s"
+    if meeting and -gap.lowest > _MOST * min(_range(tip), _range(top)):
+        yield f"the tip is {-gap.lowest:.6g} m below the spring's top at {gap.lowest_time:.6g} s"
 
 
 def _range(places: Extremes) -> float:

@@ -60,7 +60,7 @@ def _extreme(column: str, pick: Callable[[Extremes], float]) -> Callable[[Trajec
             run = run.without_start()
         if run.steps is None or column not in MOTION:  # which is known at its rows only
             return pick(Extremes.of_rows(run.time, run[column]))
-        return pick(extremes(run.scene.contact.rigid, run.steps, column))
+        return pick(*extremes(run.scene.contact.rigid, run.steps, column))
 
     return of
 
