@@ -9,7 +9,7 @@ from runs import a_trajectory
 from springbeam import load_scene, simulate, with_changes
 from springbeam.motion.events import Event, EventKind
 from springbeam.results.records import joined
-from springbeam.studies.contact_changes import contact_changes
+from springbeam.studies.contact_changes import _merged, contact_changes
 from springbeam.studies.distance import HELD, apart, distance, motion
 
 TIMES = np.linspace(0.0, 1.0, 11)
@@ -113,3 +113,7 @@ def test_a_rest_on_the_foundation_begins_and_ends():
     events = [Event(0.2, EventKind.SEATED, seated=True), Event(0.4, EventKind.UNSEATED)]
     found = contact_changes(a_trajectory(events=events), 1e-3)
     assert [(change.kind, change.time) for change in found] == [("strikes", 0.2), ("leaves", 0.4)]
+
+
+def test_contacts_are_one_that_follow_each_other_within_the_window_however_long_they_last():
+    assert _merged([(0.0, 0.5), (0.52, 0.7), (0.9, 1.0)], 0.1) == [(0.0, 0.7), (0.9, 1.0)]

@@ -9,7 +9,7 @@ from bodies import DuffingBody, Upper, interface_of
 from scenes import table
 
 from springbeam.bodies.protocol import NO_FORCE, Motion, StepRefused
-from springbeam.contact.events import locate, no_dip, position_tolerance
+from springbeam.contact.events import Height, locate, no_dip, position_tolerance
 from springbeam.contact.phases import Automaton, Joint, Phase
 from springbeam.coupling.protocol import Step
 from springbeam.motion.paths import Path
@@ -180,3 +180,9 @@ def test_where_the_next_step_ends(time, after_impact, kink, expected):
     """In a run of 2 s in steps of 0.5 s, and one of 1 ps more."""
     grid = MacroGrid(0.0, 2.0 + 1e-12, 0.5)
     assert grid.next(time, kink, after_impact=after_impact) == pytest.approx(expected, rel=1e-15)
+
+
+def test_means_of_a_height_are_those_of_its_values():
+    """2 m over 0.1 s, below a level of 0.5 m by −1.5 m: the mean, and ∫∫ over the square of the step."""
+    there = Motion(2.0, 0.0, 0.2, 0.01)
+    assert Height(0, 0.5, 1.0, -1.0).means((there, there), 0.1) == pytest.approx((-1.5, -0.75), rel=1e-14)

@@ -7,7 +7,7 @@ from numpy.polynomial import Legendre, Polynomial
 from springbeam.bodies import force
 from springbeam.bodies.protocol import Motion
 from springbeam.motion.paths import Path, Place, sign_changes
-from springbeam.results.dense import between_rows
+from springbeam.results.dense import _turning, between_rows
 from springbeam.results.records import STEP
 
 # -- The path of a position inside a step: quintics exactly, minima, zeros, the order of its error and of the cubic's
@@ -37,6 +37,18 @@ def test_path_and_cubic_are_apart_by_no_more_than_they_say(even, odd):
         assert path.beside_cubic == pytest.approx(apart, rel=1e-4, abs=1e-14)
     moments = abs(beside.integ()(1.0)), abs(2.0 * beside.integ(2)(1.0))
     assert path.moments_beside_cubic == pytest.approx(max(moments), rel=1e-9, abs=1e-15)
+
+
+def test_what_turns_a_mismatch_of_velocities_is_the_mass_times_the_acceleration_of_the_gap():
+    """Of a gap of degree 5 that is 0 at both ends of a step of joined ends, in Legendre polynomials up to degree 3."""
+    s = Polynomial((0.0, 1.0))
+    gap = s * (1.0 - s) * Polynomial((0.3, 1.0, -2.0, 1.5))
+    steps = np.zeros(2, STEP)
+    steps["phase"], steps["reduced_mass"], steps["size"] = 2.0, 0.7, SIZE
+    steps["v_tip_after"], steps["v_tip"] = gap.deriv()(0.0) / SIZE, gap.deriv()(1.0) / SIZE
+    steps["u_tip_integral"], steps["u_tip_integral_2"] = SIZE * gap.integ()(1.0), SIZE**2 * gap.integ(2)(1.0)
+    turning = Legendre.cast(0.7 / SIZE**2 * gap.deriv(2)(0.5 * s + 0.5))
+    assert _turning(steps[:1], steps[1:])[:, 0] == pytest.approx(turning.coef, rel=1e-9)
 
 
 def test_the_path_between_two_places_of_a_step_is_that_of_the_step():

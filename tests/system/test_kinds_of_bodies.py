@@ -144,3 +144,10 @@ def test_a_trial_step_tells_the_acceleration_wherever_the_body_is():
     body = DuffingBody(2.0, 3.0, 0.5, y=0.3, z=-1.0)
     assert body.trial_acceleration(0.0, 0.1) == pytest.approx(-(3.0 * 0.3 + 0.5 * 0.3**3) / 2.0, rel=1e-3)
     assert body.motion()[:2] == (0.3, -1.0)
+
+
+def test_the_damper_of_an_element_takes_what_mass_and_spring_lose_wherever_its_rest_is():
+    body = SpringDamper(2.0, 80.0, 0.6, rest=0.3, displacement=0.1, velocity=-1.0, external_force=5.0)
+    at_start = sum(body.energies())
+    body.advance(0.0, 0.5, NO_FORCE)
+    assert sum(body.energies()) == pytest.approx(at_start, rel=1e-13)

@@ -77,7 +77,9 @@ def test_events_are_in_order_and_within_the_run(number, time):
 def test_contacts_last_no_longer_than_the_run():
     run = of("pair")
     assert found(run, contact_time=0.2) == []
-    assert found(run, contact_time=0.201) == ["contacts last 0.201 s in a run of 0.2 s"]
+    told = ["contacts last 0.201 s in a run of 0.2 s"]
+    assert found(run, contact_time=0.201) == told
+    assert found(run, steps={"time": 1.0}, events=[], contact_time=0.201) == told  # begins at 1 s
 
 
 def test_a_macro_step_of_one_period_that_misses_all_impacts_is_not_resolved():
