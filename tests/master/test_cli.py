@@ -6,16 +6,20 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
+from io import StringIO
 from pathlib import Path
 
 import pytest
 import typer
 from bodies import simulate
 from commands import command
+from rich.console import Console
 from runs import block
 
 import springbeam.run.runner
 from springbeam import Event, RunStopped, load_scene, with_changes
+from springbeam.cli import common
 from springbeam.cli.common import interruptible
 from springbeam.cli.run import _event_table
 from springbeam.motion.events import EventKind
@@ -143,3 +147,30 @@ def test_an_interrupt_that_is_lost_in_a_finaliser_is_not_the_last(capsys):
         work()
     assert ended.value.exit_code == 3
     assert capsys.readouterr().err == "error: interrupted\n"
+
+
+# -- waiting ------------------------------------------------------------------------------------------------------
+
+
+#: Commands, and what each says that it does.
+WAITED_FOR = {
+    "run soft --no-plots --set time.t_end=0.01": {"run"},
+    "run soft --no-plots --set time.t_end=0.01 --accuracy 1e-2": {"pilot runs", "run"},
+    "predict soft": {"modes and stability"},
+    "report results/soft": {"makes the page"},
+    "compare results/soft results/soft --no-plots": {"compares"},
+    "spectrum results/soft --no-plots": {"computes spectra"},
+}
+
+
+def test_a_terminal_shows_what_is_waited_for_and_how_much_is_done(here, fmu_folder, monkeypatch):
+    """Of the whole, where that is known; without a terminal nothing is printed."""
+    for line, words in WAITED_FOR.items():
+        output = StringIO()
+        with monkeypatch.context() as patch:
+            patch.setattr(common, "Console", partial(Console, file=output, force_terminal=True, width=200))
+            patch.setattr(common, "console_for", lambda *, silent: Console(quiet=True))
+            assert command(*line.split()).exit_code == 0, line
+        assert [word for word in words if word not in output.getvalue()] == [], line
+        assert ("%" in output.getvalue()) == ("predict" not in line), line
+        assert command(*line.split(), *["--force"] * ("report" in line)).stderr == "", line
