@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...contact.interface import Interface
+from ...contact.interface import Interface, Rigid
 from ...motion.events import Event, EventKind
 from ...motion.paths import derivative, value
 from .records import StepRecords, path_of
@@ -33,16 +33,20 @@ def strokes(interface: Interface, steps: StepRecords, events: Sequence[Event]) -
         np.multiply.at(share, at, -e)
         speed = steps.ends["v_tip" if interface.alone else "z"][at]
         if interface.alone:  # no force acts on the tip before or after
-            changed = (1.0 + e) * _last_acceleration(steps)[at]
-        else:
+            changed = (1.0 + e) * _accelerations(steps, "u_tip", "v_tip", 1.0)[at]
+        elif isinstance(interface.law, Rigid):
+            # A tie turns velocities that differ round: its force has a mean over a step, and no value at an instant.
             gained = (steps.ends["z"] - steps.before["z_after"]) / steps.size
             changed = e * gained[at] + np.append(gained, 0.0)[at + 1]
+        else:
+            after = np.append(_accelerations(steps, "y", "z", 0.0), 0.0)
+            changed = e * _accelerations(steps, "y", "z", 1.0)[at] + after[at + 1]
         # Several may be at one time.
         np.add.at(turns, at, np.divide(changed, speed, out=np.zeros(len(at)), where=speed != 0.0))
         np.add.at(most, at, (1.0 + e) * np.abs(speed))
     return Strokes(share, turns, most)
 
 
-def _last_acceleration(steps: StepRecords) -> Any:
-    """Return ü_tip at the end of each step [m/s²], of the path through both ends and the moments."""
-    return value(derivative(derivative(path_of(steps, "u_tip", "v_tip"))), 1.0) / steps.size**2
+def _accelerations(steps: StepRecords, position: str, velocity: str, share: float) -> Any:
+    """Return those at a ``share`` of each step [m/s²], of the path of an end through both its ends and the moments."""
+    return value(derivative(derivative(path_of(steps, position, velocity))), share) / steps.size**2
