@@ -6,8 +6,10 @@ import numpy as np
 import oscillator
 import pytest
 from bodies import DuffingBody
+from scenes import load_of
 
 from springbeam import PointMass, SceneError, SpringDamper, simulate, with_changes
+from springbeam.bodies.elements import RigidWall
 from springbeam.bodies.protocol import NO_FORCE, Abilities
 from springbeam.scene import load_scene, scene_from_dict
 
@@ -151,3 +153,11 @@ def test_the_damper_of_an_element_takes_what_mass_and_spring_lose_wherever_its_r
     at_start = sum(body.energies())
     body.advance(0.0, 0.5, NO_FORCE)
     assert sum(body.energies()) == pytest.approx(at_start, rel=1e-13)
+
+
+def test_the_acceleration_of_the_base_acts_on_the_mass_of_an_element_downward_and_a_wall_stays():
+    body = SpringDamper(2.0)
+    body.expect_loads([load_of(on="base"), load_of(on="tip")])
+    body.set_loads([(3.0, 0.0, 0.0), (5.0, 0.0, 0.0)])
+    assert body.load_on_end()[0] == -1.0
+    assert RigidWall(0.5).advance(0.0, 0.1, NO_FORCE) == pytest.approx((0.5, 0.0, 0.05, 0.0025), rel=1e-15)
