@@ -80,19 +80,16 @@ make_environment() {
   fi
 }
 
-# install NAME PACKAGE… — once for each state of pyproject.toml, by uv, which takes a third of pip's time. An index that is
-# set for pip counts for it, too.
+# install NAME PACKAGE… — with pip, once for each state of pyproject.toml.
 install() {
-  local installed=$venv/.installed-$1 stamp index
+  local installed=$venv/.installed-$1 stamp
   stamp=$(cksum <pyproject.toml)" $*"
   [ "$(cat "$installed" 2>/dev/null)" != "$stamp" ] || return 0
   say "installing Python packages ($1)"
   shift
-  [ -x $venv/bin/uv ] || $python -m pip install --quiet --no-compile --disable-pip-version-check "uv>=0.5" ||
-    die "pip could not install uv (is there a network, or PIP_INDEX_URL to set?)"
-  index=${UV_DEFAULT_INDEX:-${PIP_INDEX_URL:-$($python -m pip config get global.index-url 2>/dev/null || true)}}
-  UV_DEFAULT_INDEX=${index:-https://pypi.org/simple} $venv/bin/uv pip install --quiet --python $python "$@" ||
-    die "uv could not install $* (is there a network, or UV_DEFAULT_INDEX to set?)"
+  # Python compiles what it imports: to compile all that there is would take as long as to install it.
+  $python -m pip install --quiet --no-compile --disable-pip-version-check "$@" ||
+    die "pip could not install $* (is there a network, or PIP_INDEX_URL to set?)"
   printf '%s' "$stamp" >"$installed"
 }
 
@@ -147,8 +144,9 @@ build() {
   exec 9<.
   command -v flock >/dev/null && { flock -n 9 || { say "waiting for another build"; flock 9; }; }
   make_environment
-  # What the build takes comes first, FMPy for its headers; all else is installed while the compiler works.
-  install build --no-deps cmake ninja fmpy
+  # What the build takes comes first, FMPy for its headers; all else is installed while the compiler works, by a pip that
+  # is not as slow as those that come with older versions of Python.
+  install build --no-deps "pip>=25" cmake ninja fmpy
   if [ "$packages" = run ]; then install run -e . & else install dev -e ".[dev]" & fi
   local configured installing=$!
   rm -f build/ninja.log
