@@ -106,7 +106,7 @@ def test_a_wrong_reference_fails(monkeypatch, what):
     """The reference is given another problem than the co-simulation: nothing in the bounds may hide that."""
     right = event_driven.integrate
     monkeypatch.setattr(
-        event_driven, "integrate", lambda scene, **options: right(with_changes(scene, **WRONG[what]), **options)
+        event_driven, "integrate", lambda given, **options: right(with_changes(given.scene, **WRONG[what]), **options)
     )
     coupling = {"macro_step": 1e-3, "degree": 0 if what == "law" else 2}
     scene = with_changes(SOFT, time={"t_end": 0.1}, beam={"n_elements": 8}, coupling=coupling)
@@ -140,8 +140,8 @@ def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
     right = event_driven.integrate
     for options, mass, code in (([], 1.0, 0), ([], 1.01, 2), (["--force"], 1.01, 1)):
 
-        def heavier(scene, mass=mass, **more):
-            return right(with_changes(scene, spring={"mass": mass}), **more)
+        def heavier(given, mass=mass, **more):
+            return right(with_changes(given.scene, spring={"mass": mass}), **more)
 
         monkeypatch.setattr(event_driven, "integrate", heavier)
         assert command(*arguments, *options).exit_code == code

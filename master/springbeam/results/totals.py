@@ -162,7 +162,8 @@ def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tu
     first = np.maximum(np.concatenate([rows - window, rows, inside]), rows[0])
     last = np.minimum(np.concatenate([rows, rows + window, inside + window]), rows[-1])
     # Where the ends pull at each other, a window that the run cuts short would have the larger mean.
-    whole = last - first >= (1.0 - _ALIKE) * min(window, rows[-1] - rows[0])
+    length = last - first
+    whole = length >= (1.0 - _ALIKE) * length.max()
     first = first[whole]
     last = last[whole]
     found = np.maximum(upto(last, "left"), upto(last, "right")) - np.minimum(upto(first, "left"), upto(first, "right"))
