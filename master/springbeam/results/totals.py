@@ -13,6 +13,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
 from ..motion.events import Event
+from ..motion.paths import EPS
 from ..scene import Scene
 from .contact_times import foundation_contacts, kicks, tip_contacts
 from .dense import extremes
@@ -162,8 +163,8 @@ def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tu
     first = np.maximum(np.concatenate([rows - window, rows, inside]), rows[0])
     last = np.minimum(np.concatenate([rows, rows + window, inside + window]), rows[-1])
     # Where the ends pull at each other, a window that the run cuts short would have the larger mean.
-    length = last - first
-    whole = length >= (1.0 - _ALIKE) * length.max()
+    rounding = 4.0 * EPS * np.abs(rows).max()
+    whole = last - first >= min(window, rows[-1] - rows[0]) - rounding
     first = first[whole]
     last = last[whole]
     found = np.maximum(upto(last, "left"), upto(last, "right")) - np.minimum(upto(first, "left"), upto(first, "right"))
