@@ -164,7 +164,7 @@ WAITED_FOR = {
 
 
 def test_a_terminal_shows_what_is_waited_for_and_how_much_is_done(here, fmu_folder, monkeypatch):
-    """Of the whole, where that is known; without a terminal nothing is printed."""
+    """The share of the whole is shown where that is known; without a terminal nothing is printed."""
     for line, words in WAITED_FOR.items():
         output = StringIO()
         with monkeypatch.context() as patch:

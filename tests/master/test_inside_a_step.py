@@ -40,7 +40,7 @@ def test_path_and_cubic_are_apart_by_no_more_than_they_say(even, odd):
 
 
 def test_what_turns_a_mismatch_of_velocities_is_the_mass_times_the_acceleration_of_the_gap():
-    """Of a gap of degree 5 that is 0 at both ends of a step of joined ends, in Legendre polynomials up to degree 3."""
+    """The gap of joined ends has degree 5 and is 0 at both ends of a step; Legendre polynomials show degree 3 of it."""
     s = Polynomial((0.0, 1.0))
     gap = s * (1.0 - s) * Polynomial((0.3, 1.0, -2.0, 1.5))
     steps = np.zeros(2, STEP)

@@ -279,7 +279,7 @@ def test_a_search_follows_a_valley_to_its_end(tmp_path):
 
 
 def test_a_search_along_a_valley_ends_where_the_range_does(tmp_path):
-    """Of the right stiffness, 3.1, and mass, 1, only the ratio shows; the search took 182 runs and had "not ended"."""
+    """The data show only the ratio of stiffness, 3.1, to mass, 1. Without a step along the limit a search has no end."""
     scene = load_scene("duffing", COARSE)
     run = simulate(with_changes(scene, spring={"linear_stiffness": 3.1}))
     path = written(tmp_path / "m.csv", "time,y", run.time, noisy(run["y"], 0.01))
