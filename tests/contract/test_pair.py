@@ -206,7 +206,7 @@ def warnings(pair):
 
 @pytest.mark.parametrize("what", WRONG)
 def test_a_wrong_connection_is_warned_of_once(beam, spring, what):
-    """The message comes as often as the output `warnings` counts it."""
+    """One message says what is wrong; the output `warnings` counts the steps that show it."""
     case = WRONG[what]
     pair = Pair(beam, spring, 1e-3)
     pair.connected = [name for name in BY_NAME if name != case.get("without")]

@@ -279,7 +279,7 @@ def test_a_search_follows_a_valley_to_its_end(tmp_path):
 
 
 def test_a_search_along_a_valley_ends_where_the_range_does(tmp_path):
-    """The data show only the ratio of stiffness, 3.1, to mass, 1. Without a step along the limit a search has no end."""
+    """The data show only the ratio of stiffness, 3.1, to mass, 1; the search goes on along the limit of stiffness."""
     scene = load_scene("duffing", COARSE)
     run = simulate(with_changes(scene, spring={"linear_stiffness": 3.1}))
     path = written(tmp_path / "m.csv", "time,y", run.time, noisy(run["y"], 0.01))

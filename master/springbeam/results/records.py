@@ -6,6 +6,7 @@ state after the event of the row before, the end of the step and its two moments
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from struct import Struct
 
 import numpy as np
@@ -104,6 +105,6 @@ def reduced_mass(before: np.ndarray) -> np.ndarray:
     return np.where((before["phase"] >= 3.0) & (free > 0.0), alone, before["reduced_mass"])
 
 
-def force(steps: np.ndarray, tau: np.ndarray, name: str = "contact_force") -> np.ndarray:
+def force(steps: np.ndarray | Mapping[str, np.ndarray], tau: np.ndarray, name: str = "contact_force") -> np.ndarray:
     """Return C [N] of each step ``tau`` [s] after its start, or the force N of the foundation."""
     return np.asarray(steps[name] + tau * (steps[f"{name}_rate"] + 0.5 * tau * steps[f"{name}_rate_2"]))

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...bodies.protocol import Body
 from ...motion.paths import derivative, sign_changes, value
-from ...results.records import force, joined
+from ...results.records import FORCE_COLUMNS, force, joined
 from ...scene.laws import SoftLaw
 from .records import StepRecords, path_of, penetration
 
@@ -45,16 +45,17 @@ def _defect(demand: _Demand, path: Any, steps: StepRecords, parts: int, kinks: d
     found = np.zeros((len(steps.size), parts, 4))
     step, part, low, high = _stretches(len(steps.size), parts, kinks)
     size = steps.size[step]
-    ends = steps.ends[step]
+    applied = {name: steps.ends[name][step] for name in FORCE_COLUMNS}
     path = path[:, step]
     slope = derivative(path)
+    means = np.zeros((4, len(step)))
     for at, share in _INSIDE:
         s = low + at * (high - low)
-        weight = share * (high - low) * parts
         demanded, *grows = demand(step, value(path, s), value(slope, s) / size)
-        beyond = demanded - force(ends, s * size)
+        beyond = demanded - force(applied, s * size)
         left = 1.0 - (s * parts - part)
-        np.add.at(found, (step, part), (weight * np.array([beyond, 2.0 * left * beyond, *grows])).T)
+        means += share * np.array([beyond, 2.0 * left * beyond, *grows])
+    np.add.at(found, (step, part), (means * (high - low) * parts).T)
     return found
 
 
