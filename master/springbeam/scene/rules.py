@@ -197,9 +197,8 @@ def _heights(scene: Scene) -> Iterator[str]:
     tie = scene.contact.lasting and scene.contact.rigid
     if tie and top is not None and not math.isclose(tip.value, top.value, rel_tol=1e-12):
         yield (
-            f"[{tip.key}]: the tip starts at {tip.value:.6g} m, but [contact.law] holds it at [{top.key}]; let them "
-            "start "
-            'at one height, or use "link"'
+            f"[{tip.key}]: the tip starts at {tip.value:.6g} m, but [contact.law] holds it at [{top.key}]; let "
+            'them start at one height, or use "link"'
         )
     target = scene.tip_target
     clearance = scene.initial_clearance
@@ -221,8 +220,7 @@ def _heights(scene: Scene) -> Iterator[str]:
             if getattr(scene.lower, key, 0.0) != 0.0:
                 yield (
                     f"[spring.{key}]: [beam.approach] holds everything until the tip arrives at t = {arrives:.6g} s; "
-                    "start "
-                    'at rest, or use approach = "elastic"'
+                    'start at rest, or use approach = "elastic"'
                 )
 
 
