@@ -37,7 +37,7 @@ def test_no_files_import_each_other_in_a_circle():
 #: What takes long to load.
 SLOW = (
     *("numpy", "scipy", "matplotlib", "plotly", "fmpy", "pyarrow", "distributed", "pandas", "pint"),
-    *("numpy.ma", "multiprocessing.connection", "rich.progress"),
+    *("numpy.ma", "multiprocessing.connection", "rich.progress", "pydantic"),
 )
 
 
@@ -46,10 +46,6 @@ LIGHT = (
     "",
     "--help",
     "scenes",
-    "keys",
-    "keys --schema",
-    "keys beam --json",
-    "new mine",
     "run --help",
     "crosscheck --help",
 )
@@ -58,11 +54,15 @@ LIGHT = (
 SMALL = "--no-plots --set time.t_end=0.01 --set beam.n_elements=4"
 #: What the others load.
 LOADED = {
-    "doctor": "numpy fmpy",
-    f"run soft {SMALL}": "numpy fmpy",
-    "report results/soft": "numpy",
-    "export results/soft": "numpy",
-    f"crosscheck soft {SMALL}": "numpy scipy fmpy pyarrow numpy.ma",
+    "new mine": "pydantic",
+    "keys": "pydantic",
+    "keys --schema": "pydantic",
+    "keys beam --json": "pydantic",
+    "doctor": "numpy fmpy pydantic",
+    f"run soft {SMALL}": "numpy fmpy pydantic",
+    "report results/soft": "numpy pydantic",
+    "export results/soft": "numpy pydantic",
+    f"crosscheck soft {SMALL}": "numpy scipy fmpy pyarrow numpy.ma pydantic",
 }
 
 

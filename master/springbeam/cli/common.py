@@ -97,6 +97,18 @@ ForceOption = Annotated[bool, typer.Option("--force", "-f", help="Replace existi
 NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help="Draw no picture.")]
 
 
+def _with_flags(parameters: list[Any]) -> list[Any]:
+    """Show flags without a type, which ``--force true`` would follow, and let one that is not given be false.
+
+    With ``None`` for a flag, Typer loads pydantic to check it.
+    """
+    for parameter in parameters:
+        if getattr(parameter, "is_flag", False):
+            parameter.metavar = ""
+            parameter.default = parameter.default or False
+    return parameters
+
+
 class Commands(TyperGroup):
     """All commands, each made when it is needed. A former one names its replacement."""
 
@@ -107,6 +119,9 @@ class Commands(TyperGroup):
         super().__init__(**given)
         unmade: dict[str, Any] = dict.fromkeys(self.makers)
         self.commands.update(unmade)
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        return _with_flags(super().get_params(ctx))
 
     def get_command(self, ctx: Any, name: str) -> Any:
         if name in self.makers and self.commands[name] is None:
@@ -119,21 +134,14 @@ class Commands(TyperGroup):
 
 
 class Command(TyperCommand):
-    """A command that can be interrupted. Its flags are shown without a type, which --force true would follow.
-
-    A former option names its replacement.
-    """
+    """A command that can be interrupted. A former option names its replacement."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         _refuse_gone([word for word in args if word.startswith("--")])
         return super().parse_args(ctx, args)
 
     def get_params(self, ctx: Any) -> list[Any]:
-        parameters: list[Any] = super().get_params(ctx)
-        for parameter in parameters:
-            if getattr(parameter, "is_flag", False):
-                parameter.metavar = ""
-        return parameters
+        return _with_flags(super().get_params(ctx))
 
     def invoke(self, ctx: Any) -> None:
         with interruptible(), closed_output_reported():
