@@ -9,7 +9,7 @@ each in `springbeam.run.errors`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import inf
+from math import inf, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,19 +69,29 @@ def misplaced(pair: Pair, records: np.ndarray, events: Sequence[Event]) -> float
     per_mass = made * ends.per_mass if ends.per_mass > 0.0 else np.zeros(len(made))  # of a wall ∞, and no mass
     run = Known(steps, ends, per_mass, strokes(pair.interface, steps, events), by_loads)
     degree = pair.joined.degree
-    parts = 1 if degree == 0 else 2  # a force of a higher degree has the law's mean over a step
+    fastest = _fastest(pair, records, ends)
+    parts = steps.parts(1 if degree == 0 else 2, fastest)  # a force of a higher degree has the law's mean over a step
     if pair.law is not None:
         errors = _under_forces(run, defect_of_law(pair.law, steps, parts))
     elif upper.massless:
         errors = _under_forces(run, defect_of_tip(upper, steps, parts))
     else:
-        errors = _under_ties(run, degree, pair.alone, quiet)
+        errors = _under_ties(run, steps.parts(degree + 2, fastest), pair.alone, quiet)
     found = 0.0
     for u, y in errors:
         found = max(found, abs(u) / ranges[0], abs(y) / ranges[1])
         if found > _LOST:
             break
     return found
+
+
+def _fastest(pair: Pair, records: np.ndarray, ends: Ends) -> float:
+    """Return the frequency of the fastest wave of the upper body, or of both ends in a soft contact [rad/s]."""
+    waves = float(np.abs(ends.terms.rates.imag).max(initial=0.0))
+    if pair.law is None:
+        return waves
+    deepest = float((records["y_after"] - records["u_tip_after"]).max())
+    return max(waves, sqrt(pair.law.slope(deepest) * (ends.mobility + ends.per_mass)))
 
 
 def _under_forces(run: Known, defect: np.ndarray) -> Iterator[tuple[float, float]]:
@@ -104,13 +114,13 @@ def _under_forces(run: Known, defect: np.ndarray) -> Iterator[tuple[float, float
         yield ends.u, ends.y
 
 
-def _under_ties(run: Known, degree: int, alone: bool, quiet: float) -> Iterator[tuple[float, float]]:
+def _under_ties(run: Known, parts: int, alone: bool, quiet: float) -> Iterator[tuple[float, float]]:
     """Yield the errors of both ends [m] along ``run``, inside steps, too: they leave a gap and different velocities.
 
     ``alone`` says that the tip itself strikes the foundation; ``quiet`` is as of `tie`.
     """
     ends = run.ends
-    places, *of_steps = tie(run.steps, degree, quiet)
+    places, *of_steps = tie(run.steps, parts, quiet)
     held = (run.steps.before["phase"] >= 3.0).tolist()
     held_after = (run.steps.last["phase"] >= 3.0).tolist()
     rebound = ends.rebound_of_tip if alone else ends.rebound

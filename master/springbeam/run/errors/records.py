@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...motion.paths import Path
+
+#: Largest angle by which a wave turns in a part of a step [rad], and parts of a step at most: its path has as many
+#: coefficients.
+_TURN = 1.5
+_PARTS = 6
 
 
 class StepRecords(NamedTuple):
@@ -23,6 +29,10 @@ class StepRecords(NamedTuple):
         made = np.flatnonzero(records["size"] > 0.0)
         last = np.append(made[1:], len(records)) - 1
         return cls(records[made - 1], records[made], records[last], records["size"][made])
+
+    def parts(self, least: int, fastest: float) -> int:
+        """Return in how many equal parts of each step, at least, waves up to ``fastest`` [rad/s] are seen."""
+        return max(least, min(ceil(fastest * float(self.size.max()) / _TURN), _PARTS))
 
 
 def path_of(steps: StepRecords, position: str, velocity: str) -> Any:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...motion.paths import derivative, value
-from ...results.records import force, joined
+from ...results.records import joined
 from .records import StepRecords, penetration
 
 
@@ -21,9 +21,8 @@ class Tie(NamedTuple):
     pull: np.ndarray  #: C/ẏ where a tie is released at the end of the step: the impulse by an error of y [N·s/m]
 
 
-def tie(steps: StepRecords, degree: int, quiet: float) -> Tie:
-    """Return it for forces of this ``degree``; steps whose gap stays below ``quiet`` [m] have one part."""
-    parts = degree + 2  # one more than the step has forces
+def tie(steps: StepRecords, parts: int, quiet: float) -> Tie:
+    """Return it for so many ``parts`` of each step; steps whose gap stays below ``quiet`` [m] have one."""
     path = penetration(steps)
     slope = derivative(path)
     shares = (np.arange(parts) + 1.0) / parts
@@ -31,6 +30,6 @@ def tie(steps: StepRecords, degree: int, quiet: float) -> Tie:
     whole = np.abs(inside[:, :, 0]).max(axis=1) <= quiet
     places = [part[-1:] if one else part for part, one in zip(inside.tolist(), whole.tolist(), strict=True)]
     released = (steps.before["phase"] == 1.0) & (steps.last["phase"] == 0.0) & (steps.ends["z"] != 0.0)
-    pull = np.divide(force(steps.ends, steps.size), steps.ends["z"], out=np.zeros(len(whole)), where=released)
+    pull = np.divide(steps.ends["contact_force_end"], steps.ends["z"], out=np.zeros(len(whole)), where=released)
     apart = steps.last["v_tip_after"] - steps.last["z_after"]
     return Tie(places, joined(steps.before), joined(steps.last), apart, pull)
