@@ -77,12 +77,14 @@ def test_an_error_does_not_grow_at_strokes_that_make_it_none():
     assert in_steps("pressed on the stop", 2, 7.8e-7).summary["misplaced_ends"] < 1e-3
 
 
-#: Degree, macro step, that of a run which follows the waves [s], and by which share of the error the estimate may differ.
+#: Degree, macro step, that of a run which follows the waves [s], and by which share of the error the estimate differs.
 AMID_WAVES = {
     "parts with two velocities": (2, 2.5e-4, 2e-5, 0.3),
     "released amid waves": (1, 1.27655707824823e-6, 1.1e-7, 0.7),
     "linked amid waves": (1, 3.16931135441496e-5, 4e-6, 0.2),
     "stiff contact": (1, 4.07510056622812e-4, 5e-5, 0.5),
+    "bounces late": (0, 8.09660038534827e-4, 7e-5, 0.2),
+    "bounces amid waves": (2, 1.7421136179563226e-4, 1.4e-5, 0.2),
 }
 
 

@@ -38,6 +38,7 @@ class Known(NamedTuple):
     steps: StepRecords
     ends: Ends
     stiffness: np.ndarray  #: of the lower body over its mass, in each step [1/s²]
+    events: Sequence[Event]
     strokes: Strokes
     loads: list[tuple[Any, ...]] | None  #: `_by_loads`
 
@@ -67,7 +68,7 @@ def misplaced(pair: Pair, records: np.ndarray, events: Sequence[Event]) -> float
         return 0.0
     made = np.broadcast_to(stiffness, len(records))[records["size"] > 0.0]
     per_mass = made * ends.per_mass if ends.per_mass > 0.0 else np.zeros(len(made))  # of a wall ∞, and no mass
-    run = Known(steps, ends, per_mass, strokes(pair.interface, steps, events), by_loads)
+    run = Known(steps, ends, per_mass, events, strokes(pair.interface, steps, events), by_loads)
     degree = pair.joined.degree
     fastest = _fastest(pair, records, ends)
     parts = steps.parts(1 if degree == 0 else 2, fastest)  # a force of a higher degree has the law's mean over a step
@@ -120,13 +121,13 @@ def _under_ties(run: Known, parts: int, alone: bool, quiet: float) -> Iterator[t
     ``alone`` says that the tip itself strikes the foundation; ``quiet`` is as of `tie`.
     """
     ends = run.ends
-    places, *of_steps = tie(run.steps, parts, quiet)
+    places, *of_steps = tie(run.steps, run.events, parts, quiet)
     held = (run.steps.before["phase"] >= 3.0).tolist()
     held_after = (run.steps.last["phase"] >= 3.0).tolist()
     rebound = ends.rebound_of_tip if alone else ends.rebound
     columns = (run.steps.size, run.stiffness, *run.strokes, *of_steps)
     rows = zip(*(values.tolist() for values in columns), strict=True)
-    for step, (H, k, share, turns, most, tied, tied_after, apart, pull) in enumerate(rows):
+    for step, (H, k, share, turns, most, tied, tied_after, apart, pull, meet, part) in enumerate(rows):
         per_mass = 0.0 if held[step] else ends.per_mass
         if not tied:
             ends.drift(H, k, per_mass)
@@ -142,6 +143,8 @@ def _under_ties(run: Known, parts: int, alone: bool, quiet: float) -> Iterator[t
         if (tied or tied_after) and (most > 0.0 or tied != tied_after):
             # The foundation strikes each end by itself.
             ends.kick_apart(-apart, 0.0 if held_after[step] or most > 0.0 else ends.per_mass)
+        if meet > 0.0:
+            ends.bounce(meet, part, 0.0 if held_after[step] else ends.per_mass)
         if pull != 0.0:  # y passes Ψ, sooner or later, where the force pulls
             ends.kick(-pull * ends.y, per_mass)
         yield ends.u, ends.y

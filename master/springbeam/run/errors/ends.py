@@ -144,6 +144,19 @@ class Ends:
         """Let v − z be ``apart`` [m/s] by an impulse; ``per_mass`` as of `drift`."""
         self.kick((apart - self.v + self.z) / (self.mobility + per_mass), per_mass)
 
+    def bounce(self, meet: float, part: float, per_mass: float) -> None:
+        """Let ends meet at a speed ``meet`` [m/s] and part with an acceleration ``part`` [m/s²], late if apart."""
+        apart = self.u - self.y
+        self._shift(-apart / (self.mobility + per_mass), per_mass)
+        self.kick_apart(max(-meet, min(-part * apart / meet, meet)), per_mass)
+
+    def _shift(self, jump: float, per_mass: float) -> None:
+        """Let a ``jump`` [N·s²] lift the tip and press the lower end; ``per_mass`` as of `drift`."""
+        self._values += jump * self._jump
+        self.u += jump * self.mobility
+        self.v += jump * self._resisted
+        self.y -= jump * per_mass
+
     def rebound(self, share: float, turns: float, most: float) -> None:
         """Change the errors of the lower end by a `springbeam.run.errors.strokes.Strokes` of the foundation."""
         self.z = share * self.z + max(-most, min(turns * self.y, most))
@@ -151,11 +164,8 @@ class Ends:
 
     def rebound_of_tip(self, share: float, turns: float, most: float) -> None:
         """Change those of the tip; the impulse that is earlier or later moves the beam besides."""
-        jump = (share - 1.0) * self.u / self.mobility
         change = (share - 1.0) * self.v + max(-most, min(turns * self.u, most))
-        self._values += jump * self._jump
-        self.u *= share
-        self.v += jump * self._resisted
+        self._shift((share - 1.0) * self.u / self.mobility, 0.0)
         self.kick(change / self.mobility, 0.0)
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...motion.paths import Path
+from ...motion.events import Event, EventKind
+from ...motion.paths import Path, derivative, value
 
 #: Largest angle by which a wave turns in a part of a step [rad], and parts of a step at most: its path has as many
 #: coefficients.
@@ -34,6 +36,12 @@ class StepRecords(NamedTuple):
         """Return in how many equal parts of each step, at least, waves up to ``fastest`` [rad/s] are seen."""
         return max(least, min(ceil(fastest * float(self.size.max()) / _TURN), _PARTS))
 
+    def ended_by(self, kind: EventKind, events: Sequence[Event]) -> np.ndarray:
+        """Return the number of the step that each of the ``events`` of a ``kind`` ends, but those of the start."""
+        start = self.before["events"][0]
+        number = [n for n, event in enumerate(events, 1) if event.kind is kind and n > start]
+        return np.searchsorted(self.last["events"], number)
+
 
 def path_of(steps: StepRecords, position: str, velocity: str) -> Any:
     """Return the path of a ``position`` inside each step, the coefficients of `Path`, shape (6, n)."""
@@ -48,3 +56,8 @@ def path_of(steps: StepRecords, position: str, velocity: str) -> Any:
 def penetration(steps: StepRecords) -> Any:
     """Return the path of y − u inside each step, as of `path_of`."""
     return path_of(steps, "y", "z") - path_of(steps, "u_tip", "v_tip")
+
+
+def accelerations(steps: StepRecords, position: str, velocity: str, share: float) -> Any:
+    """Return those at a ``share`` of each step [m/s²], of the path of an end through both its ends and the moments."""
+    return value(derivative(derivative(path_of(steps, position, velocity))), share) / steps.size**2

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from ...motion.events import Event, EventKind
 from ...motion.paths import derivative, value
 from ...results.records import joined
-from .records import StepRecords, penetration
+from .records import StepRecords, accelerations, penetration
 
 
 class Tie(NamedTuple):
@@ -19,9 +21,11 @@ class Tie(NamedTuple):
     tied_after: np.ndarray  #: and after its events
     apart: np.ndarray  #: v − z after these [m/s]
     pull: np.ndarray  #: C/ẏ where a tie is released at the end of the step: the impulse by an error of y [N·s/m]
+    meet: np.ndarray  #: z − v where ends meet at the end of the step and part at once [m/s]
+    part: np.ndarray  #: ü − ÿ with which they do [m/s²]
 
 
-def tie(steps: StepRecords, parts: int, quiet: float) -> Tie:
+def tie(steps: StepRecords, events: Sequence[Event], parts: int, quiet: float) -> Tie:
     """Return it for so many ``parts`` of each step; steps whose gap stays below ``quiet`` [m] have one."""
     path = penetration(steps)
     slope = derivative(path)
@@ -32,4 +36,12 @@ def tie(steps: StepRecords, parts: int, quiet: float) -> Tie:
     released = (steps.before["phase"] == 1.0) & (steps.last["phase"] == 0.0) & (steps.ends["z"] != 0.0)
     pull = np.divide(steps.ends["contact_force_end"], steps.ends["z"], out=np.zeros(len(whole)), where=released)
     apart = steps.last["v_tip_after"] - steps.last["z_after"]
-    return Tie(places, joined(steps.before), joined(steps.last), apart, pull)
+    tied = joined(steps.before)
+    tied_after = joined(steps.last)
+    meet, part = np.zeros((2, len(whole)))
+    at = steps.ended_by(EventKind.IMPACT, events)
+    at = at[~tied[at] & ~tied_after[at]]
+    if len(at):
+        meet[at] = (steps.ends["z"] - steps.ends["v_tip"])[at]
+        part[at] = (accelerations(steps, "u_tip", "v_tip", 1.0) - accelerations(steps, "y", "z", 1.0))[at]
+    return Tie(places, tied, tied_after, apart, pull, meet, part)
