@@ -93,6 +93,12 @@ install() {
   printf '%s' "$stamp" >"$installed"
 }
 
+# install_rest run|dev — to use it, or to test it, too; by a pip that is not as slow as those of older versions of Python.
+install_rest() {
+  install pip "pip>=25"
+  if [ "$1" = run ]; then install run -e .; else install "$1" -e ".[$1]"; fi
+}
+
 set_up_python() {
   make_environment
   install "$1" -e ".[$1]"
@@ -143,20 +149,24 @@ build() {
   # One at a time: two would build into the same folder.
   exec 9<.
   command -v flock >/dev/null && { flock -n 9 || { say "waiting for another build"; flock 9; }; }
-  make_environment
-  # What the build takes comes first, FMPy for its headers; all else is installed while the compiler works, by a pip that
-  # is not as slow as those that come with older versions of Python.
-  install build --no-deps "pip>=25" cmake ninja fmpy
-  if [ "$packages" = run ]; then install run -e . & else install dev -e ".[dev]" & fi
-  local configured installing=$!
   rm -f build/ninja.log
   progress &
   local reporting=$!
   trap 'kill '$reporting' 2>/dev/null || true' EXIT
+  make_environment
+  # What the build takes comes first, FMPy for its headers.
+  install build --no-deps cmake ninja fmpy &
+  local configured installing=$!
   configured="$PWD ${SPRINGBEAM_PREFIX:-} ${CMAKE_PREFIX_PATH:-} ${CXX:-} $sundials"
   if [ "$(cat build/.configured 2>/dev/null)" != "$configured" ]; then
     rm -rf build
     set_up_system
+  fi
+  wait $installing
+  # All else is installed while the compiler works.
+  install_rest "$packages" &
+  installing=$!
+  if [ ! -f build/.configured ]; then
     say "configuring"
     $venv/bin/cmake -S . -B build -G Ninja -DCMAKE_MAKE_PROGRAM="$PWD/$venv/bin/ninja" \
       -DPython3_EXECUTABLE="$PWD/$python" >build.log 2>&1 || {
