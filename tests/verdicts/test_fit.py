@@ -17,8 +17,8 @@ from scipy.stats import t as student
 
 from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
 from springbeam.scene import as_scene
-from springbeam.signals.measured import read_measured, residuals
-from springbeam.studies import fit
+from springbeam.signals.measured import Measured, at_shift, read_measured, residuals
+from springbeam.studies.fit import study as fit
 
 TRUE = {"spring.linear_stiffness": 800.0, "spring.damping": 1.2}
 OSCILLATOR = scene_from_dict(
@@ -113,6 +113,18 @@ def test_a_file_without_a_column_of_the_run_is_refused(tmp_path, text, why):
         read_measured(path, OSCILLATOR)
 
 
+def test_the_derivative_by_the_clock_is_that_of_one_side_where_a_velocity_jumps():
+    """1e-7 s before an impact, at it and after it, it is the acceleration on that side; across it, 8e6 m/s²."""
+    run = simulate(load_scene("soft", ["time.t_end=0.3"]))
+    impact = run.events[-1].time
+    times = impact + np.array([-1e-7, 0.0, 1e-7])
+    found = at_shift(run, Measured(times, {"v_tip": np.zeros(3)}, []), 0.0)
+    sides = [run.at(impact + np.array(two))["v_tip"] for two in ((-2e-6, -1e-6), (1e-6, 2e-6))]
+    before, after = (float(np.diff(two)[0]) / 1e-6 for two in sides)
+    assert abs(found.off["v_tip"][1] - found.off["v_tip"][0]) > 0.5
+    assert found.slope["v_tip"] == pytest.approx([before, after, after], rel=0.03)
+
+
 def test_the_command_compare_takes_a_measurement(here):
     simulate(OSCILLATOR).save("run")
     written(here / "m.csv", "time [s],position [mm]", TIMES + 0.2, 1e3 * exact())
@@ -156,15 +168,15 @@ def test_a_clock_that_the_data_does_not_tell_is_named(tmp_path):
 
 def test_a_trial_that_cannot_be_run_turns_the_search_back(tmp_path, monkeypatch):
     """The first run of a search: after those all over the ranges, and two for the first derivatives."""
-    right = fit.simulate
+    right = fit.simulate_to
     runs = count()
 
-    def stops_once(scene):
+    def stops_once(scene, time):
         if next(runs) == 18:
             raise RunStopped("diverges", 0.1)
-        return right(scene)
+        return right(scene, time)
 
-    monkeypatch.setattr(fit, "simulate", stops_once)
+    monkeypatch.setattr(fit, "simulate_to", stops_once)
     found = fitted(written(tmp_path / "m.csv", "time,y", TIMES, exact()), shift=0.0)
     (error,) = [row["error"] for row in found["runs"] if row["error"]]
     assert "diverges" in error
@@ -231,9 +243,9 @@ def test_an_interrupted_fit_goes_on_where_it_was(here, monkeypatch):
     """No record is made twice, and what is found is what a fit at once finds, to the last bit."""
     written(here / "m.csv", "time,y", TIMES, simulate(load_scene("duffing")).at(TIMES)["y"])
     interrupt = Interrupt(20)
-    right = fit.simulate
+    right = fit.Fit.record
     made = []
-    monkeypatch.setattr(fit, "simulate", lambda scene: interrupt() or made.append(scene) or right(scene))
+    monkeypatch.setattr(fit.Fit, "record", lambda *case: interrupt() or made.append(case) or right(*case))
     cut = command(*FIT)
     assert cut.exit_code == 3
     assert re.search(r"interrupted; 19 of \d+ records are in f; the same command continues", cut.stderr)
@@ -404,6 +416,30 @@ def test_a_laser_record_is_fitted_in_forty_runs(tmp_path):
     assert len(found["runs"]) <= 40
     for row, right in zip(found["keys"], (2.1e11, 2e4, -0.0123), strict=True):
         assert abs(row["value"] - right) <= row["high"] - row["low"]
+
+
+def test_a_velocity_that_jumps_is_fitted_in_fifty_runs_of_which_none_is_made_twice(tmp_path, monkeypatch):
+    """A laser sees impacts; it took 170 runs, 12 of them twice, since the first search stopped beside its minimum.
+
+    A run ends where the data do, but for those that show which shift of the clock fits at all.
+    """
+    made = []
+    right = fit.simulate_to
+    monkeypatch.setattr(fit, "simulate_to", lambda scene, time: made.append((scene, time)) or right(scene, time))
+    scene = load_scene("soft", ["coupling.macro_step=5e-4"])
+    times = np.linspace(0.0, 0.3, 3001)
+    path = written(tmp_path / "m.csv", "time,v_tip", times + 0.01, noisy(simulate(scene).at(times)["v_tip"], seed=1))
+    found = fitted(path, ["spring.linear_stiffness=2.9", "spring.mass=1.05"], scene)
+    assert found["undetermined"] == []
+    for row, true in zip(found["keys"], (3.0, 1.0, -0.01), strict=True):
+        assert row["low"] < true < row["high"]
+    assert len(made) <= 50
+    longest = {}
+    for one, time in made:
+        keys = (one.spring.linear_stiffness, one.spring.mass, one.coupling.H)
+        assert time > longest.get(keys, 0.0)
+        longest[keys] = time
+    assert sum(time == 0.6 for _, time in made) <= 16 + 2  # starts, the search at another shift, the minimum
 
 
 @pytest.mark.parametrize(("kind", "stiffness"), [("element", 80.0), ("fmu", 80.0), ("element", 200.0)])

@@ -307,7 +307,7 @@ def fit(
 
     Example: springbeam fit soft measured.csv --vary spring.linear_stiffness=3 --vary spring.damping=0.1
     """
-    from ..studies.fit import Fit
+    from ..studies.fit.study import Fit
 
     return Fit(
         scene=scenes.load_scene(scene, settings or ()),

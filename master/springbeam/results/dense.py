@@ -96,11 +96,12 @@ def rows_at(run: Trajectory, times: Any) -> Trajectory:
     if outside.any():
         raise ValueError(f"time {wanted[outside][0]:g} s: the run is known from {known[0]!s} s to {known[-1]!s} s")
     row = np.searchsorted(known, wanted, side="right") - 1
-    records = steps[row]
+    # Indexing an array of records copies them field by field; ``take`` and ``put`` copy each as a whole.
+    records = steps.take(row)
     between = np.flatnonzero(wanted > known[row])
-    before = records[between]
-    after = steps[row[between] + 1]
-    records[between] = _between(run.scene, before, after, run.events, wanted[between])
+    before = records.take(between)
+    after = steps.take(row[between] + 1)
+    np.put(records, between, _between(run.scene, before, after, run.events, wanted[between]))
     made = columns(run.scene, records, steps[:1])
     return Trajectory(run.scene, made, list(run.events), summary=dict(run.summary))
 
@@ -264,7 +265,7 @@ def _between(
     scene: Scene, before: np.ndarray, after: np.ndarray, events: Sequence[Event], times: np.ndarray
 ) -> np.ndarray:
     """Return records at ``times`` [s] strictly between the records ``before`` and ``after``, all of shape (n,)."""
-    found: np.ndarray = before.copy()
+    found: np.ndarray = before.take(np.arange(len(before)))
     share = (times - before["time"]) / (after["time"] - before["time"])
 
     def linear(name: str, end: np.ndarray) -> np.ndarray:

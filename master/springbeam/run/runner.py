@@ -141,6 +141,18 @@ class Simulation(AbstractContextManager["Simulation"]):
                     progress(master.state.time, master.state.phase.name, master.state.macro_steps)
         return self._end({"status": "done"})
 
+    def reach(self, time: float) -> Trajectory:
+        """Make the steps up to ``time`` [s], or to the end of the run; return the trajectory, without its summary.
+
+        The last step may end later. Raises the same errors as `step`.
+        """
+        self._refuse_closed()
+        with self._ending():
+            while not self.done and not (self.state.begun and self.state.time >= time):
+                self._master.step()
+            self._master.flush()
+        return self.recorder.trajectory()
+
     def _refuse_closed(self) -> None:
         if self._closed:
             raise ValueError("the simulation is closed, and its bodies with it; make another one")

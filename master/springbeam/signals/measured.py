@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
@@ -21,9 +21,11 @@ from .curves import check, signal
 #: Most steps of a correlation, and fewest in the run.
 _MOST = 200_000
 _FEWEST = 2_000
-#: Peaks of a correlation that are refined, and steps by Newton's method after that.
+#: Peaks of a correlation that are refined.
 _PEAKS = 6
-_NEWTON = 1
+#: Most steps by Newton's method that settle a shift, and the change of the curves over their spread that is none.
+_NEWTON = 5
+_SETTLED = 1e-7
 #: Mean square over the spread that is none.
 ALIKE = 1e-12
 #: Shifts fit equally well whose mean squares differ by no more than this share.
@@ -130,54 +132,84 @@ def reading_of(texts: Sequence[str]) -> Reading:
         raise ArgumentError(f"--read {key}={given[key]}: {first['msg'].lower()}") from None
 
 
+def mapping(names: Sequence[str]) -> dict[str, str]:
+    """Return what ``NAME=COLUMN`` say. Raises SceneError for anything else."""
+    found = {}
+    for text in names:
+        name, _, column = (part.strip() for part in text.partition("="))
+        if not name or not column:
+            raise ArgumentError(f"--map {text}: must be NAME=COLUMN, as in CH1=a_tip")
+        found[name] = column
+    return found
+
+
 class Aligned(NamedTuple):
-    """A run and a measurement whose clock is shifted for the best fit."""
+    """A run and a measurement whose clock is shifted."""
 
     shift: float  #: [s]
     off: dict[str, np.ndarray]  #: run less measurement, NaN outside of the run, shapes (n,)
     slope: dict[str, np.ndarray]  #: derivative of ``off`` by the shift, shapes (n,)
-    others: list[tuple[float, float]]  #: other shifts [s], each a least mean square nearby, which follows
 
 
 def time_shift(run: Trajectory, measured: Measured) -> float:
-    """Return the shift [s] of the clock of the measurement with which its curves fit the run best."""
-    return aligned(run, measured).shift
+    """Return the shift [s] of the clock of the measurement with which its curves fit the run best.
+
+    Of equally good ones it is the smallest.
+    """
+    return settled(run, measured, at_shift(run, measured, shifts(run, measured)[0][0])).shift
 
 
-def aligned(run: Trajectory, measured: Measured, lowest: float = -math.inf, highest: float = math.inf) -> Aligned:
-    """Return ``run`` and the measurement, its clock shifted to the least mean square of the difference.
+def settled(
+    run: Trajectory,
+    measured: Measured,
+    here: Aligned,
+    points: slice = slice(None),
+    limits: tuple[float, float] | None = None,
+) -> Aligned:
+    """Return ``run`` and the measurement, the clock moved from ``here`` to the least mean square of the difference.
 
-    Curves are weighed by the spread of the measurement. Periods of an oscillation are similar, so the `_PEAKS` best
-    shifts of a correlation are refined, and the best of these is taken; of equally good ones the smallest.
-    At least half of the points that the run can cover are used.
+    It is moved to where the mean square has no slope, so that runs that hardly differ have shifts that hardly differ.
 
     Parameters
     ----------
     run, measured
         The run and the measurement.
-    lowest, highest
-        Limits of the shift [s].
+    here
+        Both, where the clock begins.
+    points
+        Of the measurement, which count.
+    limits
+        Lowest and highest shift [s]; without them it moves by no more than a quarter of a `period`.
     """
-    others = list[tuple[float, float]]()
-    if lowest < highest:
-        found, step = _correlated(run, measured, lowest, highest)
-        moved = found[0][0]
-        others = found[1:]
-        lowest = max(moved - step, lowest)
-        highest = min(moved + step, highest)
-        for _ in range(_NEWTON):
-            here = at_shift(run, measured, moved)
-            off, slope = (weighed(part, measured) for part in (here.off, here.slope))
-            turned = float(slope @ slope)
-            moved = float(np.clip(moved - off @ slope / turned, lowest, highest)) if turned else moved
-    else:
-        moved = lowest
-    return at_shift(run, measured, moved)._replace(others=others)
+    quarter = 0.25 * period(here.slope, measured)
+    lowest, highest = limits or (here.shift - quarter, here.shift + quarter)
+    step = 0.0
+    gradient = 0.0
+    for _ in range(_NEWTON):
+        off, slope = (weighed(part, measured, points) for part in (here.off, here.slope))
+        last = gradient
+        gradient = float(off @ slope)
+        turned = max(float(slope @ slope), 1e-300)
+        # By the change of the gradient, after a step, if it shows a minimum; at first as if the curve were straight.
+        curvature = (gradient - last) / step if step * (gradient - last) > 0.0 else turned
+        step = float(np.clip(here.shift - gradient / curvature, lowest, highest)) - here.shift
+        if abs(step) * math.sqrt(turned / max(len(off), 1)) <= _SETTLED:
+            break
+        here = at_shift(run, measured, here.shift + step)
+    return here
 
 
-def weighed(curves: Mapping[str, np.ndarray], measured: Measured) -> np.ndarray:
+def period(slope: Mapping[str, Any], measured: Measured) -> float:
+    """Return that of the motion, or a smaller one [s], by derivatives of curves by time or shift, shapes (n,)."""
+    rates = [
+        math.sqrt(np.nanmean(np.array(curve, float) ** 2)) / measured.spread(what) for what, curve in slope.items()
+    ]
+    return 2.0 * math.pi / max(*rates, 1e-300)
+
+
+def weighed(curves: Mapping[str, np.ndarray], measured: Measured, points: slice = slice(None)) -> np.ndarray:
     """Return curves over the spread of the measurement, one after the other, 0 where they are NaN."""
-    return np.concatenate([np.nan_to_num(curve) / measured.spread(what) for what, curve in curves.items()])
+    return np.concatenate([np.nan_to_num(curve[points]) / measured.spread(what) for what, curve in curves.items()])
 
 
 def at_shift(run: Trajectory, measured: Measured, shift: float) -> Aligned:
@@ -186,8 +218,13 @@ def at_shift(run: Trajectory, measured: Measured, shift: float) -> Aligned:
     end = float(run.time[-1])
     covered = measured.covered(run, shift)
     times = measured.time[covered] + shift
-    half = _DIFFERENCE * (end - begin)
-    before, after = np.clip([times - half, times + half], begin, end)
+    # A derivative is that of one side where a curve jumps. The value at an event is that after it.
+    half = _DIFFERENCE * run.scene.duration
+    events = np.array([event.time for event in run.events])
+    next_one = np.searchsorted(events, times, side="right")
+    before = np.maximum(times - half, np.append(begin, events)[next_one])
+    after = np.minimum(times + half, np.append(events - 1e-3 * half, end)[next_one])
+    width = after - before
     here, earlier, later = (rows_at(run, several) for several in (times, before, after))
     off = {}
     slope = {}
@@ -195,16 +232,18 @@ def at_shift(run: Trajectory, measured: Measured, shift: float) -> Aligned:
         off[what] = np.full_like(values, np.nan)
         slope[what] = np.zeros_like(values)
         off[what][covered] = signal(here, what) - values[covered]
-        slope[what][covered] = (signal(later, what) - signal(earlier, what)) / (after - before)
-    return Aligned(shift, off, slope, [])
+        change = signal(later, what) - signal(earlier, what)
+        slope[what][covered] = np.divide(change, width, where=width > 0.0, out=np.zeros_like(width))
+    return Aligned(shift, off, slope)
 
 
-def _correlated(
-    run: Trajectory, measured: Measured, lowest: float, highest: float
-) -> tuple[list[tuple[float, float]], float]:
-    """Return shifts [s] within limits with the mean squares there, that to take first, and the step of the search.
+def shifts(run: Trajectory, measured: Measured) -> list[tuple[float, float]]:
+    """Return shifts [s] of the clock with which the measurement fits ``run``, and the mean square with each.
 
-    Between steps they are found by splines.
+    Periods of an oscillation are similar, so the `_PEAKS` best shifts of a correlation are refined, with splines
+    between its steps. The first one is the best of these, of equally good ones the smallest; the others follow by their
+    mean squares, which are those over the spread of each curve and the share of points that the run covers. At least
+    half of the points that it can cover are used.
     """
     begin = float(run.time[0])
     end = float(run.time[-1])
@@ -227,19 +266,16 @@ def _correlated(
         squares = np.bincount(cells, values**2)
         square = correlated(a**2, points) - 2.0 * correlated(a, sums) + correlated(one, squares)
         total += square / measured.spread(what) ** 2
-    shifts = begin - first + step * (np.arange(len(number)) - len(points) + 1.0)
-    allowed = (number >= 0.5 * number.max()) & (shifts >= lowest) & (shifts <= highest)
-    total = np.where(allowed, (total / number.clip(1.0) + ALIKE) / number.clip(1.0), np.inf)
-    if not allowed.any():
-        return [(0.5 * (lowest + highest), math.inf)], highest - lowest
+    moved = begin - first + step * (np.arange(len(number)) - len(points) + 1.0)
+    total = np.where(number >= 0.5 * number.max(), (total / number.clip(1.0) + ALIKE) / number.clip(1.0), np.inf)
     padded = np.pad(total, 1, constant_values=np.inf)
     lows = np.flatnonzero(np.isfinite(total) & (total <= padded[:-2]) & (total <= padded[2:]))
     splines = {what: CubicSpline(times, curve) for what, curve in curves.items()}
 
     def misfit(shift: float) -> float:
-        moved = measured.time + shift
-        inside = (moved >= begin) & (moved <= end)
-        off = {what: splines[what](moved[inside]) - values[inside] for what, values in measured.values.items()}
+        times = measured.time + shift
+        inside = (times >= begin) & (times <= end)
+        off = {what: splines[what](times[inside]) - values[inside] for what, values in measured.values.items()}
         if not inside.any():
             return math.inf
         # Of periods that fit as well, the one that covers more of the measurement.
@@ -248,7 +284,7 @@ def _correlated(
     refined = [
         minimize_scalar(
             misfit,
-            bounds=(max(shifts[k] - step, lowest), min(shifts[k] + step, highest)),
+            bounds=(moved[k] - step, moved[k] + step),
             method="bounded",
             options={"xatol": 1e-4 * step},
         )
@@ -257,7 +293,7 @@ def _correlated(
     ranked = sorted(((float(at.x), float(at.fun)) for at in refined), key=lambda pair: pair[1])
     equal = [pair for pair in ranked if pair[1] <= (1.0 + EQUAL) * ranked[0][1]]
     smallest = min(equal, key=lambda pair: abs(pair[0]))
-    return [smallest, *(pair for pair in ranked if pair is not smallest)], step
+    return [smallest, *(pair for pair in ranked if pair is not smallest)]
 
 
 def correlated(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -81,6 +81,17 @@ def simulate(
     return pick(scene, progress)
 
 
+def simulate_to(scene: Scene, time: float) -> Trajectory:
+    """Co-simulate ``scene`` at least up to ``time`` [s], or to its end; return the trajectory, maybe without summary.
+
+    With an ``accuracy`` the run is whole. Raises the same errors as `simulate`.
+    """
+    if scene.accuracy is not None:
+        return pick(scene)
+    with runner.Simulation(scene) as simulation:
+        return simulation.reach(time)
+
+
 def pick(scene: Scene, progress: Progress | None = None) -> Trajectory:
     """Return a run of ``scene`` that keeps its ``accuracy``; its scene has the settings that were picked.
 

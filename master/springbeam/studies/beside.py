@@ -12,9 +12,8 @@ from ..pictures.diagrams import Diagram, draw_diagrams
 from ..results.totals import LOSS_NAMES, TOTALS, totals
 from ..results.trajectory import Trajectory
 from ..scene import Scene
-from ..signals.measured import model, read_measured, reading_of, residuals, time_shift
+from ..signals.measured import mapping, model, read_measured, reading_of, residuals, time_shift
 from ..signals.spectra import without_peak
-from .fit import mapping
 from .tables import Findings, table
 
 

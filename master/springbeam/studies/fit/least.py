@@ -16,15 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..signals.measured import Measured
-from .tables import Row
+from ...signals.measured import Measured, period
+from ..tables import Row
 
 #: The unknown that moves the clock of the measurement [s], beside keys.
 SHIFT = "shift"
-#: Makes the record of a run at unknowns, the shift of the clock between two limits [s].
-Trial = Callable[[np.ndarray, float, float], Row]
-#: Share of the run by which the clock may move from where a search begins before points leave the run.
-_MARGIN = 0.02
+#: Makes the record of a run at unknowns, with a `window` for the clock.
+Trial = Callable[[np.ndarray, Row], Row]
 #: Residual of a run that cannot be made, so that a search turns back.
 _REFUSED = 1e3
 #: Differences of the unknowns that give derivatives: to one side on the way, where in a valley of two keys 1e-5 is too
@@ -48,9 +46,9 @@ class Minimum(NamedTuple):
     at: np.ndarray  #: unknowns, shape (k,)
     shift: float  #: of the clock [s]
     row: Row  #: the record of a run there
-    part: np.ndarray  #: the points that take part, shape (n,)
+    part: slice  #: the points that take part
     cost: float  #: see `Search.cost`
-    residual: np.ndarray  #: what is left of them, weighed, shape (m,)
+    residual: np.ndarray  #: what is left of all curves at these, weighed, shape (m,)
     derivatives: np.ndarray  #: by the unknowns and, if the clock is free, by its shift [1/s], shape (m, k or k + 1)
     weights: Mapping[str, float]  #: of the curves
     ended: bool  #: whether no further step would gain anything
@@ -73,6 +71,12 @@ class Minimum(NamedTuple):
         inverse = directions.T / np.maximum(sizes, 1e-300)
         variance = float(self.residual @ self.residual) / self.freedom
         return np.asarray(np.sqrt(variance * (inverse**2).sum(axis=1)) / lengths)
+
+    @property
+    def left(self) -> dict[str, np.ndarray]:
+        """What is left of each curve: run less measurement at the points that take part."""
+        parts = np.split(self.residual, len(self.weights))
+        return {what: part / weight for (what, weight), part in zip(self.weights.items(), parts, strict=True)}
 
     def moved_by(self, curves: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return how far the unknowns and the shift move if the measurement changes by ``curves``, shapes (n,)."""
@@ -98,7 +102,7 @@ class Minimum(NamedTuple):
 class Search:
     """A search near a run, ``row`` its record, from its unknowns ``at``, by more runs that ``trial`` makes.
 
-    The points that take part are those that the run covers, wherever the clock moves (if it is ``free``).
+    The points that take part are those that the run covers wherever the clock moves, if it is ``free``.
     """
 
     def __init__(
@@ -118,15 +122,10 @@ class Search:
         self.at = at
         self.row = row
         self._reach = _FIRST
+        self._room = row["room"]
         self._rows = {tuple(at.tolist()): row}
         self._weights = {what: 1.0 / data.spread(what) for what in data.values}
-        times = data.time + row["shift"]
-        margin = _MARGIN * (row["end"] - row["begin"]) * free
-        self.part = (times >= row["begin"] + margin) & (times <= row["end"] - margin)
-        self._room = (row["shift"], row["shift"])
-        if free and self.part.any():
-            known = data.time[self.part]
-            self._room = (row["begin"] - float(known[0]), row["end"] - float(known[-1]))
+        self.part = slice(row["first"], row["last"])
 
     @property
     def cost(self) -> float:
@@ -147,18 +146,20 @@ class Search:
         key = tuple(at.tolist())
         if key not in self._rows:
             near = self.row["shift"] if near is None else near
-            around = np.clip([near - 0.25 * self.period, near + 0.25 * self.period], *self._room)
-            self._rows[key] = self._trial(at, *around.tolist())
+            quarter = 0.25 * self.period
+            lowest, highest = np.clip([near - quarter, near + quarter], *self._room).tolist()
+            self._rows[key] = self._trial(at, window(lowest, highest, self.part))
         return self._rows[key]
 
     @property
     def period(self) -> float:
         """That of the motion, or a smaller one [s]."""
-        turns = [
-            float(np.sqrt(np.nanmean(np.array(curve, float) ** 2))) / self._data.spread(what)
-            for what, curve in self.row["slope"].items()
-        ]
-        return 2.0 * np.pi / max(*turns, 1e-300)
+        return period(self.row["slope"], self._data)
+
+    @property
+    def points(self) -> int:
+        """Number of points that take part."""
+        return int(self.part.stop - self.part.start)
 
     def _curves(self, row: Row, name: str) -> np.ndarray:
         """Return ``off`` or ``slope`` of a record where points take part, weighed."""
@@ -178,7 +179,7 @@ class Search:
         """Return what is left of the curves, weighed."""
         row = self._run(at)
         if row["error"]:
-            return np.full(len(self._data.values) * int(self.part.sum()), _REFUSED)
+            return np.full(len(self._data.values) * self.points, _REFUSED)
         return self._eliminated(row)[0]
 
     def _differences(self, before: float, after: float) -> tuple[np.ndarray, np.ndarray]:
@@ -267,6 +268,11 @@ class Search:
             turn = self._curves(self.row, "slope")
             slopes = np.column_stack([slopes - np.outer(turn, moved), turn])
         return Minimum(self.at, shift, self.row, self.part, self.cost, left, slopes, self._weights, ended)
+
+
+def window(lowest: float, highest: float, part: slice) -> Row:
+    """Return what a case says of the clock: between which shifts [s] it is sought, and by which points."""
+    return {"lowest": lowest, "highest": highest, "first": part.start, "last": part.stop}
 
 
 def _newton(slopes: np.ndarray, left: np.ndarray) -> np.ndarray:

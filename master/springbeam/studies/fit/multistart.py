@@ -1,0 +1,271 @@
+"""A fit from many starts: runs all over the ranges show where searches begin, and the best minimum is judged.
+
+A wrong minimum looks like a right one from inside. Keys can also make up for a clock that is a period late, so that
+searches begin at another shift of the clock as well.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+import numpy as np
+from scipy.special import fdtri, stdtrit
+
+from ...signals.measured import ALIKE, EQUAL, Measured
+from ..tables import Row
+from .least import SHIFT, Minimum, Search, window
+from .ranges import Ranges
+from .verdict import OWN, Found, Left, is_white, no_noise, remembered, rms
+
+#: Runs all over the range, and searches from the best of them; the second time if what is left is no noise.
+STARTS = (16, 64)
+_LOOKS = (2, 4)
+#: Steps of a first look by a search, and of the search that goes on.
+_FIRST_LOOK = 2
+_MOST = 15
+#: No more runs than so many for each key are made after those all over the range.
+_MOST_RUNS = 100
+#: Marks of runs that judge a minimum: with shorter steps, and beside the repeated measurement.
+_JUDGES = {"finer", "repeat"}
+#: Searches that end at less than so many times the cost of the best one are continued as well.
+_RIVAL = 4.0
+_CONFIDENCE = 0.95
+#: Share of a period by which another shift of the clock is away.
+_AWAY = 0.4
+#: Share of the run within which shifts of the clock belong together.
+_NEAR = 0.01
+#: Unknowns are alike that differ by no more, relative to the keys.
+_SAME = 1e-4
+
+
+def most(keys: int) -> int:
+    """Return the number of runs that a fit of so many keys makes at most, beside those that judge a minimum."""
+    return STARTS[-1] + _MOST_RUNS * keys
+
+
+def expected(keys: int, done: int) -> int:
+    """Return the number of runs if the first look finds what is left to be noise; beyond that, the largest."""
+    first = STARTS[0] + (_LOOKS[0] * (1 + _FIRST_LOOK) + 2) * (1 + keys)
+    return first if done <= first else most(keys) + len(STARTS) * len(_JUDGES)
+
+
+def name_of(case: Row) -> str:
+    """Return the name of a case, which is all that it takes."""
+    return " ".join(str(value) for value in case.values())
+
+
+class MultiStart:
+    """A fit of keys in ``ranges`` to ``data``.
+
+    Parameters
+    ----------
+    ranges
+        Where keys are sought.
+    data, repeated
+        What is measured, and a second measurement of the same.
+    shift
+        By which the clock of the measurement is moved [s]; ``None`` if that is found.
+    duration
+        Of a whole run [s].
+    make
+        Makes the record of a case (`springbeam.studies.fit.study.Fit.record`).
+    """
+
+    def __init__(
+        self,
+        ranges: Ranges,
+        data: Measured,
+        repeated: Measured | None,
+        shift: float | None,
+        duration: float,
+        make: Callable[[Row], Row],
+    ) -> None:
+        self._ranges = ranges
+        self._data = data
+        self._repeated = repeated
+        self._free = shift is None
+        self._duration = duration
+        self._make = make
+        self._names = list(ranges.ends)
+        self._made = set[str]()
+
+    def found(self) -> Found | None:
+        """Search from the best of runs all over the ranges; return what was found, ``None`` if nothing can be run."""
+        starts = self._ranges.starts(STARTS[-1])
+        begun = list[Search]()
+        looked = list[Search]()
+        chosen = list[Search]()
+        found: Found | None = None
+        done = 0
+        for until, looks in zip(STARTS, _LOOKS, strict=True):
+            begun += [search for at in starts[done:until] if (search := self._begun(at)) is not None]
+            waiting = sorted((search for search in begun if search not in chosen), key=partial(_promise, begun))
+            first = waiting[: looks - 1]
+            looked += [search.least(_FIRST_LOOK) for search in first]
+            other = self._elsewhere(min(looked, key=_cost)) if looked else None
+            second = [other] if other is not None else waiting[looks - 1 : looks]
+            looked += [search.least(_FIRST_LOOK) for search in second]
+            looked.sort(key=_cost)
+            chosen += first + second
+            done = until
+            if looked:
+                found = self._judged(looked)
+                if found.ended and not any(map(no_noise, found.left.values())):
+                    break
+        return found and found._replace(ended=found.ended and len(self._made) <= most(len(self._names)))
+
+    def _trial(self, case: Row) -> Row:
+        if not case.keys() & _JUDGES:
+            self._made.add(name_of(case))
+            if len(self._made) > most(len(self._names)):
+                return {"error": "the search has made as many runs as it may"}
+        return self._make(case)
+
+    def _begun(self, at: np.ndarray, clock: Mapping[str, float] | None = None) -> Search | None:
+        """Return the search from a run, ``None`` if it cannot be made or covers too few points.
+
+        ``clock`` says which shift of the clock is sought (`springbeam.studies.fit.study.Fit.record`).
+        """
+        row = self._trial(self._ranges.values(at) | dict(clock or {}))
+        if row["error"]:
+            return None
+        search = Search(
+            lambda unknowns, window: self._trial(self._ranges.values(unknowns) | window),
+            self._data,
+            self._ranges.limits,
+            at,
+            row,
+            free=self._free,
+        )
+        return search if search.points > len(at) + self._free else None
+
+    def _elsewhere(self, last: Search) -> Search | None:
+        """Return a search that begins with the keys to which ``last`` has led, and another shift of the clock.
+
+        ``None`` where no other shift is.
+        """
+        if not self._free:
+            return None
+        away = _AWAY * last.period
+        other = self._begun(last.at, {"beside": last.row[SHIFT], "away": away})
+        return other if other is not None and abs(other.row[SHIFT] - last.row[SHIFT]) > away else None
+
+    def _judged(self, looked: Sequence[Search]) -> Found:
+        """Go on with the best of searches and with those that may end as well; return the evidence for the best.
+
+        ``looked`` are sorted by their costs.
+        """
+        first = self._ended(looked[0])
+        others = [other for other in looked[1:] if other.cost <= _RIVAL * first.cost]
+        others = [other for other in others if _apart(other.at, first) or self._moved(other.row, first.row)]
+        minima = [first, *(self._ended(other) for other in others)]
+        best = min(minima, key=_cost)
+        # What noise can make of one cost: the F test of all unknowns (Bates & Watts 1988, section 1.3).
+        size = best.derivatives.shape[1]
+        chance = float(fdtri(size, best.freedom, _CONFIDENCE)) * size / best.freedom
+        as_well = [other for other in minima if other.cost <= (1.0 + chance) * best.cost and _apart(other.at, best)]
+        names = [*self._names, *[SHIFT] * self._free]
+        alike = best.alike(names, float(np.ptp(self._data.time))) if best.ended else []
+        changed = self._changed(best)
+        left = self._left(best, changed)
+        if self._repeated is not None:
+            left = {name: self._beside_noise(best, name, part) for name, part in left.items()}
+        # Points that remember their past count as fewer.
+        counted = max(1.0 if is_white(part.off) else remembered(part.off) for part in left.values())
+        half = math.sqrt(counted) * _half(best) + OWN * np.abs(best.moved_by(changed))
+        keys = self._intervals(best, [math.inf] * size if alike else half.tolist())
+        rivals = [self._ranges.values(other.at) for other in as_well]
+        return Found(keys, self._ranges.ends, left, alike, rivals, best.ended)
+
+    def _ended(self, search: Search) -> Minimum:
+        """Return the minimum to which a search leads, several curves weighed by what is left of each.
+
+        Where another shift of the clock fits these keys as well, and is smaller, the search goes on from there.
+        """
+        search = search.least(_MOST)
+        if self._free:
+            anywhere = self._begun(search.at)
+            if anywhere is not None and self._moved(anywhere.row, search.row) and _as_good(anywhere, search):
+                search = anywhere.least(_MOST)
+        if len(self._data.values) > 1:
+            search = search.evenly().least(_MOST)
+        return search.minimum()
+
+    def _moved(self, row: Row, other: Row) -> bool:
+        """Return whether the clocks of two runs are apart."""
+        return bool(abs(row[SHIFT] - other[SHIFT]) > _NEAR * self._duration)
+
+    def _left(self, best: Minimum, changed: Mapping[str, np.ndarray]) -> dict[str, Left]:
+        """Return what is left of the curves, by their names, beside what shorter steps have ``changed``."""
+        return {
+            name: Left(off, rms(off), rms(off) / self._data.spread(name), rms(changed[name]))
+            for name, off in best.left.items()
+        }
+
+    def _changed(self, best: Minimum) -> dict[str, np.ndarray]:
+        """Return what shorter steps change in the curves, 0 if the scene cannot be run with them."""
+        shift = best.row[SHIFT]
+        finer = self._trial(self._keys(best) | window(shift, shift, best.part) | {"finer": True})
+        if finer["error"]:
+            finer = best.row
+        return {
+            name: np.array(finer["off"][name], float)[best.part] - np.array(curve, float)[best.part]
+            for name, curve in best.row["off"].items()
+        }
+
+    def _keys(self, best: Minimum) -> Row:
+        return {name: best.row[name] for name in self._names}
+
+    def _intervals(self, best: Minimum, half: Sequence[float]) -> list[Row]:
+        """Return the values at a minimum, with intervals of a half width unless that is infinite."""
+        width = np.nan_to_num(half[: len(self._names)], posinf=0.0)
+        values, *ends = (self._ranges.values(best.at + side * width) for side in (0.0, -1.0, 1.0))
+        found = [(value, *sorted(end[name] for end in ends)) for name, value in values.items()]
+        names = [*self._names]
+        if self._free:
+            names.append(SHIFT)
+            found.append((best.shift, best.shift - half[-1], best.shift + half[-1]))
+        return [
+            {"key": name, "value": value, "low": low if known else None, "high": high if known else None}
+            for name, (value, low, high), known in zip(names, found, np.isfinite(half), strict=True)
+        ]
+
+    def _beside_noise(self, best: Minimum, name: str, left: Left) -> Left:
+        """Return what is left of a curve with the noise: what two measurements differ in beside the run, over √2."""
+        assert self._repeated is not None
+        row = self._trial(self._keys(best) | {"repeat": True})
+        times = self._repeated.time + row[SHIFT]
+        ours = self._data.time[best.part] + best.row[SHIFT]
+        # The nearest point: between two, noise would be smaller.
+        nearest = np.searchsorted(0.5 * (times[1:] + times[:-1]), ours)
+        apart = np.array(row["off"][name], float)[nearest] - left.off
+        apart = apart[np.isfinite(apart)] / math.sqrt(2.0)
+        return left._replace(noise=rms(apart), free=len(apart) / remembered(apart))
+
+
+def _promise(begun: Sequence[Search], search: Search) -> tuple[bool, float]:
+    """Return what sorts searches: first those whose neighbours all cost more, then others, by their cost."""
+    nearest = sorted(begun, key=lambda other: float(np.linalg.norm(other.at - search.at)))
+    around = nearest[1 : 2 * len(search.at) + 1]
+    return any(other.cost < search.cost for other in around), search.cost
+
+
+def _cost(search: Search | Minimum) -> float:
+    return search.cost
+
+
+def _half(best: Minimum) -> np.ndarray:
+    """Return half of the width of the intervals of the unknowns."""
+    return float(stdtrit(best.freedom, 0.5 + 0.5 * _CONFIDENCE)) * best.deviations
+
+
+def _apart(at: np.ndarray, best: Minimum) -> bool:
+    """Return whether unknowns are away from a minimum: not in its intervals, three times as wide."""
+    return bool(np.any(np.abs(at - best.at) > 3.0 * _half(best)[: len(at)] + _SAME))
+
+
+def _as_good(search: Search, other: Search) -> bool:
+    """Return whether a search begins at a cost that is not larger than that of another."""
+    return search.cost <= (1.0 + EQUAL) * other.cost + ALIKE

@@ -1,0 +1,232 @@
+"""The runs of a fit: what is left of measured curves in each, and what the user is shown of all of them.
+
+Curves of different units are weighed by their spread, and then by what is left of each. The clock of the measurement
+may be off by a shift, which is eliminated inside each residual (`least`) unless it is given.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import PrivateAttr
+from rich.text import Text
+
+from ...results.trajectory import Trajectory
+from ...run.outcome import RunStopped
+from ...scene import ArgumentError, Scene, SceneError, with_changes
+from ...scene.tables import TOLERANCE_KEYS
+from ...signals.measured import (
+    Aligned,
+    Measured,
+    at_shift,
+    mapping,
+    period,
+    read_measured,
+    reading_of,
+    settled,
+    shifts,
+)
+from ..accuracy import simulate_to
+from ..design import with_keys
+from ..study import Make, Study
+from ..tables import Findings, Row, table
+from .least import SHIFT
+from .multistart import STARTS, MultiStart, expected, most, name_of
+from .ranges import Ranges
+from .verdict import rms, undetermined
+
+_DISAGREES = 1
+_STOPPED = 3
+#: Share of the run by which the clock may move from where a search begins before points leave the run.
+_MARGIN = 0.02
+#: Share of the run by which it goes on beyond the last point, for a derivative there.
+_BEYOND = 1e-5
+#: Makes a tolerance or an accuracy tighter, as half the macro step does.
+_TIGHTER = 0.1
+#: Rows of runs that are kept for other shifts of the clock.
+_KEPT = 100_000
+
+
+class Fit(Study):
+    """What is sought by which measurement."""
+
+    kind: ClassVar[str] = "fit"
+    announced: ClassVar[str] = "about {} runs"
+
+    scene: Scene
+    file: Path  #: the measured columns, time first
+    vary: tuple[str, ...]  #: ``KEY=GUESS`` or ``KEY=LOW:HIGH`` each
+    names: tuple[str, ...] = ()  #: ``NAME=COLUMN`` each: which column of a run a measured one is
+    read: tuple[str, ...] = ()  #: ``KEY=VALUE`` each: how the file is read
+    shift: float | None = None  #: by which the clock of the measurement is moved [s]; found if it is left out
+    repeat: Path | None = None  #: a second measurement of the same, which shows the noise
+
+    _kept: dict[tuple[Any, ...], Trajectory] = PrivateAttr(default_factory=dict)  #: runs, the last used one last
+
+    @cached_property
+    def data(self) -> Measured:
+        """What is measured. Raises SceneError if the file cannot be used."""
+        return read_measured(self.file, self.scene, mapping(self.names), reading_of(self.read))
+
+    @cached_property
+    def repeated(self) -> Measured | None:
+        """The second measurement."""
+        if self.repeat is None:
+            return None
+        return read_measured(self.repeat, self.scene, mapping(self.names), reading_of(self.read))
+
+    @cached_property
+    def ranges(self) -> Ranges:
+        """Where keys are sought. Raises SceneError if they cannot be fitted."""
+        return Ranges.parse(self.vary)
+
+    def cases(self) -> dict[str, Row]:
+        """Return the runs with which the search begins. Raises SceneError if nothing can be found."""
+        cases = [self.ranges.values(start) for start in self.ranges.starts(STARTS[0])]
+        with_keys(self.scene, cases[0])
+        data = self.data
+        free = self.shift is None
+        begin = self.scene.contact_time or 0.0
+        end = self.scene.time.t_end
+        inside = int(np.sum((data.time + (self.shift or 0.0) >= begin) & (data.time + (self.shift or 0.0) <= end)))
+        if free:
+            last = np.searchsorted(data.time, data.time + (end - begin), side="right")
+            inside = int(np.max(last - np.arange(len(last))))
+        if inside <= len(self.ranges.ends) + free:
+            raise ArgumentError(
+                f"{self.file}: fewer of its points lie in the run than are needed to find "
+                f"{', '.join(self.ranges.ends)}{' and the shift of its clock' * free}; make time.t_end longer, give "
+                "more points, or another --shift"
+            )
+        _ = self.repeated
+        return {name_of(case): case for case in cases}
+
+    def expected(self, done: int = 0) -> int:
+        """Return the number of runs, as far as ``done`` of them show it."""
+        return expected(len(self.ranges.ends), done)
+
+    @property
+    def most(self) -> int:
+        """Number of runs that a search makes at most."""
+        return most(len(self.ranges.ends))
+
+    def settings(self) -> dict[str, Any]:
+        """Return the identity of a fit; measurements count by their content."""
+        several = [data for data in (self.data, self.repeated) if data is not None]
+        held = [hashlib.sha256(part.tobytes()) for data in several for part in (data.time, *data.values.values())]
+        return super().settings() | {"measured": [part.hexdigest() for part in held]}
+
+    def record(self, case: Row) -> Row:
+        """Run one case; return what is left of the curves at the shift that fits best, or why it cannot be run.
+
+        Beside the keys, a case says
+
+        * ``lowest``, ``highest``, ``first`` and ``last``: between which shifts of the clock [s] the best one of the
+          points from ``first`` up to ``last`` is sought; without them it is sought anywhere, if it is not given;
+        * ``beside`` and ``away``: the best shift is sought that is more than ``away`` from ``beside`` [s];
+        * ``finer``: the run has shorter steps;
+        * ``repeat``: it is compared with the repeated measurement.
+        """
+        keys = {name: case[name] for name in self.ranges.ends}
+        data = self.repeated if case.get("repeat") else self.data
+        assert data is not None
+        highest = case.get("highest", math.inf if self.shift is None else self.shift)
+        try:
+            run = self._run(keys, bool(case.get("finer")), float(data.time[-1]) + highest)
+        except (RunStopped, SceneError) as refused:
+            return {**keys, "error": str(refused)}
+        begins: Row = {}
+        if "lowest" in case:
+            limits = (case["lowest"], case["highest"])
+            here = at_shift(run, data, 0.5 * sum(limits))
+            found = settled(run, data, here, slice(case["first"], case["last"]), limits)
+        else:
+            found, begins = self._begun(run, data, case)
+        left = {f"left_{name}": rms(off) for name, off in found.off.items()}
+        return {**keys, SHIFT: found.shift, **left, "error": "", "off": found.off, "slope": found.slope, **begins}
+
+    def _begun(self, run: Trajectory, data: Measured, case: Row) -> tuple[Aligned, Row]:
+        """Return both at the best shift of the clock, and what a search from there takes.
+
+        These are the points that take part, from ``first`` up to ``last``, and the ``room`` of the clock: between which
+        shifts [s] the run covers them.
+        """
+        free = self.shift is None
+        here = at_shift(run, data, self._best(run, data, case) if self.shift is None else self.shift)
+        covered = np.flatnonzero(data.covered(run, here.shift, _MARGIN * free))
+        first, last = (int(covered[0]), int(covered[-1]) + 1) if len(covered) else (0, 0)
+        room = (here.shift, here.shift)
+        if free and last > first:
+            room = (float(run.time[0] - data.time[first]), float(run.time[-1] - data.time[last - 1]))
+        quarter = 0.25 * period(here.slope, data)
+        limits = (max(room[0], here.shift - quarter), min(room[1], here.shift + quarter))
+        return settled(run, data, here, slice(first, last), limits), {"first": first, "last": last, "room": room}
+
+    def _best(self, run: Trajectory, data: Measured, case: Row) -> float:
+        """Return the best shift of the clock [s], that of a case ``beside`` another one if there is one."""
+        ranked = shifts(run, data)
+        if "beside" in case:
+            others = [pair for pair in ranked if abs(pair[0] - case["beside"]) > case["away"]]
+            ranked = sorted(others, key=lambda pair: pair[1]) or ranked
+        return ranked[0][0]
+
+    def _run(self, keys: Row, finer: bool, last: float) -> Trajectory:
+        """Return the run with ``keys``, at least up to the time ``last`` [s] if that is in it.
+
+        Raises RunStopped, and SceneError if it cannot be run.
+        """
+        scene = with_keys(self.scene, keys)
+        until = min(last + _BEYOND * scene.duration, scene.time.t_end)
+        name = (*keys.values(), finer)
+        run = self._kept.pop(name, None)
+        if run is None or run.time[-1] < until:
+            run = simulate_to(_finer(scene) if finer else scene, until)
+        self._kept[name] = run
+        while len(self._kept) > 1 and sum(map(len, self._kept.values())) > _KEPT:
+            self._kept.pop(next(iter(self._kept)))
+        return run
+
+    def made(self, make: Make, known: Mapping[str, Row]) -> dict[str, Row]:
+        """Search; return all runs."""
+        self._search(lambda case: make({name_of(case): case})[name_of(case)]).found()
+        return dict(known)
+
+    def findings(self, records: Mapping[str, Row]) -> Findings:
+        """Return the values found with their intervals, and why the data does not determine them (exit code 1)."""
+        found = self._search(lambda case: records[name_of(case)]).found()
+        kept = ("off", "slope", "first", "last", "room")
+        runs = [{name: value for name, value in row.items() if name not in kept} for row in records.values()]
+        if found is None:
+            first = next(iter(records.values()))["error"]
+            error = f"none of {len(runs)} runs in the range could be made; the first: {first}"
+            return Findings({"keys": []}, code=_STOPPED, error=error, tables={self.kind: runs})
+        why = undetermined(found)
+        left = {name: (left.rms, left.share) for name, left in found.left.items()}
+        shown: list[Any] = [
+            table(("key", "value:.8g", "95 % from:.6g", "to:.6g"), [list(row.values()) for row in found.keys]),
+            table(("curve", "left, rms:.4g", "of its spread:.2%"), [(name, *sizes) for name, sizes in left.items()]),
+            f"{len(runs)} runs",
+            *(Text(f"not determined: {doubt}", style="bold red") for doubt in why),
+        ]
+        document = {"keys": found.keys, "left": left, "undetermined": why}
+        return Findings(document, shown, code=_DISAGREES * bool(why), tables={self.kind: runs})
+
+    def _search(self, make: Callable[[Row], Row]) -> MultiStart:
+        return MultiStart(self.ranges, self.data, self.repeated, self.shift, self.scene.duration, make)
+
+
+def _finer(scene: Scene) -> Scene:
+    """Return a scene with half the macro step, or a tighter accuracy or tolerances."""
+    if scene.accuracy is not None:
+        return with_changes(scene, accuracy=_TIGHTER * scene.accuracy)
+    coupling = scene.coupling
+    if not coupling.adaptive:
+        return with_changes(scene, coupling={"macro_step": 0.5 * coupling.H})
+    tolerances = ((name, getattr(coupling, name)) for name in TOLERANCE_KEYS)
+    return with_changes(scene, coupling={name: _TIGHTER * given for name, given in tolerances if given is not None})
