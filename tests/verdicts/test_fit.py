@@ -48,14 +48,10 @@ def written(path, header, *columns):
     return path
 
 
-#: Most runs that judge a minimum: two rounds of a finer run and one beside a repeated measurement.
-JUDGING = 4
-
-
 def fitted(path, vary=GUESSES, scene=OSCILLATOR, **options):
     study = fit.Fit(scene=scene, file=path, vary=tuple(vary), **options)
     records = study.computed()
-    assert len(records) <= study.expected(len(records)) <= study.most + JUDGING  # for a progress bar that ends
+    assert len(records) <= study.expected(len(records))  # for a progress bar that ends
     found = study.findings(records)
     assert found.code == bool(found.document["undetermined"])
     return {**found.document, "runs": found.tables["fit"]}

@@ -201,10 +201,13 @@ def settled(
 
 def period(slope: Mapping[str, Any], measured: Measured) -> float:
     """Return that of the motion, or a smaller one [s], by derivatives of curves by time or shift, shapes (n,)."""
-    rates = [
-        math.sqrt(np.nanmean(np.array(curve, float) ** 2)) / measured.spread(what) for what, curve in slope.items()
-    ]
+    rates = [rms(curve) / measured.spread(what) for what, curve in slope.items()]
     return 2.0 * math.pi / max(*rates, 1e-300)
+
+
+def rms(values: Any) -> float:
+    """Return the root mean square of numbers, of which NaN (or ``None``) does not count."""
+    return float(np.sqrt(np.nanmean(np.array(values, float) ** 2)))
 
 
 def weighed(curves: Mapping[str, np.ndarray], measured: Measured, points: slice = slice(None)) -> np.ndarray:
@@ -324,8 +327,8 @@ def residuals(run: Trajectory, measured: Measured, shift: float = 0.0) -> list[R
     found = []
     for what, curve in curves.items():
         off = curve - measured.values[what][covered]
-        rms = float(np.sqrt(np.mean(off**2)))
+        left = rms(off)
         at = int(np.argmax(np.abs(off)))
         scale = float(np.std(measured.values[what][covered])) or 1.0
-        found.append(Residual(what, len(off), rms, rms / scale, float(abs(off[at])), float(times[at])))
+        found.append(Residual(what, len(off), left, left / scale, float(abs(off[at])), float(times[at])))
     return found

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...signals.measured import Measured, period
+from ...signals.measured import Measured, period, rms
 from ..tables import Row
 
 #: The unknown that moves the clock of the measurement [s], beside keys.
@@ -125,7 +125,7 @@ class Search:
         self._room = row["room"]
         self._rows = {tuple(at.tolist()): row}
         self._weights = {what: 1.0 / data.spread(what) for what in data.values}
-        self.part = slice(row["first"], row["last"])
+        self.part = slice(*row["points"])
 
     @property
     def cost(self) -> float:
@@ -137,8 +137,7 @@ class Search:
         evenly = copy(self)
         evenly._weights = {}
         for what in self._data.values:
-            left = float(np.sqrt(np.nanmean(np.array(self.row["off"][what], float) ** 2)))
-            evenly._weights[what] = 1.0 / max(left, 1e-9 * self._data.spread(what))
+            evenly._weights[what] = 1.0 / max(rms(self.row["off"][what]), 1e-9 * self._data.spread(what))
         return evenly
 
     def _run(self, at: np.ndarray, near: float | None = None) -> Row:
@@ -272,7 +271,7 @@ class Search:
 
 def window(lowest: float, highest: float, part: slice) -> Row:
     """Return what a case says of the clock: between which shifts [s] it is sought, and by which points."""
-    return {"lowest": lowest, "highest": highest, "first": part.start, "last": part.stop}
+    return {"between": (lowest, highest), "points": (part.start, part.stop)}
 
 
 def _newton(slopes: np.ndarray, left: np.ndarray) -> np.ndarray:

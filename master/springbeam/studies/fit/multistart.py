@@ -13,11 +13,11 @@ from functools import partial
 import numpy as np
 from scipy.special import fdtri, stdtrit
 
-from ...signals.measured import ALIKE, EQUAL, Measured
+from ...signals.measured import ALIKE, EQUAL, Measured, rms
 from ..tables import Row
 from .least import SHIFT, Minimum, Search, window
 from .ranges import Ranges
-from .verdict import OWN, Found, Left, is_white, no_noise, remembered, rms
+from .verdict import OWN, Found, Left, is_white, no_noise, remembered
 
 #: Runs all over the range, and searches from the best of them; the second time if what is left is no noise.
 STARTS = (16, 64)
@@ -123,12 +123,12 @@ class MultiStart:
                 return {"error": "the search has made as many runs as it may"}
         return self._make(case)
 
-    def _begun(self, at: np.ndarray, clock: Mapping[str, float] | None = None) -> Search | None:
+    def _begun(self, at: np.ndarray, clock: Row | None = None) -> Search | None:
         """Return the search from a run, ``None`` if it cannot be made or covers too few points.
 
         ``clock`` says which shift of the clock is sought (`springbeam.studies.fit.study.Fit.record`).
         """
-        row = self._trial(self._ranges.values(at) | dict(clock or {}))
+        row = self._trial(self._ranges.values(at) | (clock or {}))
         if row["error"]:
             return None
         search = Search(
@@ -149,7 +149,7 @@ class MultiStart:
         if not self._free:
             return None
         away = _AWAY * last.period
-        other = self._begun(last.at, {"beside": last.row[SHIFT], "away": away})
+        other = self._begun(last.at, {"beside": (last.row[SHIFT], away)})
         return other if other is not None and abs(other.row[SHIFT] - last.row[SHIFT]) > away else None
 
     def _judged(self, looked: Sequence[Search]) -> Found:

@@ -29,6 +29,7 @@ from ...signals.measured import (
     period,
     read_measured,
     reading_of,
+    rms,
     settled,
     shifts,
 )
@@ -37,9 +38,9 @@ from ..design import with_keys
 from ..study import Make, Study
 from ..tables import Findings, Row, table
 from .least import SHIFT
-from .multistart import STARTS, MultiStart, expected, most, name_of
+from .multistart import STARTS, MultiStart, expected, name_of
 from .ranges import Ranges
-from .verdict import rms, undetermined
+from .verdict import undetermined
 
 _DISAGREES = 1
 _STOPPED = 3
@@ -92,12 +93,10 @@ class Fit(Study):
         with_keys(self.scene, cases[0])
         data = self.data
         free = self.shift is None
-        begin = self.scene.contact_time or 0.0
-        end = self.scene.time.t_end
-        inside = int(np.sum((data.time + (self.shift or 0.0) >= begin) & (data.time + (self.shift or 0.0) <= end)))
-        if free:
-            last = np.searchsorted(data.time, data.time + (end - begin), side="right")
-            inside = int(np.max(last - np.arange(len(last))))
+        # Where the run may begin in the time of the measurement, and how many points it then covers at most.
+        begins = data.time if self.shift is None else np.array([(self.scene.contact_time or 0.0) - self.shift])
+        ends = np.searchsorted(data.time, begins + self.scene.duration, side="right")
+        inside = int(np.max(ends - np.searchsorted(data.time, begins)))
         if inside <= len(self.ranges.ends) + free:
             raise ArgumentError(
                 f"{self.file}: fewer of its points lie in the run than are needed to find "
@@ -111,11 +110,6 @@ class Fit(Study):
         """Return the number of runs, as far as ``done`` of them show it."""
         return expected(len(self.ranges.ends), done)
 
-    @property
-    def most(self) -> int:
-        """Number of runs that a search makes at most."""
-        return most(len(self.ranges.ends))
-
     def settings(self) -> dict[str, Any]:
         """Return the identity of a fit; measurements count by their content."""
         several = [data for data in (self.data, self.repeated) if data is not None]
@@ -127,25 +121,25 @@ class Fit(Study):
 
         Beside the keys, a case says
 
-        * ``lowest``, ``highest``, ``first`` and ``last``: between which shifts of the clock [s] the best one of the
-          points from ``first`` up to ``last`` is sought; without them it is sought anywhere, if it is not given;
-        * ``beside`` and ``away``: the best shift is sought that is more than ``away`` from ``beside`` [s];
+        * ``between``: two shifts of the clock [s] between which the best one is sought, by ``points``, from a number up
+          to another; without them it is sought anywhere, if it is not given;
+        * ``beside``: a shift, and how far from it [s] another one is sought at least;
         * ``finer``: the run has shorter steps;
         * ``repeat``: it is compared with the repeated measurement.
         """
         keys = {name: case[name] for name in self.ranges.ends}
         data = self.repeated if case.get("repeat") else self.data
         assert data is not None
-        highest = case.get("highest", math.inf if self.shift is None else self.shift)
+        anywhere = (-math.inf, math.inf) if self.shift is None else (self.shift, self.shift)
+        limits = case.get("between", anywhere)
         try:
-            run = self._run(keys, bool(case.get("finer")), float(data.time[-1]) + highest)
+            run = self._run(keys, bool(case.get("finer")), float(data.time[-1]) + limits[1])
         except (RunStopped, SceneError) as refused:
             return {**keys, "error": str(refused)}
         begins: Row = {}
-        if "lowest" in case:
-            limits = (case["lowest"], case["highest"])
+        if "between" in case:
             here = at_shift(run, data, 0.5 * sum(limits))
-            found = settled(run, data, here, slice(case["first"], case["last"]), limits)
+            found = settled(run, data, here, slice(*case["points"]), limits)
         else:
             found, begins = self._begun(run, data, case)
         left = {f"left_{name}": rms(off) for name, off in found.off.items()}
@@ -154,8 +148,8 @@ class Fit(Study):
     def _begun(self, run: Trajectory, data: Measured, case: Row) -> tuple[Aligned, Row]:
         """Return both at the best shift of the clock, and what a search from there takes.
 
-        These are the points that take part, from ``first`` up to ``last``, and the ``room`` of the clock: between which
-        shifts [s] the run covers them.
+        These are the ``points`` that take part, from a number up to another, and the ``room`` of the clock: between
+        which shifts [s] the run covers them.
         """
         free = self.shift is None
         here = at_shift(run, data, self._best(run, data, case) if self.shift is None else self.shift)
@@ -166,13 +160,14 @@ class Fit(Study):
             room = (float(run.time[0] - data.time[first]), float(run.time[-1] - data.time[last - 1]))
         quarter = 0.25 * period(here.slope, data)
         limits = (max(room[0], here.shift - quarter), min(room[1], here.shift + quarter))
-        return settled(run, data, here, slice(first, last), limits), {"first": first, "last": last, "room": room}
+        return settled(run, data, here, slice(first, last), limits), {"points": (first, last), "room": room}
 
     def _best(self, run: Trajectory, data: Measured, case: Row) -> float:
         """Return the best shift of the clock [s], that of a case ``beside`` another one if there is one."""
         ranked = shifts(run, data)
         if "beside" in case:
-            others = [pair for pair in ranked if abs(pair[0] - case["beside"]) > case["away"]]
+            shift, away = case["beside"]
+            others = [pair for pair in ranked if abs(pair[0] - shift) > away]
             ranked = sorted(others, key=lambda pair: pair[1]) or ranked
         return ranked[0][0]
 
@@ -200,7 +195,7 @@ class Fit(Study):
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Return the values found with their intervals, and why the data does not determine them (exit code 1)."""
         found = self._search(lambda case: records[name_of(case)]).found()
-        kept = ("off", "slope", "first", "last", "room")
+        kept = ("off", "slope", "points", "room")
         runs = [{name: value for name, value in row.items() if name not in kept} for row in records.values()]
         if found is None:
             first = next(iter(records.values()))["error"]

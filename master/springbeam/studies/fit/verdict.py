@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import chdtri, fdtri
@@ -125,8 +125,3 @@ def _autocorrelation(off: np.ndarray) -> np.ndarray:
     centred = off - off.mean()
     found = correlated(centred, centred)[len(off) - 1 :]
     return np.asarray(found / max(float(found[0]), 1e-300))
-
-
-def rms(values: Any) -> float:
-    """Return the root mean square of numbers, of which NaN (or ``None``) does not count."""
-    return float(np.sqrt(np.nanmean(np.array(values, float) ** 2)))
