@@ -60,6 +60,7 @@ LOADED = {
     "keys beam --json": "pydantic",
     "doctor": "numpy fmpy pydantic",
     f"run soft {SMALL}": "numpy fmpy pydantic",
+    f"run steel-bumper {SMALL} --set beam.n_modes=2": "numpy fmpy pydantic",
     "report results/soft": "numpy pydantic",
     "export results/soft": "numpy pydantic",
     f"crosscheck soft {SMALL}": "numpy scipy fmpy pyarrow numpy.ma pydantic",

@@ -7,7 +7,7 @@ from numpy.polynomial import Legendre, Polynomial
 from springbeam.bodies import force
 from springbeam.bodies.protocol import Motion
 from springbeam.motion.paths import Path, Place, sign_changes
-from springbeam.results.dense import _turning, between_rows
+from springbeam.results.dense import _turning, inside
 from springbeam.results.records import STEP
 
 # -- The path of a position inside a step: quintics exactly, minima, zeros, the order of its error and of the cubic's
@@ -72,8 +72,7 @@ def test_the_last_moment_tells_how_far_an_end_may_be_off_between_rows_but_of_a_t
     steps[f"{end}_after"][1] = 1.0
     steps[f"{end}_integral"][1] = 0.5
     steps[f"{end}_integral_2"][1] = 0.15 + 1e-5
-    found = between_rows(True, steps)
-    assert found == pytest.approx(seen * 420e-5 / (25.0 * 5.0**0.5), rel=1e-7, abs=1e-15)
+    assert inside(True, steps).error == pytest.approx(seen * 420e-5 / (25.0 * 5.0**0.5), rel=1e-7, abs=1e-15)
 
 
 @pytest.mark.parametrize(("even", "odd", "beside"), [(1.0, 0.0, 1.0 / 30.0), (0.0, 1.0, 1.0 / 210.0), (0.0, 0.0, 0.0)])

@@ -5,6 +5,7 @@ import pytest
 from bodies import pair_of
 
 from springbeam.motion.events import Event, EventKind
+from springbeam.results.dense import inside
 from springbeam.results.records import STEP
 from springbeam.results.totals import totals
 from springbeam.run.observed import force_window
@@ -35,7 +36,8 @@ def steps_with(force, ends, tip=lambda t: -t, rate=lambda t: -1.0, once=None):
 
 def found(steps, *events, window=0.1, scene=SCENE, apart=True):
     steps["phase"][-1] = 0.0 if apart else 1.0
-    return totals(scene, steps, events, window)
+    tip = inside(scene.contact.rigid, steps, "u_tip").extremes["u_tip"]
+    return totals(scene, steps, events, window, tip)
 
 
 def parabola(t):

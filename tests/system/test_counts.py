@@ -11,6 +11,9 @@ from faulty import installed
 from springbeam import Simulation, load_scene, simulate, with_changes
 from springbeam.bodies.fmu import release
 from springbeam.contact.phases import Joint
+from springbeam.results import dense
+from springbeam.results.records import joined
+from springbeam.run.errors.ends import Ends
 
 SET_SLOPES = "fmi2SetRealInputDerivatives"
 
@@ -95,3 +98,24 @@ def test_a_tied_step_passes_at_most_49_functions_in_12_files():
     usual = sorted(passed, key=len)[len(passed) // 2]
     assert 20 < len(usual) <= 49, sorted(usual)
     assert len({file for file, *_ in usual}) <= 12
+
+
+def test_the_judge_passes_the_curves_of_a_run_once_and_a_flight_at_once(monkeypatch):
+    """Of the steps of `soft` 4 in 7 are a flight; the others are taken one by one, at an event in up to 4 parts."""
+    calls = Counter()
+
+    def counted(owner, name):
+        function = getattr(owner, name)
+
+        def count(*arguments):
+            calls[name] += 1
+            return function(*arguments)
+
+        monkeypatch.setattr(owner, name, count)
+
+    counted(dense, "motion")
+    counted(Ends, "drift")
+    run = simulate(load_scene("soft"))
+    together = int(joined(run.steps[:-1])[run.steps["size"][1:] > 0.0].sum())
+    assert calls["motion"] == 1
+    assert together <= calls["drift"] <= together + 4 * len(run.events) < 0.5 * run.summary["macro_steps"]

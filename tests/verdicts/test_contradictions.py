@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from springbeam import load_scene, simulate
-from springbeam.run.contradictions import contradictions
+from springbeam.results.dense import inside
+from springbeam.run.contradictions import PLACES, contradictions
 from springbeam.run.setup import set_up
 from springbeam.scene import scene_from_dict
 
@@ -37,7 +38,9 @@ def found(run, **changes):
     for field, change in changes.get("steps", {}).items():
         steps[field] += change
     events = changes.get("events", run.events)
-    return contradictions(set_up(run.scene), steps, events, changes.get("contact_time", 0.0))
+    setup = set_up(run.scene)
+    places = inside(setup.soft is None, steps, *PLACES).extremes
+    return contradictions(setup, steps, events, changes.get("contact_time", 0.0), places)
 
 
 @pytest.mark.parametrize("name", SCENES)

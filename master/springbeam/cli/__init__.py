@@ -65,9 +65,9 @@ def main() -> None:
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
+        from ..version import __version__
 
-        typer.echo(f"springbeam {version('springbeam')}")
+        typer.echo(f"springbeam {__version__}")
         raise typer.Exit
 
 

@@ -15,6 +15,7 @@ import typer
 from rich.text import Text
 
 from ..studies.tables import Findings, table
+from ..version import __version__
 from .common import BAD_INPUT, DISAGREES, JsonOption, SettingsOption
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def doctor(
     versions = {name: installed.get(name) for name in _PACKAGES}
     fmus = [_asked(name, version) for version in ENDINGS for name in ("beam", "spring")]
     document = {
-        "version": metadata.version("springbeam"),
+        "version": __version__,
         "path": Path(__file__).parents[1],
         "python": {"version": platform.python_version(), "executable": sys.executable},
         "system": f"{platform.platform()}, {platform.machine()}",

@@ -19,7 +19,7 @@ Shapes, bending moments and shear forces along the beam are linear between those
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import comb
 from typing import Any, NamedTuple
@@ -32,7 +32,7 @@ from ..motion.events import Event
 from ..motion.paths import LAST_MOMENT, Path, derivative, sign_changes, value
 from ..scene import Scene
 from .columns import columns
-from .records import common, joined, reduced_mass
+from .records import Records, Rows, common, joined, reduced_mass
 from .trajectory import Trajectory
 
 #: Fields that are linear between rows, and do not change with an event.
@@ -41,7 +41,7 @@ _LINEAR = (
     *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress"),
     *(f"{body}_{what}" for body in ("beam", "spring") for what in ("potential", "dissipated", "load")),
 )
-#: Columns that are polynomials between rows, whose extremes `extremes` finds.
+#: Columns that are polynomials between rows, whose extremes `inside` finds.
 MOTION = ("u_tip", "v_tip", "y", "z", "gap")
 #: Steps whose extremes are found at once, to bound the memory for a long run.
 _TOGETHER = 65536
@@ -49,10 +49,29 @@ _TOGETHER = 65536
 _SAME = 1e-12
 #: Degree of the polynomials.
 _DEGREE = 5
-#: From powers of s in [0, 1] to Bernstein coefficients: these enclose the polynomial, the outer two are its end values.
-_BERNSTEIN = np.array(
-    [[comb(i, k) / comb(_DEGREE, k) if k <= i else 0.0 for k in range(_DEGREE + 1)] for i in range(_DEGREE + 1)]
-)
+
+
+def _bernstein(parts: int) -> np.ndarray:
+    """Return the matrix from powers of s in [0, 1] to the Bernstein coefficients in each of equal ``parts``.
+
+    They enclose the polynomial there.
+    """
+    return np.array(
+        [
+            [
+                sum(comb(i, m) / comb(_DEGREE, m) * comb(k, m) * part ** (k - m) for m in range(min(i, k) + 1))
+                / parts**k
+                for k in range(_DEGREE + 1)
+            ]
+            for part in range(parts)
+            for i in range(_DEGREE + 1)
+        ]
+    )
+
+
+_ENCLOSING = _bernstein(1)
+#: Closer: two waves in a step leave room for a value that neither has.
+_CLOSER = _bernstein(8)
 #: Positions and velocities of both ends.
 _PLACES = ("u_tip", "y")
 _SPEEDS = ("v_tip", "z")
@@ -129,51 +148,44 @@ class Extremes(NamedTuple):
         return cls(float(values[low]), float(times[low]), float(values[high]), float(times[high]))
 
 
-def extremes(rigid: bool, steps: np.ndarray, *names: str) -> list[Extremes]:
-    """Return the lowest and the highest value of each motion on the curve that `at` follows.
+class Inside(NamedTuple):
+    """What a run does between its rows, on the curve that `at` follows."""
 
-    ``names`` are of `MOTION`; ``steps`` are all records of a run, ``rigid`` as of `motion`.
+    extremes: dict[str, Extremes]  #: by columns
+    #: Largest error of the curve of an end, over its largest distance from its start. Rows that are right may miss a
+    #: part of the motion that turns far in a step. The last moment of a step shows it: its part of the curve is 0.8 to
+    #: 2 times the error where that is above a percent, and more below.
+    error: float
+
+
+def inside(rigid: bool, steps: np.ndarray, *names: str) -> Inside:
+    """Return the extremes of the columns ``names``, of `MOTION`, and the error between the rows.
+
+    ``steps`` are all records of a run, ``rigid`` as of `motion`.
     """
-    found = []
-    for name in names:
-        parts = [steps[f"{part}_after"] for part in (("u_tip", "y") if name == "gap" else (name,))]
-        found.append([*Extremes.of_rows(steps["time"], parts[0] - parts[1] if name == "gap" else parts[0])])
-    for after, curves in _curves(rigid, steps):
-        for name, known in zip(names, found, strict=True):
-            for place, sign in ((0, 1.0), (2, -1.0)):
-                lowest, step, share = _lowest(sign * curves[name], below=sign * known[place])
-                if step >= 0:
-                    end = after[step]
-                    known[place] = sign * lowest
-                    known[place + 1] = float(steps["time"][end - 1] + share * steps["size"][end])
-    return [Extremes(*known) for known in found]
-
-
-def between_rows(rigid: bool, steps: np.ndarray) -> float:
-    """Return the largest error of the curve of an end between the rows, over its largest distance from its start.
-
-    Rows that are right may miss a part of the motion that turns far in a step. The last moment of a step shows it: its
-    part of the curve is 0.8 to 2 times the error where that is above a percent, and more below.
-    """
-    found = 0.0
-    for _, curves in _curves(rigid, steps):
-        for position in ("u_tip", "y"):
-            places = steps[f"{position}_after"]
-            unsure = LAST_MOMENT * np.abs(curves[position][_DEGREE]).max() - _ROUNDING * np.abs(places).max()
-            if (moved := np.abs(places - places[0]).max()) > 0.0:
-                found = max(found, float(unsure / moved))
-    return found
-
-
-def _curves(rigid: bool, steps: np.ndarray) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray]]]:
-    """Yield the numbers of the records that end steps, some thousand at a time, and the `motion` over these steps."""
+    places = {name: steps[f"{name}_after"] for name in (*_PLACES, *_SPEEDS)}
+    places["gap"] = places["u_tip"] - places["y"]
+    known = {name: [*Extremes.of_rows(steps["time"], places[name])] for name in names}
+    error = 0.0
     made = np.flatnonzero(steps["size"] > 0.0)
     for begin in range(0, len(made), _TOGETHER):
         after = made[begin : begin + _TOGETHER]
-        yield after, motion(rigid, steps[after - 1], steps[after])
+        curves = motion(rigid, Rows(steps, after - 1), Rows(steps, after))
+        for name, found in known.items():
+            for place, sign in ((0, 1.0), (2, -1.0)):
+                lowest, step, share = _lowest(sign * curves[name], below=sign * found[place])
+                if step >= 0:
+                    end = after[step]
+                    found[place] = sign * lowest
+                    found[place + 1] = float(steps["time"][end - 1] + share * steps["size"][end])
+        for name in _PLACES:
+            unsure = LAST_MOMENT * np.abs(curves[name][_DEGREE]).max() - _ROUNDING * np.abs(places[name]).max()
+            if (moved := np.abs(places[name] - places[name][0]).max()) > 0.0:
+                error = max(error, float(unsure / moved))
+    return Inside({name: Extremes(*found) for name, found in known.items()}, error)
 
 
-def motion(rigid: bool, before: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
+def motion(rigid: bool, before: Records, steps: Records) -> dict[str, np.ndarray]:
     """Return displacements, velocities and gap over ``steps`` as polynomials of s = τ/H.
 
     Parameters
@@ -193,7 +205,7 @@ def motion(rigid: bool, before: np.ndarray, steps: np.ndarray) -> dict[str, np.n
     together = rigid & joined(before)
     held = before["phase"] >= 3.0
 
-    def of(end: int, records: np.ndarray, field: str) -> Any:
+    def of(end: int, records: Records, field: str) -> Any:
         """Return a field of an end; for joined ends that of their common motion."""
         names = [name + field for name in (_PLACES if field.startswith("_integral") else _SPEEDS)]
         return np.where(together, common(records, held, *names), records[names[end]])
@@ -314,12 +326,14 @@ def _lowest(powers: np.ndarray, below: float) -> tuple[float, int, float]:
     best = below
     step = -1
     share = 0.0
-    enclosing = _BERNSTEIN @ powers
-    floors = enclosing.min(axis=0)
+    enclosing = _ENCLOSING @ powers
     tolerance = _ALIKE * float(np.abs(enclosing).max(initial=0.0))
-    for i in np.argsort(floors).tolist():
-        if floors[i] >= best - tolerance:
+    some = np.flatnonzero(enclosing.min(axis=0) < best - tolerance)
+    floors = (_CLOSER @ powers[:, some]).min(axis=0)
+    for nearest in np.argsort(floors):
+        if floors[nearest] >= best - tolerance:
             break
+        i = int(some[nearest])
         path = powers[:, i].tolist()
         # Not at 0: where it begins another one ends, or there is a row.
         for s in (*sign_changes(derivative(path), 0.0, 1.0), 1.0):

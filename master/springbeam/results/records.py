@@ -56,6 +56,21 @@ PHASE_NAMES = np.array(["free", "tied", "touch", "seated", "seated", "seated"])
 _APART = (0.0, 3.0)
 
 
+class Rows:
+    """Some records of a run; only the fields that are used are copied."""
+
+    def __init__(self, records: np.ndarray, which: np.ndarray) -> None:
+        self._records = records
+        self._which = which
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return np.asarray(self._records[name][self._which])
+
+
+#: Records, or some of them.
+Records = np.ndarray | Rows
+
+
 def steps_of(content: bytes | bytearray) -> np.ndarray:
     """Return the records in ``content``, an incomplete last one left out. Raises ValueError for one not finite."""
     steps: np.ndarray = np.frombuffer(content, STEP, len(content) // STEP.itemsize).copy()
@@ -72,12 +87,12 @@ def steps_of(content: bytes | bytearray) -> np.ndarray:
     return steps
 
 
-def joined(steps: np.ndarray) -> np.ndarray:
+def joined(steps: Records) -> np.ndarray:
     """Return whether the ends are joined from each row on."""
     return ~np.isin(steps["phase"], _APART)
 
 
-def common(steps: np.ndarray, held: np.ndarray, of_tip: str, of_low: str) -> np.ndarray:
+def common(steps: Records, held: np.ndarray, of_tip: str, of_low: str) -> np.ndarray:
     """Return what joined ends have in common of a field of the tip and that of the lower end, as of their velocities.
 
     ``held`` says where the foundation holds the lower end.
@@ -91,20 +106,20 @@ def impulse(steps: np.ndarray, name: str = "contact_force") -> np.ndarray:
     What has turned a mismatch of joined ends' velocities round is no part of it.
     """
     size, c, dc, ddc = (steps[part] for part in ("size", name, f"{name}_rate", f"{name}_rate_2"))
-    before = np.roll(steps, 1)
+    before = Rows(steps, np.arange(len(steps)) - 1)
     turned = steps["v_tip"] - steps["z"] - before["v_tip_after"] + before["z_after"]
     together = joined(before) & (size > 0.0) & ((name == "contact_force") | (before["phase"] >= 3.0))
     turning = np.where(together, reduced_mass(before) * turned, 0.0)
     return np.asarray(size * (c + size * (dc / 2.0 + size * ddc / 6.0)) - turning)
 
 
-def reduced_mass(before: np.ndarray) -> np.ndarray:
+def reduced_mass(before: Records) -> np.ndarray:
     """Return μ [kg] of ends that a rigid law joins after the records ``before``; the tip's alone on a seat."""
     free = 1.0 - before["tip_share"]
     alone = before["reduced_mass"] / np.where(free > 0.0, free, 1.0)
     return np.where((before["phase"] >= 3.0) & (free > 0.0), alone, before["reduced_mass"])
 
 
-def force(steps: np.ndarray | Mapping[str, np.ndarray], tau: np.ndarray, name: str = "contact_force") -> np.ndarray:
+def force(steps: Records | Mapping[str, np.ndarray], tau: np.ndarray, name: str = "contact_force") -> np.ndarray:
     """Return C [N] of each step ``tau`` [s] after its start, or the force N of the foundation."""
     return np.asarray(steps[name] + tau * (steps[f"{name}_rate"] + 0.5 * tau * steps[f"{name}_rate_2"]))

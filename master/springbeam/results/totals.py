@@ -16,7 +16,7 @@ from ..motion.events import Event
 from ..motion.paths import EPS
 from ..scene import Scene
 from .contact_times import foundation_contacts, kicks, tip_contacts
-from .dense import extremes
+from .dense import Extremes
 from .records import FORCE_COLUMNS, impulse, joined
 
 
@@ -70,7 +70,9 @@ def in_words(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             yield f"energy lost by {words}", f"{summary[name]:.4g} J"
 
 
-def totals(scene: Scene, steps: np.ndarray, events: Iterable[Event], window: float) -> dict[str, float | int]:
+def totals(
+    scene: Scene, steps: np.ndarray, events: Iterable[Event], window: float, tip: Extremes
+) -> dict[str, float | int]:
     """Return the numbers of `TOTALS` that the scene has, and the energies lost in impacts [J].
 
     Parameters
@@ -83,6 +85,8 @@ def totals(scene: Scene, steps: np.ndarray, events: Iterable[Event], window: flo
         Of the whole run.
     window
         Over which the contact force is averaged [s]; the run may be shorter.
+    tip
+        Of the positions of the tip.
     """
     events = list(events)
     found: dict[str, float | int] = {}
@@ -92,8 +96,7 @@ def totals(scene: Scene, steps: np.ndarray, events: Iterable[Event], window: flo
     if scene.coupled or (beam and stop):
         found |= _contact(scene, steps, events, window)
     if beam:
-        (deepest,) = extremes(scene.contact.rigid, steps, "u_tip")
-        found |= {"deepest_tip": deepest.lowest, "deepest_tip_time": deepest.lowest_time}
+        found |= {"deepest_tip": tip.lowest, "deepest_tip_time": tip.lowest_time}
     if stop:
         found["stop_strokes"] = sum(event.kind.strikes for event in events)
         held = impulse(steps, "foundation_force").sum()
@@ -109,10 +112,9 @@ def totals(scene: Scene, steps: np.ndarray, events: Iterable[Event], window: flo
 
 
 def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float) -> dict[str, float | int]:
-    at_events = kicks(steps["time"], events)
-    largest, since = _largest_mean(steps, at_events, window)
+    largest, since = peak_force(steps, events, window)
     found: dict[str, float | int] = {
-        "contact_impulse": (impulse(steps) + at_events).sum(),
+        "contact_impulse": _gained(steps, events).sum(),
         "contact_force_max": largest,
         "contact_force_window": window,
         "contact_force_max_time": since,
@@ -132,31 +134,38 @@ def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float
     return found
 
 
-def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tuple[float, float]:
+def _gained(steps: np.ndarray, events: Iterable[Event]) -> np.ndarray:
+    """Return the impulse of the contact over each of ``steps`` and its events [N·s]."""
+    return np.asarray(impulse(steps) + kicks(steps["time"], events))
+
+
+def peak_force(steps: np.ndarray, events: Iterable[Event], window: float) -> tuple[float, float]:
     """Return the largest mean of C [N] over windows of ``window`` [s] in the run, and when the first of these begins.
 
-    A run that is shorter is one window, without a force after it. ``at_events`` are the impulses [N·s] that act at each
-    row, as of `kicks`. One at the edge of a window belongs to it if that makes the mean larger.
+    A run that is shorter is one window, without a force after it. An impact at the edge of a window belongs to it if
+    that makes the mean larger.
     """
     rows = steps["time"]
     # The impulse up to each row, including impacts there, and the powers of the time since then up to the next row;
     # before the run and after it there is no force.
     begins = np.append(rows[0] - 2.0 * window, rows)
     passed = np.zeros((4, len(begins)))
-    passed[0, 1:] = np.cumsum(impulse(steps) + at_events)
+    passed[0, 1:] = np.cumsum(_gained(steps, events))
     passed[1:, 1:-1] = [steps[name][1:] / power for name, power in zip(FORCE_COLUMNS, (1.0, 2.0, 6.0), strict=True)]
 
-    def upto(times: np.ndarray, side: Literal["left", "right"], order: int = 0) -> np.ndarray:
-        """Return ∫ C dt before the impulses of ``times`` [s] (left) or after them (right), or its derivatives."""
+    def upto(times: np.ndarray, side: Literal["left", "right"], *orders: int) -> np.ndarray:
+        """Return derivatives of ∫ C dt before the impulses of ``times`` [s] (left) or after them (right)."""
         row = np.searchsorted(begins, times, side) - 1
-        return np.asarray(polyval(times - begins[row], polyder(passed, order)[:, row], tensor=False))
+        since = times - begins[row]
+        powers = passed[:, row]
+        return np.array([polyval(since, polyder(powers, order), tensor=False) for order in orders])
 
     # Inside steps the mean is largest where C is the same at both edges of the window: between `edges` both forces are
     # of degree 2. The root of a τ² + b τ + c at which it falls is 2 c / (√(b² − 4 a c) − b), also where a is 0.
     edges = np.sort(np.concatenate([rows, rows - window]))
     half = 0.5 * np.diff(edges)
     middle = edges[:-1] + half
-    c, b, twice_a = (upto(middle + window, "right", order) - upto(middle, "right", order) for order in (1, 2, 3))
+    c, b, twice_a = upto(middle + window, "right", 1, 2, 3) - upto(middle, "right", 1, 2, 3)
     with np.errstate(divide="ignore", invalid="ignore"):
         root = 2.0 * c / (np.sqrt(b**2 - 2.0 * twice_a * c) - b)
     inside = np.where(np.abs(root) < half, middle + root, edges[:-1])
@@ -167,7 +176,9 @@ def _largest_mean(steps: np.ndarray, at_events: np.ndarray, window: float) -> tu
     whole = last - first >= min(window, rows[-1] - rows[0]) - rounding
     first = first[whole]
     last = last[whole]
-    found = np.maximum(upto(last, "left"), upto(last, "right")) - np.minimum(upto(first, "left"), upto(first, "right"))
+    (most,) = np.maximum(upto(last, "left", 0), upto(last, "right", 0))
+    (least,) = np.minimum(upto(first, "left", 0), upto(first, "right", 0))
+    found = most - least
     largest = found.max()
     since = first[found >= largest - _ALIKE * np.abs(passed[0]).max()].min()  # of a constant force all are alike
     return max(0.0, float(largest)) / window, float(since)

@@ -5,22 +5,30 @@ A step that misses an event leaves no other trace, so the records of every run a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ..contact.interface import Rigid
 from ..motion.events import Event
-from ..results.dense import Extremes, extremes
+from ..results.dense import Extremes
 from .setup import Setup
 
+#: Columns whose extremes are searched.
+PLACES = ("u_tip", "y", "gap")
 #: Largest penetration over the range of an end: the error of curves between right rows.
 _MOST = 0.01
 #: Times closer than this share of the run are one.
 _SAME = 1e-9
 
 
-def contradictions(setup: Setup, steps: np.ndarray, events: Sequence[Event], contact_time: float) -> list[str]:
+def contradictions(
+    setup: Setup,
+    steps: np.ndarray,
+    events: Sequence[Event],
+    contact_time: float,
+    places: Mapping[str, Extremes],
+) -> list[str]:
     """Return in words the results of a run that contradict its ``setup``; a right run has none.
 
     Parameters
@@ -31,17 +39,16 @@ def contradictions(setup: Setup, steps: np.ndarray, events: Sequence[Event], con
         Of the whole run so far; steps of dtype `springbeam.results.records.STEP`.
     contact_time
         Total duration of all contacts of the run [s].
+    places
+        Extremes of `PLACES`.
     """
     if not len(steps):
         return []
-    return [*_ends(setup, steps), *_times(steps, events, contact_time)]
+    return [*_ends(setup, *(places[name] for name in PLACES)), *_times(steps, events, contact_time)]
 
 
-def _ends(setup: Setup, steps: np.ndarray) -> Iterator[str]:
+def _ends(setup: Setup, tip: Extremes, top: Extremes, gap: Extremes) -> Iterator[str]:
     meeting = isinstance(setup.law, Rigid)
-    if setup.floor is None and not meeting:
-        return
-    tip, top, gap = extremes(setup.soft is None, steps, "u_tip", "y", "gap")
     if setup.floor is not None:
         places, name = (top, "the spring's top") if setup.lower else (tip, "the tip")
         if setup.floor - places.lowest > _MOST * _range(places):

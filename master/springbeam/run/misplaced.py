@@ -9,6 +9,7 @@ each in `springbeam.run.errors`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise, repeat
 from math import inf, sqrt
 from typing import Any, NamedTuple
 
@@ -30,6 +31,8 @@ HELD = 1e-9
 _LOST = 1e3
 #: A gap inside a step, or what a load adds, that is this share of the motion of an end does not count.
 _QUIET = 1e-8
+#: Most steps whose terms are moved at once, to bound the memory.
+_TOGETHER = 256
 
 
 class Known(NamedTuple):
@@ -41,6 +44,18 @@ class Known(NamedTuple):
     events: Sequence[Event]
     strokes: Strokes
     loads: list[tuple[Any, ...]] | None  #: `_by_loads`
+
+    def rows(self, *columns: np.ndarray) -> list[tuple[Any, ...]]:
+        """Return the load and the values of ``columns`` of each step."""
+        loads = repeat(None, len(self.steps.size)) if self.loads is None else self.loads
+        return list(zip(loads, *(values.tolist() for values in columns), strict=True))
+
+    def stretches(self, apart: np.ndarray) -> Iterator[tuple[slice, bool]]:
+        """Yield stretches of steps, and whether nothing acts in them: ends are ``apart``, no stroke, no load."""
+        nothing = apart & (self.strokes.share == 1.0) & (self.strokes.most == 0.0) & (self.loads is None)
+        changes = (np.flatnonzero(np.diff(nothing)) + 1).tolist()
+        for begin, end in pairwise(sorted({*changes, *range(0, len(apart), _TOGETHER), len(apart)})):
+            yield slice(begin, end), bool(nothing[begin])
 
 
 def misplaced(pair: Pair, records: np.ndarray, events: Sequence[Event]) -> float | None:
@@ -99,20 +114,22 @@ def _under_forces(run: Known, defect: np.ndarray) -> Iterator[tuple[float, float
     """Yield the errors of both ends [m] along ``run``, whose steps apply forces with a ``defect``."""
     ends = run.ends
     parts = defect.shape[1]
-    first = int(np.argmax(defect.any(axis=(1, 2)))) if run.loads is None else 0  # up to there nothing is wrong
-    columns = (run.steps.size / parts, run.stiffness, defect, *run.strokes)
-    rows = zip(*(values[first:].tolist() for values in columns), strict=True)
-    for step, (H, k, of_parts, *stroke) in enumerate(rows):
-        for missed, early, stiffer, rate in of_parts:
-            demanded = missed + (0.5 * stiffer - rate / H) * (ends.y - ends.u)
-            follows = 0.5 * stiffer + rate / H
-            apart, gives = ends.drift(H, k, ends.per_mass, 0.5 * H * H * (early - missed))
-            ends.act((demanded + follows * apart) / (1.0 + follows * gives))
+    rows = run.rows(run.steps.size / parts, run.stiffness, defect, *run.strokes)
+    for some, nothing in run.stretches(np.logical_not(defect.any(axis=(1, 2)))):
+        if nothing:
+            yield ends.fly(run.steps.size[some], run.stiffness[some])
+            continue
+        for load, H, k, of_parts, *stroke in rows[some]:
+            for missed, early, stiffer, rate in of_parts:
+                demanded = missed + (0.5 * stiffer - rate / H) * (ends.y - ends.u)
+                follows = 0.5 * stiffer + rate / H
+                apart, gives = ends.drift(H, k, ends.per_mass, 0.5 * H * H * (early - missed))
+                ends.act((demanded + follows * apart) / (1.0 + follows * gives))
+                yield ends.u, ends.y
+            if load is not None:
+                ends.add(*load)
+            ends.rebound(*stroke)
             yield ends.u, ends.y
-        if run.loads is not None:
-            ends.add(*run.loads[step])
-        ends.rebound(*stroke)
-        yield ends.u, ends.y
 
 
 def _under_ties(run: Known, parts: int, alone: bool, quiet: float) -> Iterator[tuple[float, float]]:
@@ -121,33 +138,37 @@ def _under_ties(run: Known, parts: int, alone: bool, quiet: float) -> Iterator[t
     ``alone`` says that the tip itself strikes the foundation; ``quiet`` is as of `tie`.
     """
     ends = run.ends
-    places, *of_steps = tie(run.steps, run.events, parts, quiet)
-    held = (run.steps.before["phase"] >= 3.0).tolist()
-    held_after = (run.steps.last["phase"] >= 3.0).tolist()
+    found = tie(run.steps, run.events, parts, quiet)
+    places = found.places
+    held, held_after = (records["phase"] >= 3.0 for records in (run.steps.before, run.steps.last))
     rebound = ends.rebound_of_tip if alone else ends.rebound
-    columns = (run.steps.size, run.stiffness, *run.strokes, *of_steps)
-    rows = zip(*(values.tolist() for values in columns), strict=True)
-    for step, (H, k, share, turns, most, tied, tied_after, apart, pull, meet, part) in enumerate(rows):
-        per_mass = 0.0 if held[step] else ends.per_mass
-        if not tied:
-            ends.drift(H, k, per_mass)
-        for deep, rate in places[step] if tied else ():
-            beyond, gives = ends.drift(H / len(places[step]), k, per_mass)
-            ends.act((beyond + deep) / gives)
-            ends.kick_apart(rate, per_mass)
-            yield ends.y, ends.y  # between rows the tip takes the path of the lower end
-        if run.loads is not None:
-            ends.add(*run.loads[step])
-        if share != 1.0:
-            rebound(share, turns, most)
-        if (tied or tied_after) and (most > 0.0 or tied != tied_after):
-            # The foundation strikes each end by itself.
-            ends.kick_apart(-apart, 0.0 if held_after[step] or most > 0.0 else ends.per_mass)
-        if meet > 0.0:
-            ends.bounce(meet, part, 0.0 if held_after[step] else ends.per_mass)
-        if pull != 0.0:  # y passes Ψ, sooner or later, where the force pulls
-            ends.kick(-pull * ends.y, per_mass)
-        yield ends.u, ends.y
+    rows = run.rows(run.steps.size, run.stiffness, *run.strokes, *found[1:], held, held_after)
+    for some, nothing in run.stretches(~(found.tied | found.tied_after | (found.pull != 0.0) | (found.meet > 0.0))):
+        if nothing:
+            yield ends.fly(run.steps.size[some], run.stiffness[some])
+            continue
+        for inside, row in zip(places[some], rows[some], strict=True):
+            load, H, k, share, turns, most, tied, tied_after, apart, pull, meet, part, seated, seated_after = row
+            per_mass = 0.0 if seated else ends.per_mass
+            if not tied:
+                ends.drift(H, k, per_mass)
+            for deep, rate in inside:
+                beyond, gives = ends.drift(H / len(inside), k, per_mass)
+                ends.act((beyond + deep) / gives)
+                ends.kick_apart(rate, per_mass)
+                yield ends.y, ends.y  # between rows the tip takes the path of the lower end
+            if load is not None:
+                ends.add(*load)
+            if share != 1.0:
+                rebound(share, turns, most)
+            if (tied or tied_after) and (most > 0.0 or tied != tied_after):
+                # The foundation strikes each end by itself.
+                ends.kick_apart(-apart, 0.0 if seated_after or most > 0.0 else ends.per_mass)
+            if meet > 0.0:
+                ends.bounce(meet, part, 0.0 if seated_after else ends.per_mass)
+            if pull != 0.0:  # y passes Ψ, sooner or later, where the force pulls
+                ends.kick(-pull * ends.y, per_mass)
+            yield ends.u, ends.y
 
 
 def _by_loads(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
-from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -17,6 +16,7 @@ from ..results.recording import MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, as_scene
 from ..scene.suspicions import suspicions
+from ..version import __version__
 from .gate import admit, tried
 from .master import Master
 from .outcome import Progress, RunStopped
@@ -197,7 +197,7 @@ class Simulation(AbstractContextManager["Simulation"]):
         counting = {name: body for name, body in bodies if body is not None and body.steps_made is not None}
         return {
             **status,
-            "version": version("springbeam"),
+            "version": __version__,
             **amounts,
             **{f"{name}_steps": body.steps_made for name, body in counting.items()},
             **{f"{name}_rollbacks": body.rewinds for name, body in counting.items()},

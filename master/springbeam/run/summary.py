@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from ..results.columns import not_shown
-from ..results.dense import between_rows
+from ..results.dense import inside
 from ..results.recording import Recorder
 from ..results.totals import totals
-from .contradictions import contradictions
+from .contradictions import PLACES, contradictions
 from .master import Master
 from .misplaced import misplaced
 from .observed import coarse_force, force_window, unknown
@@ -29,12 +29,13 @@ def summary(master: Master, recorder: Recorder) -> dict[str, Any]:
     made = int(np.count_nonzero(np.diff(steps["time"])))
     energies, warnings, changed = master.balance.report(steps)
     displaced = misplaced(pair, steps, events)
-    unresolved = why_not_resolved(pair, steps, displaced or 0.0, between_rows(pair.law is None, steps))
+    places, between = inside(pair.law is None, steps, *PLACES) if len(steps) else ({}, 0.0)
+    unresolved = why_not_resolved(pair, steps, displaced or 0.0, between)
     window = force_window(pair, steps)
     warnings += filter(None, [unresolved or peak_force_doubt(pair, window), not_shown(scene, steps)])
     warnings += filter(None, [unknown(pair), coarse_force(pair)])
-    amounts = totals(scene, steps, events, window) if len(steps) else {}
-    ruled_out = contradictions(pair.setup, steps, events, amounts.get("contact_duration_total", 0.0))
+    amounts = totals(scene, steps, events, window, places["u_tip"]) if len(steps) else {}
+    ruled_out = contradictions(pair.setup, steps, events, amounts.get("contact_duration_total", 0.0), places)
     warnings += [f"not resolved: {what}: an event was missed; {_SHORTER}" for what in ruled_out]
     return {
         "degree": pair.setup.degree,

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from math import pi, sqrt
 
 from .statics import bending_stiffness, locking, lowest_frequency
@@ -12,6 +13,8 @@ from .tables import Beam
 
 #: ω α_b above which waves die out within two periods and need no resolution.
 DIES_OUT = 0.15
+#: Steps from 0 to the highest frequency of the mesh in which that of a wave is searched.
+_STEPS = 1 << 20
 
 
 def slowest_frequency(beam: Beam) -> float:
@@ -35,9 +38,7 @@ def fastest_frequency(beam: Beam) -> float:
     high = mesh_frequency(beam)
     if beam.integrator != "modal" or beam.n_modes == 0 or modes_below(beam, high) <= beam.n_modes:
         return high
-    from scipy.optimize import bisect  # takes long to load: only if modes are left out
-
-    return float(bisect(lambda omega: modes_below(beam, omega) - beam.n_modes + 0.5, 0.0, high, rtol=1e-3))
+    return high / _STEPS * bisect_left(range(_STEPS), beam.n_modes, key=lambda k: modes_below(beam, high / _STEPS * k))
 
 
 def mesh_frequency(beam: Beam) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..pictures.diagrams import Diagram, draw_diagrams
-from ..results.totals import LOSS_NAMES, TOTALS, totals
+from ..results.totals import LOSS_NAMES, TOTALS, peak_force
 from ..results.trajectory import Trajectory
 from ..scene import Scene
 from ..signals.measured import mapping, model, read_measured, reading_of, residuals, time_shift
@@ -88,6 +88,6 @@ def _over_one_window(runs: list[Trajectory]) -> list[dict[str, Any]]:
         if summary.get("contact_force_window", common) != common:
             del summary["contact_force_max"], summary["contact_force_window"]
             if run.steps is not None:
-                found = totals(run.scene, run.steps, run.events, common)
-                summary |= {"contact_force_max": found["contact_force_max"], "contact_force_window": common}
+                peak, _ = peak_force(run.steps, run.events, common)
+                summary |= {"contact_force_max": peak, "contact_force_window": common}
     return summaries

@@ -10,7 +10,6 @@ import sys
 from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import closing, contextmanager
-from importlib import metadata
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,6 +19,7 @@ from pebble import ProcessExpired, ProcessPool
 from pydantic_core import from_json, to_json
 
 from ..scene import ArgumentError, SceneError
+from ..version import __version__
 from .tables import Row
 
 #: Makes the record of a case of its axes; arrays in it become lists. It is sent to workers.
@@ -181,7 +181,7 @@ def dask_cluster(scheduler: str) -> Iterator[Executor]:
     except (OSError, ValueError) as error:
         raise ArgumentError(f"--scheduler {scheduler}: cannot be reached: {error}") from error
     with client:
-        own = metadata.version("springbeam")
+        own = __version__
         known: Any = client.get_versions(packages=["springbeam"])
         theirs = {address: worker["packages"]["springbeam"] for address, worker in known["workers"].items()}
         if set(theirs.values()) != {own}:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..motion.events import EventKind
-from ..results.dense import MOTION, Extremes, extremes
+from ..results.dense import MOTION, Extremes, inside
 from ..results.totals import LOSS_NAMES, TOTALS
 from ..results.trajectory import BODY_COLUMNS, COLUMNS, Trajectory
 from ..scene import ArgumentError
@@ -60,7 +60,7 @@ def _extreme(column: str, pick: Callable[[Extremes], float]) -> Callable[[Trajec
             run = run.without_start()
         if run.steps is None or column not in MOTION:  # which is known at its rows only
             return pick(Extremes.of_rows(run.time, run[column]))
-        return pick(*extremes(run.scene.contact.rigid, run.steps, column))
+        return pick(inside(run.scene.contact.rigid, run.steps, column).extremes[column])
 
     return of
 

@@ -20,7 +20,6 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
-from importlib import metadata
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -33,6 +32,7 @@ from ..results.directory import ResultsExist, ResultsUnreadable, RunDirectory, l
 from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, load_scene
 from ..scene.loads import TableLoad
+from ..version import __version__
 from .accuracy import simulate
 from .engine import Measure, Report, lost, record_all
 from .metrics import Metric, costs
@@ -114,7 +114,7 @@ class Study(BaseModel, ABC):
         """Return the identity of the study, with the files that it needs. Raises FmuError if one is missing."""
         return {
             "study": self.kind,
-            "springbeam": metadata.version("springbeam"),
+            "springbeam": __version__,
             "files": _fingerprints(self.scene or load_scene("soft")),
             "settings": self.model_dump(mode="json", exclude_none=True),
         }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -72,26 +72,10 @@ class Ends:
         self._resisted = float((self.terms.shown[1] @ self._jump).real)
         self._values = np.zeros(len(self._jump), complex)
         self._pairs = self._values.view(float)
-        self._moves = cache(self._move)
+        self._moves = cache(partial(_move, self.terms, self._jump))
         #: The force [N], the impulse [N·s] and the shift [N·s²] of this step that the terms do not have yet.
         self._due = [0.0, 0.0, 0.0]
         self._added = np.zeros((3, len(self._pairs)))
-
-    def _move(self, H: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[float, float], tuple[float, float]]:
-        """Return what a step of ``H`` [s] makes of the terms, and of u and v in these.
-
-        Further, in rows, what its end adds to the terms: of a constant force of 1 N, of an impulse of 1 N·s, and of
-        1 N·s², which moves a free mass, of the modes that the step follows; and what force and shift add to u and v.
-        """
-        rates, impulse, shown, stiffness, damping = self.terms
-        moved = np.exp(rates * H)
-        by_force = impulse * np.expm1(rates * H) / rates
-        follows = 1.0 / (1.0 + 0.5 * H * (damping + 0.5 * H * stiffness))
-        shifted = moved * (self._jump + damping * impulse) * follows
-        at_end = _reals(np.conj(shown * moved))
-        added = _reals(np.array([by_force, impulse, shifted]))
-        force_moves, shift_moves = ((shown @ terms).real.tolist() for terms in (by_force, shifted))
-        return moved, at_end, added, force_moves, shift_moves
 
     def drift(self, H: float, stiffness: float, per_mass: float, shift: float = 0.0) -> tuple[float, float]:
         """Advance by ``H`` [s] without a force, the lower end by the midpoint rule.
@@ -100,8 +84,7 @@ class Ends:
         besides. ``stiffness`` is the spring's over its mass [1/s²], ``per_mass`` that of the lower end [1/kg], 0 while
         the foundation holds it.
         """
-        if any(self._due):
-            self._pairs += np.array(self._due).dot(self._added)
+        self._settle()
         moved, at_end, self._added, self._by_force, by_shift = self._moves(H)
         self._due = [0.0, 0.0, shift]
         u, v = at_end.dot(self._pairs).tolist()
@@ -110,13 +93,40 @@ class Ends:
         self.v = v + shift * by_shift[1]
         self.y -= shift * per_mass
         half = 0.5 * H
+        faster = H * self._swing(H, stiffness) * per_mass
+        self._lower = half * faster, faster
+        return self.y - self.u, self._by_force[0] + half * faster
+
+    def _settle(self) -> None:
+        """Give the terms what acts over the step of the last `drift`."""
+        if any(self._due):
+            self._pairs += np.array(self._due).dot(self._added)
+
+    def _swing(self, H: float, stiffness: float) -> float:
+        """Advance the lower end as of `drift`, and return which share of an impulse is left of it."""
+        half = 0.5 * H
         slow = 1.0 / (1.0 + half * (self._resists + half * stiffness))
         mean = slow * (self.z - half * stiffness * self.y)
         self.y += H * mean
         self.z = 2.0 * mean - self.z
-        faster = H * slow * per_mass
-        self._lower = half * faster, faster
-        return self.y - self.u, self._by_force[0] + half * faster
+        return slow
+
+    def fly(self, sizes: np.ndarray, stiffness: np.ndarray) -> tuple[float, float]:
+        """Advance by steps of these ``sizes`` [s] without a force, all terms at once.
+
+        Return the largest ``|u|`` and ``|y|`` at their ends [m]. ``stiffness`` is as of `drift`, in each step.
+        """
+        self._settle()
+        self._due = [0.0, 0.0, 0.0]
+        steps = list(zip(sizes.tolist(), stiffness.tolist(), strict=True))
+        moved = np.multiply.accumulate([self._moves(H)[0] for H, _ in steps]) * self._values
+        self._values[:] = moved[-1]
+        self.u, self.v = (self.terms.shown @ moved[-1]).real.tolist()
+        heights = []
+        for H, k in steps:
+            self._swing(H, k)
+            heights.append(abs(self.y))
+        return float(np.abs((moved @ self.terms.shown[0]).real).max()), max(heights)
 
     def act(self, C: float) -> None:
         """Let the mean force ``C`` [N] act over the step of the last `drift`, too."""
@@ -167,6 +177,26 @@ class Ends:
         change = (share - 1.0) * self.v + max(-most, min(turns * self.u, most))
         self._shift((share - 1.0) * self.u / self.mobility, 0.0)
         self.kick(change / self.mobility, 0.0)
+
+
+def _move(
+    terms: Terms, jump: np.ndarray, H: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[float, float], tuple[float, float]]:
+    """Return what a step of ``H`` [s] makes of the terms, and of u and v in these.
+
+    Further, in rows, what its end adds to the terms: of a constant force of 1 N, of an impulse of 1 N·s, and of 1 N·s²,
+    which moves a free mass, of the modes that the step follows (``jump`` in all modes); and what force and shift add to
+    u and v.
+    """
+    rates, impulse, shown, stiffness, damping = terms
+    moved = np.exp(rates * H)
+    by_force = impulse * np.expm1(rates * H) / rates
+    follows = 1.0 / (1.0 + 0.5 * H * (damping + 0.5 * H * stiffness))
+    shifted = moved * (jump + damping * impulse) * follows
+    at_end = _reals(np.conj(shown * moved))
+    added = _reals(np.array([by_force, impulse, shifted]))
+    force_moves, shift_moves = ((shown @ each).real.tolist() for each in (by_force, shifted))
+    return moved, at_end, added, force_moves, shift_moves
 
 
 def _reals(values: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...motion.events import Event, EventKind
 from ...motion.paths import Path, derivative, value
+from ...results.records import Rows
 
 #: Largest angle by which a wave turns in a part of a step [rad], and parts of a step at most: its path has as many
 #: coefficients.
@@ -20,9 +21,9 @@ _PARTS = 6
 class StepRecords(NamedTuple):
     """Records of steps (`springbeam.results.records.STEP`), (n,) each."""
 
-    before: np.ndarray  #: at the start of each step
-    ends: np.ndarray  #: at its end
-    last: np.ndarray  #: at its end, after all events there
+    before: Rows  #: at the start of each step
+    ends: Rows  #: at its end
+    last: Rows  #: at its end, after all events there
     size: np.ndarray  #: [s]
 
     @classmethod
@@ -30,7 +31,7 @@ class StepRecords(NamedTuple):
         """Return those of all ``records`` of a run."""
         made = np.flatnonzero(records["size"] > 0.0)
         last = np.append(made[1:], len(records)) - 1
-        return cls(records[made - 1], records[made], records[last], records["size"][made])
+        return cls(Rows(records, made - 1), Rows(records, made), Rows(records, last), records["size"][made])
 
     def parts(self, least: int, fastest: float) -> int:
         """Return in how many equal parts of each step, at least, waves up to ``fastest`` [rad/s] are seen."""

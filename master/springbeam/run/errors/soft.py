@@ -89,10 +89,12 @@ def _touches(path: Any) -> dict[int, list[float]]:
 def _force_of_law(law: SoftLaw, _step: np.ndarray, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
     """Return `_Demand` of a soft ``law``."""
     found = np.zeros((3, len(p)))
-    closed = np.flatnonzero((p > 0.0) | (not law.one_sided))
-    for i, *both in zip(closed.tolist(), p[closed].tolist(), rate[closed].tolist(), strict=True):
-        _, *slopes = law.resistance(*both) if law.damped else (0.0, 0.0, 0.0)
-        found[:, i] = law.force(*both), law.slope(both[0]) + slopes[0], slopes[1]
+    closed = (p > 0.0) | (not law.one_sided)
+    places = list(zip(p[closed].tolist(), rate[closed].tolist(), strict=True))
+    found[0, closed] = [law.force(*place) for place in places]
+    found[1, closed] = [law.slope(deep) for deep, _ in places]
+    if law.damped and places:
+        found[1:, closed] += np.transpose([law.resistance(*place)[1:] for place in places])
     return found
 
 

@@ -16,7 +16,8 @@ from .records import StepRecords, accelerations, penetration
 class Tie(NamedTuple):
     """What is known of each step of ends that a rigid law joins, (n,) each but the first."""
 
-    places: list[list[list[float]]]  #: y − u [m] and its rate [m/s] at the ends of equal parts of each step
+    #: y − u [m] and its rate [m/s] at the ends of equal parts of each step in which they are joined.
+    places: list[list[list[float]]]
     tied: np.ndarray  #: whether the ends are joined over the step
     tied_after: np.ndarray  #: and after its events
     apart: np.ndarray  #: v − z after these [m/s]
@@ -27,18 +28,19 @@ class Tie(NamedTuple):
 
 def tie(steps: StepRecords, events: Sequence[Event], parts: int, quiet: float) -> Tie:
     """Return it for so many ``parts`` of each step; steps whose gap stays below ``quiet`` [m] have one."""
-    path = penetration(steps)
+    tied = joined(steps.before)
+    path = penetration(steps)[:, tied]
     slope = derivative(path)
     shares = (np.arange(parts) + 1.0) / parts
-    inside = np.array([[value(path, s), value(slope, s) / steps.size] for s in shares]).transpose(2, 0, 1)
+    inside = np.array([[value(path, s), value(slope, s) / steps.size[tied]] for s in shares]).transpose(2, 0, 1)
     whole = np.abs(inside[:, :, 0]).max(axis=1) <= quiet
-    places = [part[-1:] if one else part for part, one in zip(inside.tolist(), whole.tolist(), strict=True)]
+    found = (part[-1:] if one else part for part, one in zip(inside.tolist(), whole.tolist(), strict=True))
+    places = [next(found) if together else [] for together in tied.tolist()]
     released = (steps.before["phase"] == 1.0) & (steps.last["phase"] == 0.0) & (steps.ends["z"] != 0.0)
-    pull = np.divide(steps.ends["contact_force_end"], steps.ends["z"], out=np.zeros(len(whole)), where=released)
+    pull = np.divide(steps.ends["contact_force_end"], steps.ends["z"], out=np.zeros(len(tied)), where=released)
     apart = steps.last["v_tip_after"] - steps.last["z_after"]
-    tied = joined(steps.before)
     tied_after = joined(steps.last)
-    meet, part = np.zeros((2, len(whole)))
+    meet, part = np.zeros((2, len(tied)))
     at = steps.ended_by(EventKind.IMPACT, events)
     at = at[~tied[at] & ~tied_after[at]]
     if len(at):
