@@ -3,12 +3,14 @@
 import exact
 import numpy as np
 import pytest
+from commands import printed
 from exact import coupled, laws
 from exact.alone import clamped_free_frequencies
 from references import dips
 from scenes import kinds, soft
 
 from springbeam.monolithic import event_driven
+from springbeam.monolithic.exponential import LinearForm
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.scene import Beam, load_scene, with_changes
 
@@ -48,6 +50,25 @@ def test_rows_cost_no_steps_and_lie_on_the_motion_of_a_run_that_ends_there():
             if name not in ("phase", "time"):
                 scale = max(np.max(np.abs(many[name])), np.max(many.e_total) * (name == "energy_residual"))
                 assert abs(column[-1] - many[name][row]) <= 1e-11 * scale, name
+
+
+@pytest.mark.parametrize(
+    ("name", "t_end", "most"),
+    [("soft", 0.2, (40, 240, 10)), ("bumper", 0.1, (260, 2400, 32))],
+)
+def test_a_reference_takes_few_steps_iterations_and_weights(name, t_end, most, monkeypatch, tmp_path):
+    """They had been 205, 1216 and 18, and 1403, 9877 and 50, with 12 Gauss points and Brent's method for events."""
+    monkeypatch.chdir(tmp_path)
+    printed("new", "bumper")
+    evaluated = []
+    forces = LinearForm.forces
+    monkeypatch.setattr(LinearForm, "forces", lambda self, ends: evaluated.append(1) or forces(self, ends))
+    scene = load_scene("soft" if name == "soft" else "bumper.toml", [f"time.t_end={t_end}"])
+    equations = event_driven.Equations(scene)
+    run = event_driven.integrate(equations)
+    weights = sum(form.weights.cache_info().misses for form in equations.forms.values())
+    assert np.all(np.array((run.summary["counts"]["steps"], len(evaluated), weights)) <= most)
+    assert run.summary["largest_relative_energy_residual"] < 1e-13
 
 
 LAWS = [exact.compliant_impact, exact.hunt_crossley, exact.link, exact.tie]

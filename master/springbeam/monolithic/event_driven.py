@@ -17,7 +17,7 @@ from numpy.polynomial import legendre
 
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError
-from .exponential import TO_LEGENDRE, ExponentialPropagator, LinearForm, Segment
+from .exponential import END_SLOPE, TO_LEGENDRE, ExponentialPropagator, LinearForm, Segment
 from .hybrid_system import NOISE, HybridSystem, QuasiStaticSystem, ReferenceFailure
 from .laws import ReferencePhase, Watch
 from .rows import Rows
@@ -33,6 +33,11 @@ _MOST_EVENTS = 100_000
 _SAMPLES = 1000
 #: A turn whose value is a smaller share of how much the nodes vary is looked at exactly.
 _CLOSE = 1e-6
+#: The last step of Newton's method to an event, as a share of its time: the next would be smaller than rounding.
+_LAST_STEP = 1e-9
+#: The last two steps where rounding is larger.
+_LAST_STEPS = 1e-6
+_MOST_STEPS_TO_ZERO = 60
 
 
 class Equations:
@@ -42,13 +47,13 @@ class Equations:
         refuse(scene)
         self.scene = scene
         self.system = (QuasiStaticSystem if scene.massless else HybridSystem)(scene)
-        self._forms: dict[ReferencePhase, LinearForm] = {}
+        self.forms: dict[ReferencePhase, LinearForm] = {}
 
     def form(self, phase: ReferencePhase) -> LinearForm:
         """Return a phase in its modes."""
-        if phase not in self._forms:
-            self._forms[phase] = LinearForm(self.system, phase)
-        return self._forms[phase]
+        if phase not in self.forms:
+            self.forms[phase] = LinearForm(self.system, phase)
+        return self.forms[phase]
 
 
 def integrate(
@@ -307,38 +312,48 @@ def _crossing(
 ) -> float | None:
     """Return where a function, whose ``values`` at the nodes are given, first falls through zero."""
 
-    def g(tau: float) -> float:
-        return float(watch.function(s.motion(phase, segment.inside(tau))))
+    def g(tau: float) -> tuple[float, float]:
+        """Return the function at τ, stepped anew, and its slope."""
+        for piece in segment.pieces(tau):
+            inside = np.asarray(watch.function(s.motion(phase, piece.states)))
+        return float(inside[-1]), float(END_SLOPE @ inside / piece.nodes[-1])
 
-    turns, there = _turns(float(segment.nodes[-1]), values)
+    size = float(segment.nodes[-1])
+    series = TO_LEGENDRE @ values
+    series = legendre.legtrim(series, 0.1 * NOISE * np.max(np.abs(series)))
+    # Far above zero there is none: a smooth minimum lies below the nodes by less than they vary.
+    turns = np.empty(0) if np.min(values) > np.ptp(values) else _zeros(legendre.legder(series), size)
     if not len(turns) and np.min(values) >= 0.0:
         return None
+    there = legendre.legval(2.0 * turns / size - 1.0, series)
     close = np.abs(there) <= _CLOSE * np.ptp(values)
-    there[close] = [g(tau) for tau in turns[close]]
+    there[close] = [g(tau)[0] for tau in turns[close]]
     order = np.argsort(np.r_[segment.nodes, turns])
     times = np.r_[segment.nodes, turns][order]
     values = np.r_[values, there][order]
-    below = np.flatnonzero(values < -s.noise(watch.unit, segment.states[0]))
+    below = np.flatnonzero(values < -s.noise(watch.unit, np.max(np.abs(segment.states), axis=0)))
     if not len(below):
         return None
-    low = float(times[max(below[0] - 1, 0)])
+    first = max(below[0] - 1, 0)
+    low = float(times[first])
     high = float(times[below[0]])
-    if g(low) <= 0.0 or g(high) >= 0.0:  # what the nodes have and the exact state differ by less than either's error
-        return low if g(low) <= 0.0 else high
-    from scipy.optimize import brentq  # takes its time to load
+    if values[first] <= 0.0 or (low > 0.0 and g(low)[0] <= 0.0):
+        return low
+    zeros = _zeros(series, size)
+    tau = float(next(iter(zeros[(zeros > low) & (zeros < high)]), 0.5 * (low + high)))
+    last = high - low
+    for _ in range(_MOST_STEPS_TO_ZERO):  # of Newton's method; by bisection where it leads out
+        value, slope = g(tau)
+        step = value / slope if slope < 0.0 else np.inf
+        if abs(step) <= _LAST_STEP * tau or max(abs(step), last) <= _LAST_STEPS * tau:
+            return tau - step
+        low, high = (tau, high) if value > 0.0 else (low, tau)
+        last = abs(step)
+        tau = tau - step if low < tau - step < high else 0.5 * (low + high)
+    return tau
 
-    # A root at a segment's very start needs no more than the rounding of the segment.
-    return float(brentq(g, low, high, xtol=1e-16 * high, rtol=8.9e-16, maxiter=200))
 
-
-def _turns(size: float, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return where in a segment of ``size`` [s] the polynomial through ``values`` turns, and its values there.
-
-    Nothing where these are far above zero: a smooth minimum lies below the nodes by less than they vary.
-    """
-    if np.min(values) > np.ptp(values):
-        return np.empty(0), np.empty(0)
-    series = TO_LEGENDRE @ values
-    turns = legendre.legroots(legendre.legder(legendre.legtrim(series, 0.1 * NOISE * np.max(np.abs(series)))))
-    x = turns.real[(turns.imag == 0.0) & (np.abs(turns.real) < 1.0)]
-    return 0.5 * size * (1.0 + x), np.asarray(legendre.legval(x, series))
+def _zeros(series: np.ndarray, size: float) -> np.ndarray:
+    """Return where a series of Legendre polynomials is zero inside a segment of ``size`` [s]."""
+    x = legendre.legroots(series)
+    return np.asarray(0.5 * size * (1.0 + x.real[(x.imag == 0.0) & (np.abs(x.real) < 1.0)]))

@@ -25,8 +25,10 @@ from .oscillators import GAUSS, STAGES, TARGETS, Oscillators, StepWeights
 from .semi_discrete import singular_modes
 
 _MAX_ITERATIONS = 60
-#: Step size × rate of the fastest motion that is not silent: 12 Gauss points interpolate e^{iθ}, θ ≤ 2, to 1e-12.
-_STEP_PHASE = 2.0
+#: Largest change of the forces in the last iteration, as a share of them.
+_CONVERGED = 1e-14
+#: Step size × rate of the fastest motion that is not silent: 24 Gauss points interpolate e^{iθ}, θ ≤ 12, to 3e-12.
+_STEP_PHASE = 12.0
 #: What the last two Legendre coefficients of the forces may add to the velocity of an end over a step, as a share of
 #: the largest velocity. The step's end is far more exact: Gauss points integrate what these coefficients leave out.
 _TAIL = 1e-12
@@ -36,6 +38,12 @@ _CACHED_SIZES = 64
 _NODES = np.append(0.0, TARGETS)
 #: Takes values at the nodes of a segment to the Legendre coefficients of the polynomial through them.
 TO_LEGENDRE = np.linalg.inv(legendre.legvander(2.0 * _NODES - 1.0, STAGES + 1))
+#: Takes these values to its slope at the end of a segment of size 1.
+END_SLOPE = np.arange(STAGES + 2) * np.arange(1, STAGES + 3) @ TO_LEGENDRE
+#: Weights of its barycentric form (Berrut & Trefethen 2004, (4.2)).
+_BARYCENTRIC = 1.0 / np.prod(4.0 * (_NODES[:, None] - _NODES) + np.eye(len(_NODES)), axis=1)
+#: Stands for the distance 0 from a node, whose value is then all that counts.
+_ON_NODE = 1e-200
 
 
 @dataclass(frozen=True)
@@ -60,18 +68,15 @@ class Segment:
         return states
 
     def _through(self, times: np.ndarray) -> np.ndarray:
-        values = legendre.legvander(2.0 * times / self.nodes[-1] - 1.0, STAGES + 1)
-        return np.asarray(values @ (TO_LEGENDRE @ self.states))
+        away = times[..., None] / self.nodes[-1] - _NODES
+        shares = _BARYCENTRIC / np.where(away == 0.0, _ON_NODE, away)
+        return np.asarray(shares / np.sum(shares, axis=-1, keepdims=True) @ self.states)
 
     def pieces(self, tau: float) -> Iterator[Segment]:
         """Step anew up to τ [s]: the forces of the whole segment may hold a kink that lies after τ."""
         inner = ExponentialPropagator(self.form, self.states[0], self.speed)
         while tau - inner.elapsed > 1e-15 * tau:
             yield inner.advance(tau - inner.elapsed)
-
-    def inside(self, tau: float) -> np.ndarray:
-        """Return X at τ [s], stepped anew."""
-        return np.asarray([self.states[0], *(piece.states[-1] for piece in self.pieces(tau))][-1])
 
 
 class LinearForm:
@@ -175,7 +180,7 @@ class LinearForm:
         ReferenceFailure if the step is too long to find these.
         """
         s = self.system
-        weights, of_ends, constant = self.weights(float(f"{size:.12e}"))  # sizes recur but for rounding
+        weights, of_ends, constant = self.weights(size)
         times = X[s.T] + size * TARGETS
         xi, xi_dot = self.modal(X)
         moved = weights.free(xi, xi_dot) + constant
@@ -200,11 +205,13 @@ class LinearForm:
         if not len(self.inputs):
             return r
         with np.errstate(over="ignore", invalid="ignore"):  # an escaping spring; found by the caller
-            for iteration in range(_MAX_ITERATIONS):
+            for _ in range(_MAX_ITERATIONS):
                 new = self.forces(without + (of_ends @ r.ravel()).reshape(without.shape))
                 change = np.abs(new - r).max()
                 r = new
-                if change <= (4e-16 if iteration < 9 else 1e-14) * np.abs(new).max():
+                if not np.isfinite(change):
+                    break
+                if change <= _CONVERGED * np.abs(new).max():
                     return r
         raise ReferenceFailure(self.unresolved)
 
@@ -236,8 +243,8 @@ class ExponentialPropagator:
         limit = self.form.longest_step(self.X)
         while True:
             size = min(limit, self._force_limit)
-            # Powers of two recur, also in other segments: weights are dear.
-            size = remaining if remaining <= size else 2.0 ** float(np.floor(np.log2(size)))
+            # Powers of √2 recur, also in other segments: weights are dear.
+            size = remaining if remaining <= size else 2.0 ** (0.5 * float(np.floor(2.0 * np.log2(size))))
             try:
                 segment = self._step(size)
             except ReferenceFailure:

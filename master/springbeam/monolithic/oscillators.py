@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 #: Gauss points of a step, at which forces are given.
-STAGES = 12
-#: Points of a quadrature that integrates e^{iθ} × a polynomial of degree 11 for θ ≤ `_SLOW` to 1e-16.
-_QUADRATURE = 24
+STAGES = 24
+#: Points at which S and Ṡ are taken where all roots are below `_SLOW`/h: they interpolate e^{iθ}, θ ≤ 20, to rounding.
+_KERNEL_POINTS = 40
 _SLOW = 20.0
 #: Above this |s| h/2, which `ive` refuses, only the limit of fast roots is left.
 _LIMIT = 1e9
@@ -40,14 +40,25 @@ class GaussRule:
 
 
 GAUSS = GaussRule(STAGES)
-_INNER = GaussRule(_QUADRATURE)
+_KERNEL = GaussRule(_KERNEL_POINTS)
 #: Where a step is evaluated: the Gauss points and the end, as fractions of it.
 TARGETS = np.append(GAUSS.nodes, 1.0)
-#: Quadrature points on [0, c] for each target c, (targets, Q), and weight × ℓ_k there, (targets, stages, Q).
-_ELAPSED = TARGETS[:, None] * _INNER.nodes
-_WEIGHTED = np.swapaxes(GAUSS.lagrange(_ELAPSED) * (TARGETS[:, None] * _INNER.weights)[..., None], 1, 2).copy()
 #: c × the Legendre coefficients on [0, c] of ℓ_k for each target c, (targets, legendre, stages).
 _ON_PARTS = TARGETS[:, None, None] * (GAUSS.transform @ GAUSS.lagrange(TARGETS[:, None] * GAUSS.nodes))
+
+
+def _convolutions() -> np.ndarray:
+    """Return ∫₀^c L_m(c − x) ℓ_k(x) dx for each target c, (targets, stages, kernel points).
+
+    ℓ_k and L_m are 1 at one Gauss point and at one kernel point and 0 at the others.
+    """
+    exact = GaussRule((STAGES + _KERNEL_POINTS) // 2)  # for a product of these
+    inside = TARGETS[:, None] * exact.nodes
+    forces = GAUSS.lagrange(inside) * (TARGETS[:, None] * exact.weights)[..., None]
+    return np.asarray(np.swapaxes(forces, 1, 2) @ _KERNEL.lagrange(TARGETS[:, None] - inside))
+
+
+_CONVOLUTIONS = _convolutions()
 
 
 @dataclass(frozen=True)
@@ -120,8 +131,8 @@ class Oscillators:
         near = np.abs(self.fast) * size <= _SLOW
         if np.any(near):
             oscillators = Oscillators(self.omega2[near], self.c[near])
-            kernels = oscillators.kernels((TARGETS[:, None] - _ELAPSED)[at] * size)
-            force[..., near] = np.matmul(_WEIGHTED[at] * size, kernels)
+            kernels = oscillators.kernels(_KERNEL.nodes * size)
+            force[..., near] = [_CONVOLUTIONS[at] * size @ kernel for kernel in kernels]
         if not np.all(near):
             far = ~near
             slow = self.slow[far]

@@ -25,7 +25,7 @@ import numpy as np
 
 from ..monolithic import event_driven
 from ..pictures.drawing import present
-from ..results.dense import at
+from ..results.dense import rows_at
 from ..results.trajectory import BODY_COLUMNS, Trajectory, columns_of
 from ..run.runner import run_in_memory
 from ..scene import Scene, SceneError, with_changes
@@ -121,8 +121,10 @@ def _beside_event_driven(scene: Scene, found: Row, done: Done) -> tuple[Trajecto
     away = away_from(
         times, jumps + [kink for load in scene.loads if not load.is_finer_than(size) for kink in load.kinks], size
     )
+    of_coarse, of_fine = (sample(run, times) for run in (coarse, fine))
     for name in quantities(scene):
-        ours, halved = (sample(run, times, name) for run in (coarse, fine))
+        ours = of_coarse[name]
+        halved = of_fine[name]
         good = before & np.isfinite(ours) & np.isfinite(halved) & (away | (name in ("u_tip", "y")))
         if good.sum() < 2:
             continue
@@ -156,9 +158,9 @@ def _same_story_until(coarse: Trajectory, fine: Trajectory) -> float:
     changes, others = (contact_changes(run, SHORT * size) for run in (coarse, fine))
     horizon = _agree_until(changes, others, float(times[0]), float(coarse.time[-1]))
     away = away_from(times, (event.time for run in (coarse, fine) for event in run.events), size)
+    values, finer = (rows_at(run, times) for run in (coarse, fine))
     for name in present(coarse, _RESOLVED):
-        values, finer = (at(run, times)[name] for run in (coarse, fine))
-        differ = away & (apart(finer, values) > _RESOLVED[name])
+        differ = away & (apart(finer[name], values[name]) > _RESOLVED[name])
         if differ[1:].any():
             horizon = min(horizon, float(times[1:][differ[1:]][0]) - size)
     return horizon
@@ -281,11 +283,11 @@ def quantities(scene: Scene) -> list[str]:
     return [name for name in wanted if name in there]
 
 
-def sample(run: Trajectory, times: np.ndarray, name: str) -> np.ndarray:
-    """Return a quantity at macro points [s]."""
+def sample(run: Trajectory, times: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the `quantities` of a run at macro points [s], NaN after its end."""
     H = run.scene.coupling.H
     rows = run.time
     nearest = rows[np.searchsorted(rows, times - 1e-9 * H).clip(max=len(rows) - 1)]  # what is known at rows alone
     wanted = np.where(np.abs(nearest - times) <= 1e-9 * H, nearest, times)
-    found = at(run, np.minimum(wanted, rows[-1]))[name]
-    return np.where(wanted <= rows[-1], found, np.nan)
+    found = rows_at(run, np.minimum(wanted, rows[-1]))
+    return {name: np.where(wanted <= rows[-1], found[name], np.nan) for name in quantities(run.scene)}

@@ -146,7 +146,8 @@ def _errors(scene: Scene, run: Trajectory, reference: Trajectory) -> list[Row]:
     times = macro_points(scene)
     H = scene.coupling.H
     names = [name for name in quantities(scene) if name not in ("e_beam", "e_spring")]
-    off = {name: np.abs(sample(run, times, name) - reference[name]) for name in names}
+    sampled = sample(run, times)
+    off = {name: np.abs(sampled[name] - reference[name]) for name in names}
     changes = [change.time for change in contact_changes(reference, SHORT * H)]
     found = []
     for begin, end in itertools.pairwise([times[0], *changes, scene.time.t_end]):
