@@ -20,7 +20,6 @@ from functools import cache
 from typing import Literal, NamedTuple
 
 import numpy as np
-import scipy.linalg
 
 from ..scene import Beam, Scene, Spring, Stop
 from .laws import EndsMotion, ReferencePhase, law_of
@@ -127,7 +126,7 @@ class HybridSystem:
     def space(self, phase: ReferencePhase) -> np.ndarray:
         """Return the directions in which x can move, orthonormal, (n, p)."""
         rows = self.held(phase).rows
-        return scipy.linalg.null_space(rows) if len(rows) else np.eye(self.n)
+        return np.asarray(np.linalg.svd(rows)[2][len(rows) :].T)
 
     def oscillating(self, phase: ReferencePhase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return ω² and c [1/s², 1/s] and the constant loads of the coordinates in a phase."""

@@ -11,19 +11,21 @@ singular values of B, since eigenvalues of K carry an absolute error ε·ω_max�
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse as sp
-import scipy.sparse.linalg as spla
 from numpy.polynomial import legendre
 
 from ..scene import Beam, Load, Scene
 from ..scene.statics import SHAPE_POINTS
 
-#: Up to this many unknowns all modes are computed, also where few are wanted.
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+
+#: Up to this many unknowns matrices are dense, and all modes are computed, also where few are wanted.
 _DENSE_SIZE = 400
 #: What lies in a space but for this share adds nothing to it.
 _DEPENDENT = 1e-10
@@ -39,9 +41,9 @@ class SemiDiscreteBeam:
         n and p.
     length : float
         L [m].
-    M, K : (2N, 2N) csc matrices
-        Mass [kg·m², kg], consistent or averaged, and stiffness [N·m, N, N/m].
-    B : (rows, 2N) csr matrix
+    M, K : (2N, 2N) matrices
+        Mass [kg·m², kg], consistent or averaged, and stiffness [N·m, N, N/m]; sparse above `_DENSE_SIZE`, as is B.
+    B : (rows, 2N) matrix
         Strain factor, K = BᵀB.
     slope_shape : (2N,) array
         u = x, θ = 0.
@@ -50,9 +52,9 @@ class SemiDiscreteBeam:
     n_elements: int
     degree: int
     length: float
-    M: sp.csc_matrix
-    K: sp.csc_matrix
-    B: sp.csr_matrix
+    M: np.ndarray | sp.csr_matrix
+    K: np.ndarray | sp.csr_matrix
+    B: np.ndarray | sp.csr_matrix
     slope_shape: np.ndarray
 
     @property
@@ -71,7 +73,7 @@ class SemiDiscreteBeam:
 
     def interpolated(
         self, fractions: np.ndarray = SHAPE_POINTS, of_u: int = 1, *, slopes: bool = False
-    ) -> sp.csr_matrix:
+    ) -> np.ndarray | sp.csr_matrix:
         """Return the (k, 2N) matrix that takes q to u or, with ``of_u`` = 0, θ at k ``fractions`` of the length.
 
         Or to their slopes [1/m]. Where two elements meet they are those of the one towards the tip, of whose error
@@ -89,12 +91,12 @@ class SemiDiscreteBeam:
         return np.asarray(self.interpolated(x / self.length).T @ forces)
 
 
-def inner_forces(beam: Beam, mesh: SemiDiscreteBeam) -> sp.csr_matrix:
-    """Return the (42, 2N) matrix that takes q + α_b q̇ to EI θ_x [N·m] and KAG (u_x − θ) [N] at `SHAPE_POINTS`."""
+def inner_forces(beam: Beam, mesh: SemiDiscreteBeam, q: np.ndarray) -> np.ndarray:
+    """Return EI θ_x [N·m] and KAG (u_x − θ) [N] at `SHAPE_POINTS` of q + α_b q̇, (2N, k): shape (42, k)."""
     EI = beam.young_modulus * beam.second_moment_of_area
     KAG = beam.shear_coefficient * beam.area * beam.shear_modulus
-    bent, slid = (mesh.interpolated(SHAPE_POINTS, of_u, slopes=True) for of_u in (0, 1))
-    return sp.vstack([EI * bent, KAG * (slid - mesh.interpolated(SHAPE_POINTS, 0))]).tocsr()
+    bent, slid = (mesh.interpolated(SHAPE_POINTS, of_u, slopes=True) @ q for of_u in (0, 1))
+    return np.vstack([EI * bent, KAG * (slid - mesh.interpolated(SHAPE_POINTS, 0) @ q)])
 
 
 def _lagrange(degree: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -153,12 +155,11 @@ def assemble(beam: Beam) -> SemiDiscreteBeam:
     columns = 2 * p * elements[:, None] + np.arange(2 * (p + 1))  # with the clamped node's two unknowns still in front
     M = _scatter(columns, columns, mass, 2 * (n * p + 1))
     B = _scatter(len(strain) * elements[:, None] + np.arange(len(strain)), columns, strain, 2 * (n * p + 1))
-    M = M[2:, 2:].tocsc()
-    B = B[:, 2:].tocsr()
+    B = B[:, 2:]
 
     slope = np.zeros(2 * (n * p + 1))
     slope[columns[:, 1::2]] = h * (elements[:, None] + _lobatto(p))
-    return SemiDiscreteBeam(n, p, beam.length, M, (B.T @ B).tocsc(), B, slope[2:])
+    return SemiDiscreteBeam(n, p, beam.length, M[2:, 2:], B.T @ B, B, slope[2:])
 
 
 def points(beam: Beam) -> tuple[np.ndarray, np.ndarray]:
@@ -186,11 +187,17 @@ def unit_forces(beam: Beam, load: Load) -> tuple[np.ndarray, np.ndarray]:
     return x, np.polynomial.polynomial.polyval(x / beam.length, shape) * dx
 
 
-def _scatter(rows: np.ndarray, columns: np.ndarray, elements: np.ndarray, width: int) -> sp.csr_matrix:
+def _scatter(rows: np.ndarray, columns: np.ndarray, elements: np.ndarray, width: int) -> np.ndarray | sp.csr_matrix:
     """Return the sum of ``elements`` (n, r, c), or one for all, at their ``rows`` (n, r) and ``columns`` (n, c)."""
     i, j, values = np.broadcast_arrays(rows[:, :, None], columns[:, None, :], elements)
     shape = (int(rows.max()) + 1, width)
-    return sp.coo_matrix((values.ravel(), (i.ravel(), j.ravel())), shape=shape).tocsr()
+    if width <= _DENSE_SIZE + 2:
+        matrix = np.zeros(shape)
+        np.add.at(matrix, (i, j), values)
+        return matrix
+    from scipy.sparse import coo_matrix  # a third of a second to load, as all that is sparse: only for fine meshes
+
+    return coo_matrix((values.ravel(), (i.ravel(), j.ravel())), shape=shape).tocsr()
 
 
 @dataclass(frozen=True)
@@ -247,7 +254,7 @@ def modal_beam(beam: Beam) -> ModalBeam:
         load=basis.T @ discrete.nodal(*constant_forces(beam)),
         slope_shape=basis.T @ (discrete.M @ discrete.slope_shape),
         sampler=discrete.interpolated() @ basis,
-        inner=inner_forces(beam, discrete) @ basis,
+        inner=inner_forces(beam, discrete, basis),
         basis=basis,
         alpha=beam.alpha_b,
     )
@@ -255,40 +262,63 @@ def modal_beam(beam: Beam) -> ModalBeam:
 
 def singular_modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return ascending frequencies and orthonormal modes of factorᵀfactor; factor has no fewer rows than columns."""
-    _, sigma, vt = scipy.linalg.svd(factor, full_matrices=False)
+    _, sigma, vt = np.linalg.svd(factor, full_matrices=False)
     return sigma[::-1], vt[::-1].T
 
 
 def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
     """Return the lowest modes, the static shapes and the start, (2N, n_modes + 3)."""
+    dense = isinstance(discrete.K, np.ndarray)
     # Without units of length and time, in unknowns (L θ, u): no wanted eigenvalue of K⁻¹M far below 1.
-    D = sp.diags(np.where(np.arange(discrete.size) % 2, 1.0, 1.0 / discrete.length)).tocsc()
-    K = D @ discrete.K @ D
-    M = D @ discrete.M @ D
-    loads = np.column_stack([discrete.tip_vector, discrete.nodal(*points(beam))])
-    static = D @ spla.splu(K).solve(D @ loads)
-    if discrete.size <= _DENSE_SIZE or 2 * beam.n_modes > discrete.size:
+    unit = np.where(np.arange(discrete.size) % 2, 1.0, 1.0 / discrete.length)[:, None]
+    loads = unit * np.column_stack([discrete.tip_vector, discrete.nodal(*points(beam))])
+    if dense:
+        static = np.linalg.solve(unit * discrete.K * unit.T, loads)
+    else:
+        import scipy.sparse.linalg as spla
+        from scipy.sparse import diags
+
+        D = diags(unit[:, 0])
+        K = (D @ discrete.K @ D).tocsc()
+        static = spla.splu(K).solve(loads)
+    if dense or 2 * beam.n_modes > discrete.size:
         modes = _rayleigh_ritz(discrete)[1][:, : beam.n_modes]
     else:
+        M = (D @ discrete.M @ D).tocsc()
         fastest = K.diagonal().max() / M.diagonal().min()  # rad²/s²
-        modes = D @ spla.eigsh(K / fastest, k=beam.n_modes, M=M, sigma=0.0, v0=np.ones(discrete.size))[1]
-    return np.column_stack([modes, static, discrete.slope_shape])
+        modes = unit * spla.eigsh(K / fastest, k=beam.n_modes, M=M, sigma=0.0, v0=np.ones(discrete.size))[1]
+    return np.column_stack([modes, unit * static, discrete.slope_shape])
 
 
 def _rayleigh_ritz(discrete: SemiDiscreteBeam, space: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return frequencies and modes in a space, given by its columns, or of all; columns that depend on others count
     once."""
-    band = min(2 * discrete.degree + 1, discrete.size - 1)
-    # M = UᵀU; in the coordinates Uq lengths and angles are those of the kinetic energy.
-    U = scipy.linalg.cholesky_banded([np.pad(discrete.M.diagonal(k), (k, 0)) for k in range(band, -1, -1)])
+    times, solve = _mass_root(discrete)
     within = np.eye(discrete.size)
     if space is not None:
-        columns = sp.diags([U[band - k, k:] for k in range(band + 1)], range(band + 1)) @ space
-        q, r, _ = scipy.linalg.qr(columns / np.linalg.norm(columns, axis=0), mode="economic", pivoting=True)
-        within = q[:, np.abs(np.diag(r)) > _DEPENDENT]
-    orthonormal = scipy.linalg.solve_banded((0, band), U, within)
+        columns = times(space)
+        directions, shares, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+        within = directions[:, shares > _DEPENDENT]
+    orthonormal = solve(within)
     omega, vectors = singular_modes(discrete.B @ orthonormal)
     return omega, orthonormal @ vectors
+
+
+def _mass_root(
+    discrete: SemiDiscreteBeam,
+) -> tuple[Callable[[np.ndarray], np.ndarray], Callable[[np.ndarray], np.ndarray]]:
+    """Return functions of U and U⁻¹ on columns, M = UᵀU: lengths and angles of Uq are those of the kinetic energy."""
+    M = discrete.M
+    if isinstance(M, np.ndarray):
+        U = np.linalg.cholesky(M).T
+        return partial(np.matmul, U), partial(np.linalg.solve, U)
+    from scipy.linalg import cholesky_banded, solve_banded
+    from scipy.sparse import diags
+
+    band = 2 * discrete.degree + 1
+    bands = cholesky_banded([np.pad(M.diagonal(k), (k, 0)) for k in range(band, -1, -1)])
+    upper = diags([bands[band - k, k:] for k in range(band + 1)], range(band + 1))
+    return upper.dot, partial(solve_banded, (0, band), bands)
 
 
 #: Angle [rad] that a load turns in a step at most.

@@ -25,6 +25,7 @@ from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from ..monolithic.semi_discrete import assemble, constant_forces, inner_forces
@@ -130,8 +131,8 @@ class _Algorithm:
         d = self.discrete
         alpha = self.beam.alpha_b
         self.h = h
-        self.B = (4.0 * d.M + (2.0 * alpha * h - h**2) * d.K).tocsr()
-        self.solve = spla.splu((4.0 * d.M + (h**2 + 2.0 * alpha * h) * d.K).tocsc()).solve
+        self.B = 4.0 * d.M + (2.0 * alpha * h - h**2) * d.K
+        self.solve = spla.splu(sp.csc_matrix(4.0 * d.M + (h**2 + 2.0 * alpha * h) * d.K)).solve
         #: How (62) answers to a force at the tip.
         self.tip_response: np.ndarray = self.solve(d.tip_vector)
 
@@ -337,5 +338,5 @@ class _Algorithm:
             "steps_apart": int(np.sum(found["case"] == 11)),
             "wall_time": seconds,
         }
-        shapes = np.hstack([q @ d.interpolated().T, (q + alpha * v) @ inner_forces(self.beam, d).T])
+        shapes = np.hstack([q @ d.interpolated().T, inner_forces(self.beam, d, (q + alpha * v).T).T])
         return problem.result(self.scene, columns, shapes, self.events, summary)
