@@ -12,14 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial.laguerre import laggauss
 
 #: Gauss points of a step, at which forces are given.
 STAGES = 24
-#: Points at which S and Ṡ are taken where all roots are below `_SLOW`/h: they interpolate e^{iθ}, θ ≤ 20, to rounding.
-_KERNEL_POINTS = 40
-_SLOW = 20.0
-#: Above this |s| h/2, which `ive` refuses, only the limit of fast roots is left.
-_LIMIT = 1e9
+#: Points at which S and Ṡ are taken where all roots are below `_SLOW`/h: they interpolate e^{iθ}, θ ≤ 60, to 1e-13.
+_KERNEL_POINTS = 64
+_SLOW = 60.0
 #: Roots nearer than this share of σ are moved apart by it: S changes by its square.
 _CRITICAL = 1e-6
 
@@ -43,8 +42,8 @@ GAUSS = GaussRule(STAGES)
 _KERNEL = GaussRule(_KERNEL_POINTS)
 #: Where a step is evaluated: the Gauss points and the end, as fractions of it.
 TARGETS = np.append(GAUSS.nodes, 1.0)
-#: c × the Legendre coefficients on [0, c] of ℓ_k for each target c, (targets, legendre, stages).
-_ON_PARTS = TARGETS[:, None, None] * (GAUSS.transform @ GAUSS.lagrange(TARGETS[:, None] * GAUSS.nodes))
+#: Points and weights of ∫₀^∞ e^{−x} f(x) dx, exact where f has the degree of ℓ_k.
+_DECAY, _DECAY_WEIGHTS = laggauss(STAGES // 2)
 
 
 def _convolutions() -> np.ndarray:
@@ -154,15 +153,17 @@ class Oscillators:
 def _convolve(s: np.ndarray, size: float, at: slice) -> np.ndarray:
     """Return ∫₀^τ e^{s(τ − ν)} ℓ_k(ν) dν at those targets that ``at`` picks, for roots s: (targets, stages, len(s)).
 
-    On [0, 1], ∫ e^{z(1 − x)} P_m(2x − 1) dx = e^{−w} i_m(w) with w = −z/2 and i_m the modified spherical Bessel
-    functions (Abramowitz & Stegun, 10.1.14 and 10.2.2).
+    With z = s h and c = τ/h it is (e^{zc} L(0) − L(c))/s, L(c) = ∫₀^∞ e^{−x} ℓ_k(c + x/z) dx. That loses nothing where
+    |z| is large; elsewhere the exponential is interpolated.
     """
-    from scipy.special import ive  # only for fast oscillators
-
-    w = -0.5 * size * TARGETS[at][:, None] * s
-    m = np.arange(STAGES)[:, None, None]
-    with np.errstate(over="ignore", invalid="ignore"):
-        bessel = np.sqrt(0.5 * np.pi / w) * ive(m + 0.5, w) * np.exp(np.abs(w.real) - w)
-        limit = 0.5 * (1.0 - (-1.0) ** m * np.exp(-2.0 * w)) / w
-    responses = np.where(np.abs(w) > _LIMIT, limit, bessel)
-    return np.asarray(size * np.einsum("tmk,mtp->tkp", _ON_PARTS[at], responses))
+    z = size * s
+    slow = np.abs(z) <= _SLOW
+    fast = z[~slow]
+    start, *ends = (
+        np.tensordot(GAUSS.lagrange(c + _DECAY[:, None] / fast), _DECAY_WEIGHTS, ([0], [0])).T
+        for c in (0.0, *TARGETS[at])
+    )
+    convolved = np.empty((len(ends), STAGES, len(s)), complex)
+    convolved[..., slow] = _CONVOLUTIONS[at] * size @ np.exp(_KERNEL.nodes[:, None] * z[slow])
+    convolved[..., ~slow] = (np.exp(TARGETS[at, None, None] * fast) * start - ends) / s[~slow]
+    return convolved

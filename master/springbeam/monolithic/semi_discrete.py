@@ -297,8 +297,8 @@ def _rayleigh_ritz(discrete: SemiDiscreteBeam, space: np.ndarray | None = None) 
     within = np.eye(discrete.size)
     if space is not None:
         columns = times(space)
-        directions, shares, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
-        within = directions[:, shares > _DEPENDENT]
+        q, r = np.linalg.qr(columns / np.linalg.norm(columns, axis=0))
+        within = q[:, np.abs(np.diag(r)) > _DEPENDENT]
     orthonormal = solve(within)
     omega, vectors = singular_modes(discrete.B @ orthonormal)
     return omega, orthonormal @ vectors
