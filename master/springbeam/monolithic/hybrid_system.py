@@ -214,15 +214,19 @@ class HybridSystem:
         }
 
     def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
-        """Return what rounding leaves of a displacement, velocity or contact force that is exactly zero."""
+        """Return what rounding leaves of a displacement, velocity or contact force that is exactly zero.
+
+        A place also has the rounding of the time of an event.
+        """
         x = np.abs(X[self.A])
         x_dot = np.abs(X[self.V])
         tip = np.abs(self.tip)
         top = np.abs(self.top)
+        speed = float((tip + top) @ x_dot)
         if unit == "m":
-            return NOISE * (float((tip + top) @ x) + abs(self.stop.position))
+            return NOISE * (float((tip + top) @ x) + abs(self.stop.position) + abs(float(X[self.T])) * speed)
         if unit == "m/s":
-            return NOISE * float((tip + top) @ x_dot)
+            return NOISE * speed
         own = np.abs(self.omega2) * x + self.c * x_dot + np.abs(self.load)
         return NOISE * float((tip @ own) / self.mobility + self.mass * (top @ own))
 
@@ -282,10 +286,13 @@ class QuasiStaticSystem(HybridSystem):
         return X
 
     def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
-        """Return the noise of any pair, and what the rounding of an event's time makes of a place, and of the force."""
+        """Return the noise of any pair; what the rounding of an event's time makes of a place changes the force."""
+        found = super().noise(unit, X)
+        if unit != "N":
+            return found
         moved = NOISE * abs(float(X[self.T])) * float(np.abs(X[self.V]) @ (self.tip + self.top))
         force = NOISE * float(self.omega2[0] * abs(X[0]) + self.c[0] * abs(X[self.n]) + abs(self.load[0]))
-        return super().noise(unit, X) + {"m": moved, "m/s": 0.0, "N": float(self.omega2[0]) * moved + force}[unit]
+        return found + float(self.omega2[0]) * moved + force
 
 
 def _statics(beam: Beam) -> tuple[float, float, float]:
