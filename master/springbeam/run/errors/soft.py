@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from itertools import pairwise
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -61,20 +61,14 @@ def _defect(demand: _Demand, path: Any, steps: StepRecords, parts: int, kinks: d
 
 def _stretches(steps: int, parts: int, kinks: dict[int, list[float]]) -> tuple[Any, Any, Any, Any]:
     """Return the step, the part of it, and both ends, as shares of the step, of each stretch without ``kinks``."""
-    edges = [part / parts for part in range(parts)]
-    step = np.repeat(np.arange(steps), parts)
-    low = np.tile(edges, steps)
-    high = low + 1.0 / parts
-    if kinks:
-        smooth = ~np.isin(step, list(kinks))
-        divided = [
-            (number, *ends) for number, places in kinks.items() for ends in pairwise(sorted([*edges, 1.0, *places]))
-        ]
-        step, low, high = (
-            np.concatenate([values[smooth], more])
-            for values, more in zip((step, low, high), zip(*divided, strict=True), strict=True)
-        )
-        step = step.astype(int)
+    where = np.array([number for number, places in kinks.items() for _ in places], int)
+    step = np.append(np.repeat(np.arange(steps), parts), where)
+    low = np.append(np.tile(np.arange(parts) / parts, steps), [*chain.from_iterable(kinks.values())])
+    order = np.lexsort((low, step))
+    step = step[order]
+    low = low[order]
+    high = np.append(low[1:], 1.0)
+    high[np.append(step[1:] != step[:-1], True)] = 1.0
     part = np.minimum((0.5 * (low + high) * parts).astype(int), parts - 1)  # a kink may be at the end to rounding
     return step, part, low, high
 
