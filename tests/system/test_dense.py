@@ -67,6 +67,10 @@ def test_rows_are_themselves_and_between_them_every_column_holds(name):
         if event.energy_loss > 1e-6 and event.time > run.time[0]:
             step = run.steps[np.searchsorted(run.time, event.time)]
             before = run.at(event.time - 1e-6 * step["size"])
+            if event.kind.collision and run.scene.spring is not None:
+                gained = 0.5 * run.scene.spring.mass * (step["z_after"] ** 2 - step["z"] ** 2)
+                after = run.e_spring[np.searchsorted(run.time, event.time)]
+                assert after - before.e_spring[0] == pytest.approx(gained, rel=1e-4, abs=1e-5 * scale)
             assert before.e_impact_loss[0] == pytest.approx(run.at(event.time).e_impact_loss[0] - event.energy_loss)
             assert abs(run.at(event.time).e_total[0] - before.e_total[0]) < 1e-8 * scale
 

@@ -67,6 +67,12 @@ def test_a_tip_may_not_pass_the_top_of_the_spring():
     assert any("below the spring's top" in text for text in found(run, steps=raised))
 
 
+def test_a_gap_that_a_tie_leaves_inside_a_step_is_none():
+    """It is 1.3 % of the motion, while rows have none: joined ends have one motion."""
+    run = simulate(load_scene("soft", ["time.t_end=0.2", "coupling.macro_step=4e-3", "coupling.degree=0"]))
+    assert found(run) == []
+
+
 @pytest.mark.parametrize(
     ("number", "time"), [(0, -1.0), (-1, 0.0), (-1, 0.3)], ids=["before the start", "out of order", "after the end"]
 )

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 import scenes
 from bodies import pair_of
+from scipy.linalg import expm
 
 from springbeam import simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.results.records import STEP
-from springbeam.run.errors.ends import Terms
+from springbeam.run.errors.ends import Ends, Terms
 from springbeam.run.errors.soft import _stretches
 from springbeam.run.misplaced import misplaced
 from springbeam.scene.modes import tip_modes
@@ -148,6 +149,40 @@ def test_the_terms_of_a_mode_are_its_impulse_response(damping):
     exact = 2.25 * (np.exp(r1 * times) - np.exp(r2 * times)) / (r1 - r2)
     found = (terms.shown[0] * terms.impulse * np.exp(terms.rates * times)).sum(axis=1).real
     assert found == pytest.approx(exact[:, 0].real, rel=1e-9)
+
+
+@pytest.mark.parametrize(("damping", "H"), [(0.2, 2.0), (0.9, 5.0), (20.0, 0.3), (0.9, 1e-3)])
+def test_a_force_that_falls_through_zero_moves_a_mode(damping, H):
+    """By 6/H² − 12 t/H³ a free mass of 1 kg moves by 1 m and rests; afterwards the mode is alone."""
+    ends = Ends((np.array([0.16]), np.array([damping]), np.array([1.5])), 0.0, 0.0, 10.0)
+    rates = np.zeros((4, 4))
+    rates[0, 1] = rates[2, 3] = 1.0
+    rates[1] = -0.16, -damping, 1.5, 0.0
+    at_end = expm(H * rates) @ [0.0, 0.0, 6.0 / H**2, -12.0 / H**3]
+    ends.drift(H, 0.0, 0.0, 1.0)
+    assert [ends.u, ends.v] == pytest.approx(1.5 * at_end[:2], rel=1e-5)
+    ends.drift(0.7, 0.0, 0.0)
+    assert [ends.u, ends.v] == pytest.approx(1.5 * (expm(0.7 * rates[:2, :2]) @ at_end[:2]), rel=1e-5)
+
+
+def test_ends_that_meet_later_and_part_at_once_are_as_far_off_as_exact_ones():
+    """A mass of 2 kg, 1 m high, with −4 m/s and 5 m/s², meets 3 kg at rest: how places change with the height."""
+
+    def places(start, time):
+        met = (4.0 - np.sqrt(16.0 - 10.0 * start)) / 5.0
+        together = 0.4 * (5.0 * met - 4.0)
+        since = time - met
+        return np.array([together * since + 2.5 * since**2, together * since])
+
+    met = (4.0 - np.sqrt(6.0)) / 5.0
+    ends = Ends((np.array([0.0]), np.array([0.0]), np.array([2.0**-0.5])), 3.0, 0.0, 1.0)
+    ends.drift(1e-9, 0.0, ends.per_mass, 2.0)  # which lifts the tip by 1 m, and presses the other mass by 2/3 m
+    ends.y = 0.0
+    ends.drift(met, 0.0, ends.per_mass)
+    ends.bounce(np.sqrt(6.0), 5.0, ends.per_mass)
+    ends.drift(0.5, 0.0, ends.per_mass)
+    exact = (places(1.0 + 1e-5, met + 0.5) - places(1.0 - 1e-5, met + 0.5)) / 2e-5
+    assert [ends.u, ends.y] == pytest.approx(exact, rel=1e-6)
 
 
 def test_a_contact_that_opens_at_the_end_of_a_step_to_rounding_belongs_to_its_last_part():

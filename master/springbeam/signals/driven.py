@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..results.dense import at_multiples
+from ..results.dense import MOTION, at_multiples, extremes
 from ..results.trajectory import Trajectory
 from ..scene.loads import ChirpLoad, HarmonicLoad
 from .curves import signal
@@ -37,8 +37,15 @@ class Settled(NamedTuple):
         return self.multiple * self.drive
 
     def amplitude(self, run: Trajectory, column: str) -> float:
-        """Return half the range of a column over the last 8 periods, where the transient has faded further."""
-        return 0.5 * float(np.ptp(run[column][run.time >= run.time[-1] - _PERIODS * self.period]))
+        """Return half the range of a column over the last 8 periods, where the transient has faded further.
+
+        It is that of the curve of a motion, else of the rows, of which 8 periods have more phases than one.
+        """
+        begin = float(run.time[-1]) - _PERIODS * self.period
+        if column in MOTION and run.steps is not None:
+            (found,) = extremes(run.scene.contact.rigid, run.steps[run.steps["time"] >= begin], column)
+            return 0.5 * (found.highest - found.lowest)
+        return 0.5 * float(np.ptp(run[column][run.time >= begin]))
 
 
 def drive_of(run: Trajectory) -> HarmonicLoad | None:

@@ -9,6 +9,9 @@ import numpy as np
 
 from ...bodies.protocol import Modes
 
+#: From there on a difference of exponentials is not rounded away.
+_SMALL = 1e-2
+
 
 class Terms(NamedTuple):
     """The terms of the modes of a body, (n,) each.
@@ -20,8 +23,6 @@ class Terms(NamedTuple):
     rates: np.ndarray  #: r [1/s]
     impulse: np.ndarray  #: what an impulse of 1 N·s at the end adds
     shown: np.ndarray  #: what the terms add to the displacement of the end, and to its velocity, (2, n)
-    stiffness: np.ndarray  #: ω² [1/s²]
-    damping: np.ndarray  #: 2 ζ ω [1/s]
 
     @classmethod
     def of(cls, modes: Modes, duration: float) -> Terms:
@@ -42,8 +43,6 @@ class Terms(NamedTuple):
             rates,
             both(impulse, -impulse),
             np.array([displaced, displaced * rates]),
-            both(stiffness, stiffness),
-            both(modes[1], modes[1]),
         )
 
 
@@ -72,7 +71,7 @@ class Ends:
         self._resisted = float((self.terms.shown[1] @ self._jump).real)
         self._values = np.zeros(len(self._jump), complex)
         self._pairs = self._values.view(float)
-        self._moves = cache(partial(_move, self.terms, self._jump))
+        self._moves = cache(partial(_move, self.terms))
         #: The force [N], the impulse [N·s] and the shift [N·s²] of this step that the terms do not have yet.
         self._due = [0.0, 0.0, 0.0]
         self._added = np.zeros((3, len(self._pairs)))
@@ -180,23 +179,30 @@ class Ends:
 
 
 def _move(
-    terms: Terms, jump: np.ndarray, H: float
+    terms: Terms, H: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[float, float], tuple[float, float]]:
     """Return what a step of ``H`` [s] makes of the terms, and of u and v in these.
 
-    Further, in rows, what its end adds to the terms: of a constant force of 1 N, of an impulse of 1 N·s, and of 1 N·s²,
-    which moves a free mass, of the modes that the step follows (``jump`` in all modes); and what force and shift add to
-    u and v.
+    Further, in rows, what its end adds to the terms: of a constant force of 1 N, of an impulse of 1 N·s at the end, and
+    of a force that falls linearly, without an impulse, and moves a free mass by 1 N·s² over its mass; and what the
+    first and the last add to u and v.
     """
-    rates, impulse, shown, stiffness, damping = terms
-    moved = np.exp(rates * H)
-    by_force = impulse * np.expm1(rates * H) / rates
-    follows = 1.0 / (1.0 + 0.5 * H * (damping + 0.5 * H * stiffness))
-    shifted = moved * (jump + damping * impulse) * follows
+    rates, impulse, shown = terms
+    turned = rates * H
+    moved = np.exp(turned)
+    by_force = impulse * np.expm1(turned) / rates
+    shifted = impulse * _falling(turned) * 6.0 / H
     at_end = _reals(np.conj(shown * moved))
     added = _reals(np.array([by_force, impulse, shifted]))
     force_moves, shift_moves = ((shown @ each).real.tolist() for each in (by_force, shifted))
     return moved, at_end, added, force_moves, shift_moves
+
+
+def _falling(x: np.ndarray) -> np.ndarray:
+    """Return ∫ (2s − 1) exp(x s) ds from 0 to 1."""
+    with np.errstate(invalid="ignore"):
+        exact = ((x - 2.0) * np.exp(x) + x + 2.0) / x**2
+    return np.where(np.abs(x) < _SMALL, x / 6.0 * np.exp(0.5 * x), exact)
 
 
 def _reals(values: np.ndarray) -> np.ndarray:
