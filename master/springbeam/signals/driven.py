@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..results.dense import MOTION, at_multiples, extremes
+from ..results.dense import MOTION, at_multiples, inside
 from ..results.trajectory import Trajectory
 from ..scene.loads import ChirpLoad, HarmonicLoad
 from .curves import signal
@@ -43,7 +43,8 @@ class Settled(NamedTuple):
         """
         begin = float(run.time[-1]) - _PERIODS * self.period
         if column in MOTION and run.steps is not None:
-            (found,) = extremes(run.scene.contact.rigid, run.steps[run.steps["time"] >= begin], column)
+            late = run.steps[run.steps["time"] >= begin]
+            found = inside(run.scene.contact.rigid, late, column).extremes[column]
             return 0.5 * (found.highest - found.lowest)
         return 0.5 * float(np.ptp(run[column][run.time >= begin]))
 
