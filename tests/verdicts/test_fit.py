@@ -18,6 +18,7 @@ from scipy.stats import t as student
 from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
 from springbeam.scene import as_scene
 from springbeam.signals.measured import Measured, at_shift, read_measured, residuals
+from springbeam.studies import accuracy
 from springbeam.studies.fit import study as fit
 
 TRUE = {"spring.linear_stiffness": 800.0, "spring.damping": 1.2}
@@ -436,6 +437,23 @@ def test_a_velocity_that_jumps_is_fitted_in_fifty_runs_of_which_none_is_made_twi
         assert time > longest.get(keys, 0.0)
         longest[keys] = time
     assert sum(time == 0.6 for _, time in made) <= 16 + 2  # starts, the search at another shift, the minimum
+
+
+def test_a_search_keeps_the_macro_step_that_is_picked_where_it_begins(tmp_path, monkeypatch):
+    """It was picked for each of its runs by three to five pilots, also for two whose keys differ by 1e-6.
+
+    Steps are picked for the 16 starts and for the tenfold accuracy by which the minimum is judged.
+    """
+    picked = []
+    right = accuracy.pick
+    monkeypatch.setattr(accuracy, "pick", lambda scene: picked.append(scene.accuracy) or right(scene))
+    path = written(tmp_path / "m.csv", "time,y", TIMES, noisy(exact()))
+    found = fitted(path, scene=with_changes(OSCILLATOR, accuracy=1e-4), shift=0.0)
+    assert picked == [*[1e-4] * 16, 1e-5]
+    assert len(found["runs"]) > 17 + 6
+    assert found["undetermined"] == []
+    for row in found["keys"]:
+        assert abs(row["value"] - TRUE[row["key"]]) <= row["high"] - row["low"]
 
 
 @pytest.mark.parametrize(("kind", "stiffness"), [("element", 80.0), ("fmu", 80.0), ("element", 200.0)])

@@ -116,10 +116,10 @@ def pick(scene: Scene, progress: Progress | None = None) -> Trajectory:
     errors: dict[str, float] = {}
     agreed = False
     while steps <= _MOST:
-        prepared = _prepared(scene, scene.duration / steps)
+        pilot = prepared(scene, scene.duration / steps)
         steps *= 2.0
         try:
-            fine = runner.run_in_memory(prepared, progress)
+            fine = runner.run_in_memory(pilot, progress)
         except RunStopped as error:
             if steps > _MOST or error.run is None:
                 raise
@@ -176,7 +176,7 @@ def _coarsest(
         if scene.duration < _FEWEST * H:
             break
         try:
-            coarse = known.get(H) or runner.run_in_memory(_prepared(scene, H), progress)
+            coarse = known.get(H) or runner.run_in_memory(prepared(scene, H), progress)
         except RunStopped:
             break
         if H not in known:
@@ -294,7 +294,7 @@ def _lasting(body: Body) -> float:
     return float(np.max(omega[damping <= DIES_OUT * omega], initial=0.0))
 
 
-def _prepared(scene: Scene, macro_step: float) -> Scene:
+def prepared(scene: Scene, macro_step: float) -> Scene:
     """Return ``scene`` with a macro step [s] and the scheme and tolerances that go with its accuracy."""
     assert scene.accuracy is not None
     tolerance = _TOLERANCE * scene.accuracy

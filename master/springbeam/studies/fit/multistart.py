@@ -123,16 +123,16 @@ class MultiStart:
                 return {"error": "the search has made as many runs as it may"}
         return self._make(case)
 
-    def _begun(self, at: np.ndarray, clock: Row | None = None) -> Search | None:
+    def _begun(self, at: np.ndarray, more: Row | None = None) -> Search | None:
         """Return the search from a run, ``None`` if it cannot be made or covers too few points.
 
-        ``clock`` says which shift of the clock is sought (`springbeam.studies.fit.study.Fit.record`).
+        ``more`` is what the case says beside the keys (`springbeam.studies.fit.study.Fit.record`).
         """
-        row = self._trial(self._ranges.values(at) | (clock or {}))
+        row = self._trial(self._ranges.values(at) | (more or {}))
         if row["error"]:
             return None
         search = Search(
-            lambda unknowns, window: self._trial(self._ranges.values(unknowns) | window),
+            lambda unknowns, window: self._trial(self._ranges.values(unknowns) | window | {"step": row["step"]}),
             self._data,
             self._ranges.limits,
             at,
@@ -149,7 +149,7 @@ class MultiStart:
         if not self._free:
             return None
         away = _AWAY * last.period
-        other = self._begun(last.at, {"beside": (last.row[SHIFT], away)})
+        other = self._begun(last.at, {"beside": (last.row[SHIFT], away), "step": last.row["step"]})
         return other if other is not None and abs(other.row[SHIFT] - last.row[SHIFT]) > away else None
 
     def _judged(self, looked: Sequence[Search]) -> Found:
@@ -186,7 +186,7 @@ class MultiStart:
         """
         search = search.least(_MOST)
         if self._free:
-            anywhere = self._begun(search.at)
+            anywhere = self._begun(search.at, {"step": search.row["step"]})
             if anywhere is not None and self._moved(anywhere.row, search.row) and _as_good(anywhere, search):
                 search = anywhere.least(_MOST)
         if len(self._data.values) > 1:

@@ -33,7 +33,7 @@ from ...signals.measured import (
     settled,
     shifts,
 )
-from ..accuracy import simulate_to
+from ..accuracy import prepared, simulate_to
 from ..design import with_keys
 from ..study import Make, Study
 from ..tables import Findings, Row, table
@@ -68,7 +68,7 @@ class Fit(Study):
     shift: float | None = None  #: by which the clock of the measurement is moved [s]; found if it is left out
     repeat: Path | None = None  #: a second measurement of the same, which shows the noise
 
-    _kept: dict[tuple[Any, ...], Trajectory] = PrivateAttr(default_factory=dict)  #: runs, the last used one last
+    _kept: dict[str, Trajectory] = PrivateAttr(default_factory=dict)  #: runs by their scenes, the last used one last
 
     @cached_property
     def data(self) -> Measured:
@@ -124,6 +124,7 @@ class Fit(Study):
         * ``between``: two shifts of the clock [s] between which the best one is sought, by ``points``, from a number up
           to another; without them it is sought anywhere, if it is not given;
         * ``beside``: a shift, and how far from it [s] another one is sought at least;
+        * ``step``: the macro step [s] that was picked for the accuracy of the scene, so that it is not picked again;
         * ``finer``: the run has shorter steps;
         * ``repeat``: it is compared with the repeated measurement.
         """
@@ -133,7 +134,7 @@ class Fit(Study):
         anywhere = (-math.inf, math.inf) if self.shift is None else (self.shift, self.shift)
         limits = case.get("between", anywhere)
         try:
-            run = self._run(keys, bool(case.get("finer")), float(data.time[-1]) + limits[1])
+            run = self._run(case, float(data.time[-1]) + limits[1])
         except (RunStopped, SceneError) as refused:
             return {**keys, "error": str(refused)}
         begins: Row = {}
@@ -143,7 +144,9 @@ class Fit(Study):
         else:
             found, begins = self._begun(run, data, case)
         left = {f"left_{name}": rms(off) for name, off in found.off.items()}
-        return {**keys, SHIFT: found.shift, **left, "error": "", "off": found.off, "slope": found.slope, **begins}
+        step = None if self.scene.accuracy is None else run.scene.coupling.H
+        curves = {"off": found.off, "slope": found.slope}
+        return {**keys, SHIFT: found.shift, **left, "error": "", "step": step, **curves, **begins}
 
     def _begun(self, run: Trajectory, data: Measured, case: Row) -> tuple[Aligned, Row]:
         """Return both at the best shift of the clock, and what a search from there takes.
@@ -171,17 +174,21 @@ class Fit(Study):
             ranked = sorted(others, key=lambda pair: pair[1]) or ranked
         return ranked[0][0]
 
-    def _run(self, keys: Row, finer: bool, last: float) -> Trajectory:
-        """Return the run with ``keys``, at least up to the time ``last`` [s] if that is in it.
+    def _run(self, case: Row, last: float) -> Trajectory:
+        """Return the run of a case, at least up to the time ``last`` [s] if that is in it.
 
         Raises RunStopped, and SceneError if it cannot be run.
         """
-        scene = with_keys(self.scene, keys)
+        scene = with_keys(self.scene, {name: case[name] for name in self.ranges.ends})
+        if case.get("finer"):
+            scene = _finer(scene)
+        elif case.get("step"):
+            scene = prepared(scene, case["step"])
         until = min(last + _BEYOND * scene.duration, scene.time.t_end)
-        name = (*keys.values(), finer)
+        name = scene.model_dump_json()
         run = self._kept.pop(name, None)
         if run is None or run.time[-1] < until:
-            run = simulate_to(_finer(scene) if finer else scene, until)
+            run = simulate_to(scene, until)
         self._kept[name] = run
         while len(self._kept) > 1 and sum(map(len, self._kept.values())) > _KEPT:
             self._kept.pop(next(iter(self._kept)))
@@ -195,7 +202,7 @@ class Fit(Study):
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Return the values found with their intervals, and why the data does not determine them (exit code 1)."""
         found = self._search(lambda case: records[name_of(case)]).found()
-        kept = ("off", "slope", "points", "room")
+        kept = ("step", "off", "slope", "points", "room")
         runs = [{name: value for name, value in row.items() if name not in kept} for row in records.values()]
         if found is None:
             first = next(iter(records.values()))["error"]
