@@ -13,6 +13,7 @@ from runs import EVERY_EVENT, ODD_COLUMNS, PAIR, SCENES, a_trajectory
 
 from springbeam import Event, with_changes
 from springbeam.pictures import plots
+from springbeam.pictures.diagrams import Diagram, draw_diagrams
 from springbeam.pictures.drawing import EVENT_LOOKS, NOT_RESOLVED, decimated
 from springbeam.pictures.plots import figure_of, plot_run
 from springbeam.results.directory import PICTURES
@@ -142,3 +143,11 @@ def test_thinning_keeps_ends_order_and_the_extremes_of_every_column_of_pixels(va
         if len(span):
             kept = values[rows[np.isin(rows, span)]]
             assert (kept.min(), kept.max()) == (values[span].min(), values[span].max())
+
+
+def test_a_curve_on_logarithmic_axes_leaves_out_what_is_not_above_zero():
+    """matplotlib would draw it at the edge."""
+    curve = [[1.0, 2.0], [2.0, 0.0], [0.0, 3.0], [3.0, 4.0]]
+    (ax,) = draw_diagrams([Diagram("x", "y", {"a": curve})], "").axes
+    assert ax.lines[0].get_xydata().tolist() == [[1.0, 2.0], [3.0, 4.0]]
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")

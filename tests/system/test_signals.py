@@ -10,6 +10,7 @@ from springbeam import load_scene, simulate, with_changes
 from springbeam.signals.driven import responses, settled
 from springbeam.signals.spectra import power_spectrum, shock_of_run, shock_spectrum, spectra
 from springbeam.studies.metrics import METRICS
+from springbeam.studies.spectrum import spectrum
 from springbeam.studies.sweep import Sweep
 
 MASS = 0.2
@@ -254,3 +255,36 @@ def test_up_and_down_are_different_motions_of_a_hardening_spring():
     low = np.interp(12.0, down.frequency[::-1], down.amplitude[::-1])
     assert high > 2.0 * low
     assert (up.way, down.way) == ("up", "down")
+
+
+def spectra_drawn(run):
+    """Spectra of y, their tables, and what is drawn of each: points, whether they are joined or dots, and the scale."""
+    made = spectrum(run, ["y"], None, None, 10.0, None, 1, "")
+    axes = made.pictures["spectrum"]().axes
+    drawn = {ax.get_ylabel(): [np.array(line.get_xydata()) for line in ax.lines] for ax in axes}
+    looks = [(ax.lines[0].get_linestyle(), ax.lines[0].get_marker(), ax.get_yscale()) for ax in axes]
+    tables = {name: np.array([list(row.values()) for row in rows]) for name, rows in made.tables.items()}
+    return spectra(run, ["y"]), tables, drawn, looks
+
+
+def test_the_picture_and_the_tables_of_a_driven_run_have_its_spectra_and_points(driven):
+    """Of the power, what is below 1e-12 of the highest line is left out, and on a logarithmic axis the mean at 0 Hz."""
+    found, tables, drawn, looks = spectra_drawn(driven)
+    density = np.column_stack(found.power["y"][:2])
+    assert np.array_equal(tables["power-y"][:, :2], density)
+    assert np.array_equal(tables["shock-spring"], np.column_stack(found.shock["spring"]))
+    assert np.array_equal(tables["poincare"], np.column_stack([found.points[0], found.points[1]]))
+    seen = density[1:][density[1:, 1] > 1e-12 * density[1:, 1].max()]
+    assert np.array_equal(drawn["largest acceleration [m/s²]"][0], np.column_stack(found.shock["spring"][:2]))
+    assert np.array_equal(drawn["power density [unit²/Hz]"][0], seen)
+    assert np.array_equal(drawn["velocity [m/s]"][0], found.points[1])
+    assert looks == [("-", "", "log"), ("--", "", "log"), ("None", ".", "linear")]
+
+
+def test_the_picture_of_a_sweep_has_half_the_range_by_frequency():
+    found, tables, drawn, looks = spectra_drawn(swept(6.0, 8.5, 2.0, 1e-2))
+    up, down = (np.column_stack([chirp.frequency, chirp.amplitude]) for chirp in found.responses["y"])
+    assert np.array_equal(tables["response-y-load-0"], up)
+    assert np.array_equal(tables["response-y-load-1"], down)
+    assert all(map(np.array_equal, drawn["half the range [unit]"], (up, down)))
+    assert looks[-1] == (":", "^", "linear")

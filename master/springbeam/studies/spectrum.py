@@ -39,7 +39,7 @@ def spectrum(
         times, points = found.points
         columns["poincare"] = {"time": times, "position": points[:, 0], "velocity": points[:, 1]}
     shocks = {f"shock at the {end}": np.transpose(s[:2]) for end, s in found.shock.items()}
-    powers = {f"power of {what}": np.transpose(p[:2])[1:] for what, p in found.power.items()}
+    powers = {f"power of {what}": np.transpose(p[:2]) for what, p in found.power.items()}
     powers = {name: points[points[:, 1] > _FLOOR * points[:, 1].max()] for name, points in powers.items()}
     answers = {f"{what} to load {load}, {c.way}": np.transpose(c[1:]) for (what, load), c in swept.items()}
     once = {} if found.points is None else {"points": found.points[1]}
