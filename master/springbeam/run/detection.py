@@ -244,7 +244,7 @@ class Detector:
             return step
         start = gap(step.start)
         end = gap(step.end)
-        if start[0] < 0.0 or end[0] < 0.0:
+        if start[0] < 0.0 or end[0] < 0.0 or no_dip(start, end, step.size, state.fastest):
             return step
         path = Path.through(start, end, step.size, gap.means(step.end, step.size))
         inside = path.lowest_inside()

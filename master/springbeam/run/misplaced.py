@@ -47,8 +47,7 @@ class Known(NamedTuple):
 
     def rows(self, *columns: np.ndarray) -> list[tuple[Any, ...]]:
         """Return the load and the values of ``columns`` of each step."""
-        loads = repeat(None, len(self.steps.size)) if self.loads is None else self.loads
-        return list(zip(loads, *(values.tolist() for values in columns), strict=True))
+        return list(zip(self.loads or repeat(None), *(values.tolist() for values in columns), strict=False))
 
     def stretches(self, apart: np.ndarray) -> Iterator[tuple[slice, bool]]:
         """Yield stretches of steps, and whether nothing acts in them: ends are ``apart``, no stroke, no load."""
