@@ -232,7 +232,7 @@ def test_a_peak_force_that_depends_on_the_mesh_is_told(factor, told):
 
     def doubt(window, **changes):
         with pair_of(with_changes(PAIR, **changes)) as pair:
-            return peak_force_doubt(pair, window)
+            return peak_force_doubt(pair, window, 0.0)
 
     window = factor * 2.5 * 2.0 * np.pi / (np.sqrt(12.0) * 10.0 * 50.0)
     said = doubt(window)

@@ -103,31 +103,50 @@ def test_a_pilot_that_stopped_early_is_not_returned_however_near_it_is(monkeypat
     np.testing.assert_allclose(sizes, sizes[0] / np.array([1.0, 2.0, 4.0, 1.0]), rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("exponent", "share"), [(1.0, 0.3), (1.5, 0.1), (1.5, 1.0), (2.0, 3.0), (3.0, 0.2), (3.0, 0.5)]
-)
-def test_two_runs_and_the_law_show_how_wrong_a_peak_force_is(exponent, share):
-    """A mass of 2 kg falls on a soft stop, in steps of which the window of its peak force is a ``share``."""
+def falling(exponent, share, steps):
+    """Return a mass that meets a soft stop after some macro steps, of which the window of its peak force is a share."""
     mass = 2.0
     stiffness = 1e6
     deep = (0.5 * mass * (exponent + 1.0) / stiffness) ** (1.0 / (exponent + 1.0))  # at 1 m/s
     omega = np.sqrt(exponent * stiffness * deep ** (exponent - 1.0) / mass)
     H = 0.02 * 2.0 * np.pi / omega / share
-    scene = as_scene(
+    return as_scene(
         {
-            "time": {"t_end": 1.3 * H + 4.0 / omega},
-            "beam": {"element": "point_mass", "mass": mass, "displacement": 1.3 * H, "velocity": -1.0},
+            "time": {"t_end": steps * H + 4.0 / omega},
+            "beam": {"element": "point_mass", "mass": mass, "displacement": steps * H, "velocity": -1.0},
             "stop": {"position": 0.0},
             "contact": {"law": "compliance", "stiffness": stiffness, "exponent": exponent},
+            "coupling": {"degree": 2, "macro_step": H},
         }
     )
-    fine = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": H / 16.0})).summary["contact_force_max"]
+
+
+@pytest.mark.parametrize(
+    ("exponent", "share"), [(1.0, 0.3), (1.5, 0.1), (1.5, 1.0), (2.0, 3.0), (3.0, 0.2), (3.0, 0.5)]
+)
+def test_two_runs_and_the_law_show_how_wrong_a_peak_force_is(exponent, share):
+    scene = falling(exponent, share, 1.3)
+    H = scene.coupling.H
+    fine = simulate(with_changes(scene, coupling={"macro_step": H / 16.0})).summary["contact_force_max"]
     for degree in (0, 1, 2):
         twice, run = (
             simulate(with_changes(scene, coupling={"degree": degree, "macro_step": size})) for size in (2.0 * H, H)
         )
         wrong = abs(run.summary["contact_force_max"] / fine - 1.0)
         assert wrong < max(3.0 * search._estimated(twice, run, 1e-3, {})[1]["force"], 1e-6)
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize("share", [0.1, 0.15, 0.4])
+@pytest.mark.parametrize("exponent", [1.0, 3.0])
+def test_a_peak_force_that_the_steps_miss_warns_though_the_motion_is_resolved(exponent, share, degree):
+    scene = with_changes(falling(exponent, share, 21.3), coupling={"degree": degree})
+    fine = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": scene.coupling.H / 16.0}))
+    run = simulate(scene)
+    wrong = abs(run.summary["contact_force_max"] / fine.summary["contact_force_max"] - 1.0)
+    said = "".join(run.summary["warnings"])
+    assert wrong < 0.07 or said.startswith(("not resolved", "the peak contact force may be"))
+    assert wrong > 0.03 or "the peak contact force may be" not in said
 
 
 @pytest.mark.parametrize("name", FOUND["alone"])

@@ -66,6 +66,10 @@ class Rows:
     def __getitem__(self, name: str) -> np.ndarray:
         return np.asarray(self._records[name][self._which])
 
+    def among(self, which: slice) -> Rows:
+        """Return ``which`` of them."""
+        return Rows(self._records, self._which[which])
+
 
 #: Records, or some of them.
 Records = np.ndarray | Rows

@@ -30,8 +30,10 @@ BENT = 1e-4
 SETTLED = 2.5
 #: Share of the slowest period over which the contact force is averaged.
 WINDOW = 0.02
-#: How every warning of a peak force that the mesh decides begins.
-MESH_DECIDES = "the peak contact force depends on the mesh"
+#: Largest error of the peak of a soft contact force, relative to it.
+PEAK_FORCE = 0.05
+#: How every warning of a peak force begins.
+PEAK_DOUBTED = "the peak contact force "
 #: How every warning of a run that is not resolved begins, and what that of its forces has.
 NOT_RESOLVED = "not resolved"
 LAW_MISSED = "the forces of the steps differ from the contact law"
@@ -157,18 +159,24 @@ def window_of(pair: Pair, omega: float) -> float:
     return WINDOW * (2.0 * pi / omega if omega > 0.0 else pair.setup.end)
 
 
-def peak_force_doubt(pair: Pair, window: float) -> str | None:
+def peak_force_doubt(pair: Pair, window: float, error: float) -> str | None:
     """Return why the peak contact force, a mean over ``window`` [s], is unreliable, and the remedy; else ``None``.
 
+    Under a soft law it is, if its relative ``error`` as of `springbeam.run.errors.peak` is larger than `PEAK_FORCE`.
     At a rigid impact the force at an instant grows with the mesh. Its mean over a window settles where the window is
     longer than `SETTLED` periods of the fastest wave kept (``docs/choose.md`` has the numbers).
     """
+    if error > PEAK_FORCE:
+        return (
+            f"{PEAK_DOUBTED}may be wrong by about {100.0 * error:.2g} %: the law's along the path of the ends differs "
+            f"from that of the steps; {_shorter(pair, sqrt(error / PEAK_FORCE))}{_higher(pair)}"
+        )
     meets = pair.setup.law is not None or pair.setup.floor is not None
     ringing = pair.upper.ringing if pair.law is None and meets else 0.0
     needed = SETTLED * 2.0 * pi / ringing if ringing > 0.0 else 0.0
     if window >= needed:
         return None
     return (
-        f"{MESH_DECIDES}: it is a mean over {window:.2g} s, and the contact is rigid. contact.force_window >= "
-        f"{1.05 * needed:.2g} s, more elements or more modes settle it"
+        f"{PEAK_DOUBTED}depends on the mesh: it is a mean over {window:.2g} s, and the contact is rigid. "
+        f"contact.force_window >= {1.05 * needed:.2g} s, more elements or more modes settle it"
     )

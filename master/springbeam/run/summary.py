@@ -11,6 +11,7 @@ from ..results.dense import inside
 from ..results.recording import Recorder
 from ..results.totals import totals
 from .contradictions import PLACES, contradictions
+from .errors.peak import peak_beside_law
 from .master import Master
 from .misplaced import misplaced
 from .observed import coarse_force, force_window, unknown
@@ -32,9 +33,12 @@ def summary(master: Master, recorder: Recorder) -> dict[str, Any]:
     places, between = inside(pair.law is None, steps, *PLACES) if len(steps) else ({}, 0.0)
     unresolved = why_not_resolved(pair, steps, displaced or 0.0, between)
     window = force_window(pair, steps)
-    warnings += filter(None, [unresolved or peak_force_doubt(pair, window), not_shown(scene, steps)])
-    warnings += filter(None, [unknown(pair), coarse_force(pair)])
     amounts = totals(scene, steps, events, window, places["u_tip"]) if len(steps) else {}
+    if pair.law is not None and amounts.get("contact_force_max"):
+        of_window = (amounts[f"contact_force_{name}"] for name in ("max", "window", "max_time"))
+        amounts["contact_force_max_error"] = peak_beside_law(pair.law, steps, *of_window)
+    doubt = peak_force_doubt(pair, window, amounts.get("contact_force_max_error", 0.0))
+    warnings += filter(None, [unresolved or doubt, not_shown(scene, steps), unknown(pair), coarse_force(pair)])
     ruled_out = contradictions(pair.setup, steps, events, amounts.get("contact_duration_total", 0.0), places)
     warnings += [f"not resolved: {what}: an event was missed; {_SHORTER}" for what in ruled_out]
     return {

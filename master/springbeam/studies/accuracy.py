@@ -17,7 +17,6 @@ import numpy as np
 
 from ..bodies.factory import load_bodies
 from ..bodies.protocol import Body
-from ..results.dense import at
 from ..results.trajectory import Trajectory
 from ..run import runner
 from ..run.ledger import CHANGED
@@ -39,8 +38,6 @@ _CONTACT_TURN = 2.0
 _WAVE_TURN = 3.0
 #: An estimate of the error is to be so many times smaller than the accuracy.
 _SAFETY = 1.5
-#: Number of samples of the law for its peak force along the path of the ends: in a window, and in a macro step.
-_IN_A_WINDOW, _IN_A_STEP = 100, 8
 #: The coupling's and IDA's relative tolerance over the accuracy.
 _TOLERANCE = 1e-3
 
@@ -199,7 +196,7 @@ def _with_own(errors: dict[str, float], run: Trajectory) -> dict[str, float]:
     """
     found = {**errors, "motion": max(errors["motion"], run.summary.get("misplaced_ends", 0.0))}
     if "force" in errors:
-        found["force"] = max(errors["force"], _peak_beside_law(run))
+        found["force"] = max(errors["force"], run.summary.get("contact_force_max_error", 0.0))
     return found
 
 
@@ -210,8 +207,8 @@ def _estimated(
 
     The order p is what this distance and that ``before`` show, 1 … 2; 1 where there is none. Times of contacts that
     agree better than at order 2 after those ``before`` may agree by chance: their error is that at order 2. Contacts
-    shorter than the share ``short`` of the run are no evidence. The error of a peak force is at least that of
-    `_peak_beside_law`.
+    shorter than the share ``short`` of the run are no evidence. The error of a peak force is at least that which a run
+    shows beside its law.
     """
     apart = _apart(coarse, fine, short)
     errors = {}
@@ -221,32 +218,6 @@ def _estimated(
         errors[name] = now / (2.0**order - 1.0)
     errors["times"] = max(errors["times"], before.get("times", 0.0) / 12.0)  # D/(2² − 1), and four times less
     return apart, _with_own(errors, fine)
-
-
-def _peak_beside_law(run: Trajectory) -> float:
-    """Return by how much the peak of a soft contact force differs from the law's along the path, relative to it.
-
-    Two runs whose steps are longer than the window of the peak may miss it alike: each takes it of polynomials over
-    steps. The path of the ends within steps has a higher order.
-    """
-    law = run.scene.soft_law
-    peak = float(run.summary.get("contact_force_max", 0.0))
-    if law is None or peak == 0.0:
-        return 0.0
-    window = float(run.summary["contact_force_window"])
-    begins = float(run.summary["contact_force_max_time"])
-    # Windows near it that lie in the run.
-    low = max(begins - window, float(run.time[0]))
-    high = min(begins + 2.0 * window, float(run.time[-1]))
-    points = max(_IN_A_WINDOW, math.ceil(_IN_A_STEP * window / run.scene.coupling.H))
-    times = np.linspace(low, high, math.ceil(points * (high - low) / window) + 1)
-    ends = at(run, times).columns
-    rates = ends.get("z", 0.0) - ends["v_tip"]
-    force = np.array([law.force(*there) for there in zip((-ends["gap"]).tolist(), rates.tolist(), strict=True)])
-    impulse = np.append(0.0, np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(times)))
-    starts = np.append(times[times < high - window], high - window)
-    found = float((np.interp(starts + window, times, impulse) - np.interp(starts, times, impulse)).max()) / window
-    return abs(found - peak) / max(found, peak)
 
 
 def _first(scene: Scene) -> float:

@@ -33,6 +33,11 @@ class StepRecords(NamedTuple):
         last = np.append(made[1:], len(records)) - 1
         return cls(Rows(records, made - 1), Rows(records, made), Rows(records, last), records["size"][made])
 
+    def among(self, which: slice) -> StepRecords:
+        """Return ``which`` of them."""
+        before, ends, last = (rows.among(which) for rows in (self.before, self.ends, self.last))
+        return StepRecords(before, ends, last, self.size[which])
+
     def parts(self, least: int, fastest: float) -> int:
         """Return in how many equal parts of each step, at least, waves up to ``fastest`` [rad/s] are seen."""
         return max(least, min(ceil(fastest * float(self.size.max()) / _TURN), _PARTS))

@@ -13,7 +13,7 @@ from ...monolithic import event_driven
 from ...results.trajectory import Trajectory
 from ...run.ledger import EXACT, bounds
 from ...run.outcome import RunStopped
-from ...run.resolution import MESH_DECIDES
+from ...run.resolution import PEAK_DOUBTED
 from ...run.runner import Simulation
 from ...scene import Scene, SceneError
 from ...scene.suspicions import suspicions
@@ -161,7 +161,7 @@ def judged(run: Trajectory, cause: str = "", reference: Reference | None = None)
 def warns(run: Trajectory) -> bool:
     """Return whether ``run`` is not resolved, or has a warning that its computation gave."""
     others = set(run.summary["warnings"]).difference(suspicions(run.scene))
-    return not run.summary["resolved"] or any(not text.startswith(MESH_DECIDES) for text in others)
+    return not run.summary["resolved"] or any(not text.startswith(PEAK_DOUBTED) for text in others)
 
 
 def _errors(run: Trajectory, reference: Reference, warned: bool) -> Row:
