@@ -30,7 +30,7 @@ _SETTLED = 1e-7
 ALIKE = 1e-12
 #: Shifts fit equally well whose mean squares differ by no more than this share.
 EQUAL = 0.01
-#: Half of the difference that gives a derivative by time, as a share of the run.
+#: Difference that gives a derivative by time, as a share of the run.
 _DIFFERENCE = 1e-6
 
 
@@ -217,26 +217,25 @@ def weighed(curves: Mapping[str, np.ndarray], measured: Measured, points: slice 
 
 def at_shift(run: Trajectory, measured: Measured, shift: float) -> Aligned:
     """Return ``run`` and the measurement with its clock shifted by ``shift`` [s]."""
-    begin = float(run.time[0])
-    end = float(run.time[-1])
     covered = measured.covered(run, shift)
     times = measured.time[covered] + shift
-    # A derivative is that of one side where a curve jumps. The value at an event is that after it.
-    half = _DIFFERENCE * run.scene.duration
+    # Derivatives are by what follows, up to the next event, where a curve may jump.
+    ahead = _DIFFERENCE * run.scene.duration
     events = np.array([event.time for event in run.events])
-    next_one = np.searchsorted(events, times, side="right")
-    before = np.maximum(times - half, np.append(begin, events)[next_one])
-    after = np.minimum(times + half, np.append(events - 1e-3 * half, end)[next_one])
-    width = after - before
-    here, earlier, later = (rows_at(run, several) for several in (times, before, after))
+    ends = np.append(events - 1e-3 * ahead, run.time[-1])
+    later = np.minimum(times + ahead, ends[np.searchsorted(events, times, side="right")])
+    width = later - times
+    here, after = (rows_at(run, several) for several in (times, later))
     off = {}
     slope = {}
     for what, values in measured.values.items():
         off[what] = np.full_like(values, np.nan)
         slope[what] = np.zeros_like(values)
-        off[what][covered] = signal(here, what) - values[covered]
-        change = signal(later, what) - signal(earlier, what)
-        slope[what][covered] = np.divide(change, width, where=width > 0.0, out=np.zeros_like(width))
+        found = signal(here, what)
+        off[what][covered] = found - values[covered]
+        slope[what][covered] = np.divide(
+            signal(after, what) - found, width, where=width != 0.0, out=np.zeros_like(width)
+        )
     return Aligned(shift, off, slope)
 
 

@@ -146,8 +146,8 @@ class Search:
         if key not in self._rows:
             near = self.row["shift"] if near is None else near
             quarter = 0.25 * self.period
-            lowest, highest = np.clip([near - quarter, near + quarter], *self._room).tolist()
-            self._rows[key] = self._trial(at, window(lowest, highest, self.part))
+            shifts = np.clip([near - quarter, near, near + quarter], *self._room).tolist()
+            self._rows[key] = self._trial(at, window(shifts, self.part))
         return self._rows[key]
 
     @property
@@ -269,9 +269,9 @@ class Search:
         return Minimum(self.at, shift, self.row, self.part, self.cost, left, slopes, self._weights, ended)
 
 
-def window(lowest: float, highest: float, part: slice) -> Row:
-    """Return what a case says of the clock: between which shifts [s] it is sought, and by which points."""
-    return {"between": (lowest, highest), "points": (part.start, part.stop)}
+def window(shifts: Sequence[float], part: slice) -> Row:
+    """Return what a case says of the clock: the lowest, a first and the highest shift [s], and which points count."""
+    return {"clock": shifts, "points": (part.start, part.stop)}
 
 
 def _newton(slopes: np.ndarray, left: np.ndarray) -> np.ndarray:

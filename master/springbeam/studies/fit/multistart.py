@@ -207,7 +207,7 @@ class MultiStart:
     def _changed(self, best: Minimum) -> dict[str, np.ndarray]:
         """Return what shorter steps change in the curves, 0 if the scene cannot be run with them."""
         shift = best.row[SHIFT]
-        finer = self._trial(self._keys(best) | window(shift, shift, best.part) | {"finer": True})
+        finer = self._trial(self._keys(best) | window((shift, shift, shift), best.part) | {"finer": True})
         if finer["error"]:
             finer = best.row
         return {

@@ -121,8 +121,9 @@ class Fit(Study):
 
         Beside the keys, a case says
 
-        * ``between``: two shifts of the clock [s] between which the best one is sought, by ``points``, from a number up
-          to another; without them it is sought anywhere, if it is not given;
+        * ``clock``: the lowest shift of the clock [s], that from which the best one is sought, and the highest;
+          ``points`` are those that count, from a number up to another. Without a clock it is sought anywhere, if it is
+          not given;
         * ``beside``: a shift, and how far from it [s] another one is sought at least;
         * ``step``: the macro step [s] that was picked for the accuracy of the scene, so that it is not picked again;
         * ``finer``: the run has shorter steps;
@@ -131,16 +132,16 @@ class Fit(Study):
         keys = {name: case[name] for name in self.ranges.ends}
         data = self.repeated if case.get("repeat") else self.data
         assert data is not None
-        anywhere = (-math.inf, math.inf) if self.shift is None else (self.shift, self.shift)
-        limits = case.get("between", anywhere)
+        anywhere = (-math.inf, 0.0, math.inf) if self.shift is None else (self.shift, self.shift, self.shift)
+        lowest, near, highest = case.get("clock", anywhere)
         try:
-            run = self._run(case, float(data.time[-1]) + limits[1])
+            run = self._run(case, float(data.time[-1]) + highest)
         except (RunStopped, SceneError) as refused:
             return {**keys, "error": str(refused)}
         begins: Row = {}
-        if "between" in case:
-            here = at_shift(run, data, 0.5 * sum(limits))
-            found = settled(run, data, here, slice(*case["points"]), limits)
+        if "clock" in case:
+            here = at_shift(run, data, near)
+            found = settled(run, data, here, slice(*case["points"]), (lowest, highest))
         else:
             found, begins = self._begun(run, data, case)
         left = {f"left_{name}": rms(off) for name, off in found.off.items()}
