@@ -14,7 +14,7 @@ from ..motion.paths import Path
 from .stepping import Pair
 
 #: Largest distance of an end from its position under the contact law, as a share of its motion, by degree of the force:
-#: a soft law, a tie. The estimate leaves out force errors of the fastest waves and effects of separations.
+#: a soft law, a tie. The estimate leaves out the fastest waves and events that are missed.
 MISPLACED = (0.006, 0.002, 0.0005)
 MISPLACED_TIED = (0.0025, 0.002, 0.001)
 #: Largest error of an end between the rows, as a share of its motion (`springbeam.results.dense.between_rows`): where
