@@ -318,13 +318,13 @@ def _crossing(
             inside = np.asarray(watch.function(s.motion(phase, piece.states)))
         return float(inside[-1]), float(END_SLOPE @ inside / piece.nodes[-1])
 
+    lowest = np.min(values)
+    if lowest > np.max(values) - lowest:  # a smooth minimum lies below the nodes by less than they vary
+        return None
     size = float(segment.nodes[-1])
     series = TO_LEGENDRE @ values
     series = legendre.legtrim(series, 0.1 * NOISE * np.max(np.abs(series)))
-    # Far above zero there is none: a smooth minimum lies below the nodes by less than they vary.
-    turns = np.empty(0) if np.min(values) > np.ptp(values) else _zeros(legendre.legder(series), size)
-    if not len(turns) and np.min(values) >= 0.0:
-        return None
+    turns = _zeros(legendre.legder(series), size)
     there = legendre.legval(2.0 * turns / size - 1.0, series)
     close = np.abs(there) <= _CLOSE * np.ptp(values)
     there[close] = [g(tau)[0] for tau in turns[close]]

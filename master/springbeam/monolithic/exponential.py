@@ -137,14 +137,15 @@ class LinearForm:
 
     def forces(self, ends: np.ndarray) -> np.ndarray:
         """Return R: forces (k, inputs) of ends that move as `ends_at` says."""
-        (u, y), (v, z) = np.swapaxes(ends, 1, 2)
-        found = []
-        spring = self.system.spring
+        (u, y), (v, z) = ends.swapaxes(1, 2)
+        found = np.empty((len(u), len(self.inputs)))
         if self.of_spring:
-            found.append(-self.damping * z - spring.cubic_stiffness * (y - spring.unloaded) ** 3)
+            spring = self.system.spring
+            stretched = y - spring.unloaded
+            found[:, 0] = -self.damping * z - spring.cubic_stiffness * (stretched * stretched * stretched)
         if self.of_law:
-            found.append(self.system.law.force(y - u, z - v))
-        return np.asarray(np.reshape(found, (len(found), len(u))).T)
+            found[:, -1] = self.system.law.force(y - u, z - v)
+        return found
 
     def _weights(self, size: float) -> tuple[StepWeights, np.ndarray, np.ndarray]:
         """Return the weights of a step, and what they make of r and of the constant.
@@ -168,7 +169,7 @@ class LinearForm:
         longest = loads.longest_step
         times = X[self.system.T] + np.array([0.0, longest][: 1 + (len(loads) > 0)])
         forces = r @ self.inputs + self.constant + loads.values(times) @ self.patterns
-        amplitudes = np.max([self.oscillators.amplitudes(xi, xi_dot, force) for force in forces], axis=0)
+        amplitudes = self.oscillators.amplitudes(xi, xi_dot, forces).max(axis=0)
         silent = NOISE * self.reach.max(initial=0.0) * max(np.linalg.norm(xi), amplitudes.max(initial=0.0))
         fastest = self.oscillators.rates[self.reach * amplitudes > silent].max(initial=0.0)
         return min(_STEP_PHASE / fastest if fastest > 0.0 else np.inf, longest)

@@ -95,9 +95,9 @@ class Oscillators:
         self.slow, self.fast = self._roots(_CRITICAL)
         #: |s₁| and |s₂| [1/s], (2p,).
         self.rates = np.abs(np.concatenate([self.slow, self.fast]))
-        apart = self.slow - self.fast
-        #: 1/(s₁ − s₂), and 1/ω²; 0 of a mode that nothing holds.
-        self._between = np.divide(1.0, apart, out=np.zeros_like(apart), where=apart != 0.0)
+        apart = np.tile(self.slow - self.fast, 2)
+        #: 1/(s₁ − s₂) where the root is none of a rest, (2p,), and 1/ω², (p,); 0 of a mode that nothing holds.
+        self._between = np.divide(1.0, apart, out=np.zeros_like(apart), where=(apart != 0.0) & (self.rates > 0.0))
         self._compliance = np.divide(1.0, omega2, out=np.zeros_like(omega2), where=omega2 != 0.0)
 
     def _roots(self, apart: float) -> tuple[np.ndarray, np.ndarray]:
@@ -131,7 +131,7 @@ class Oscillators:
         if np.any(near):
             oscillators = Oscillators(self.omega2[near], self.c[near])
             kernels = oscillators.kernels(_KERNEL.nodes * size)
-            force[..., near] = [_CONVOLUTIONS[at] * size @ kernel for kernel in kernels]
+            force[..., near] = [_CONVOLUTIONS[at] @ (size * kernel) for kernel in kernels]
         if not np.all(near):
             far = ~near
             slow = self.slow[far]
@@ -143,11 +143,11 @@ class Oscillators:
         start = np.array([[S_dot + self.c * S, S], [-self.omega2 * S, S_dot]])
         return StepWeights(start, force)
 
-    def amplitudes(self, xi: np.ndarray, xi_dot: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Return the amplitudes at ``rates`` of the free motion about equilibrium under ``force``, (2p,)."""
-        off = xi - force * self._compliance
-        both = np.concatenate([xi_dot - self.fast * off, self.slow * off - xi_dot])
-        return np.where(self.rates > 0.0, np.abs(both * np.tile(self._between, 2)), 0.0)
+    def amplitudes(self, xi: np.ndarray, xi_dot: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        """Return the amplitudes at ``rates`` of the free motion about equilibrium under ``forces``, (k, p): (k, 2p)."""
+        off = xi - forces * self._compliance
+        both = np.concatenate([xi_dot - self.fast * off, self.slow * off - xi_dot], axis=1)
+        return np.asarray(np.abs(both * self._between))
 
 
 def _convolve(s: np.ndarray, size: float, at: slice) -> np.ndarray:
@@ -157,13 +157,12 @@ def _convolve(s: np.ndarray, size: float, at: slice) -> np.ndarray:
     |z| is large; elsewhere the exponential is interpolated.
     """
     z = size * s
+    c = TARGETS[at]
     slow = np.abs(z) <= _SLOW
     fast = z[~slow]
-    start, *ends = (
-        np.tensordot(GAUSS.lagrange(c + _DECAY[:, None] / fast), _DECAY_WEIGHTS, ([0], [0])).T
-        for c in (0.0, *TARGETS[at])
-    )
-    convolved = np.empty((len(ends), STAGES, len(s)), complex)
-    convolved[..., slow] = _CONVOLUTIONS[at] * size @ np.exp(_KERNEL.nodes[:, None] * z[slow])
-    convolved[..., ~slow] = (np.exp(TARGETS[at, None, None] * fast) * start - ends) / s[~slow]
+    ahead = GAUSS.lagrange(np.append(0.0, c)[:, None, None] + _DECAY[:, None] / fast)
+    start, *ends = np.swapaxes(np.tensordot(ahead, _DECAY_WEIGHTS, ([1], [0])), 1, 2)
+    convolved = np.empty((len(c), STAGES, len(s)), complex)
+    convolved[..., slow] = _CONVOLUTIONS[at] @ (size * np.exp(_KERNEL.nodes[:, None] * z[slow]))
+    convolved[..., ~slow] = (np.exp(c[:, None, None] * fast) * start - ends) / s[~slow]
     return convolved

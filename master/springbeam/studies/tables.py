@@ -109,11 +109,12 @@ def write_parquet(path: Path, rows: Sequence[Row]) -> Path:
     if rows:
         lines = [to_json(row, inf_nan_mode="constants", fallback=lambda value: value.tolist()) for row in rows]
         names = _names(rows)
-        texts = [name for name in names if any(isinstance(row.get(name), str) for row in rows)]
-        as_given = pa.json.ParseOptions(explicit_schema=pa.schema([(name, pa.string()) for name in texts]))
+        given = {name: [row[name] for row in rows if row.get(name) is not None] for name in names}
+        texts = [(name, pa.string()) for name in names if any(isinstance(value, str) for value in given[name])]
+        empty = [(name, pa.float64()) for name in names if not given[name]]
+        as_given = pa.json.ParseOptions(explicit_schema=pa.schema([*texts, *empty]))
         found = pa.json.read_json(BytesIO(b"\n".join(lines)), parse_options=as_given).select(names)
-    fields = [field.with_type(pa.float64()) if pa.types.is_null(field.type) else field for field in found.schema]
-    pa.parquet.write_table(found.cast(pa.schema(fields)), path)
+    pa.parquet.write_table(found, path)
     return path
 
 
