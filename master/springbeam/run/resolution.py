@@ -17,7 +17,7 @@ from .stepping import Pair
 #: a soft law, a tie. The estimate leaves out the fastest waves and events that are missed.
 MISPLACED = (0.006, 0.002, 0.0005)
 MISPLACED_TIED = (0.0025, 0.002, 0.001)
-#: Largest error of an end between the rows, as a share of its motion (`springbeam.results.dense.between_rows`): where
+#: Largest error of an end between the rows, as a share of its motion (`springbeam.results.dense.inside`): where
 #: waves turn by more than 2π in a step, up to half of the error.
 BETWEEN_ROWS = 0.005
 #: Largest lag of waves at the end of the run by a body's own integrator [rad]: of the fastest ones that an impact
