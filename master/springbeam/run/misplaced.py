@@ -29,6 +29,8 @@ from .stepping import Pair
 HELD = 1e-9
 #: Relative error of an end from which on nothing more can be learnt.
 _LOST = 1e3
+#: A contact that turns by more than √(2 × this) [rad] in a part of a step is not followed by a cubic.
+_FOLLOWED = 1.0
 #: A gap inside a step, or what a load adds, that is this share of the motion of an end does not count.
 _QUIET = 1e-8
 #: Most steps whose terms are moved at once, to bound the memory.
@@ -84,8 +86,9 @@ def misplaced(pair: Pair, records: np.ndarray, events: Sequence[Event]) -> float
     per_mass = made * ends.per_mass if ends.per_mass > 0.0 else np.zeros(len(made))  # of a wall ∞, and no mass
     run = Known(steps, ends, per_mass, events, strokes(pair.interface, steps, events), by_loads)
     degree = pair.joined.degree
-    fastest = _fastest(pair, records, ends)
-    parts = steps.parts(1 if degree == 0 else 2, fastest)  # a force of a higher degree has the law's mean over a step
+    fastest = float(np.abs(ends.terms.rates.imag).max(initial=0.0))
+    # A force of a higher degree has the law's mean over a step.
+    parts = steps.parts(1 if degree == 0 else 2, fastest, _in_contact(pair, records, ends))
     if pair.law is not None:
         errors = _under_forces(run, defect_of_law(pair.law, steps, parts))
     elif upper.massless:
@@ -100,13 +103,12 @@ def misplaced(pair: Pair, records: np.ndarray, events: Sequence[Event]) -> float
     return found
 
 
-def _fastest(pair: Pair, records: np.ndarray, ends: Ends) -> float:
-    """Return the frequency of the fastest wave of the upper body, or of both ends in a soft contact [rad/s]."""
-    waves = float(np.abs(ends.terms.rates.imag).max(initial=0.0))
+def _in_contact(pair: Pair, records: np.ndarray, ends: Ends) -> float:
+    """Return the frequency of both ends where a soft contact is deepest [rad/s]; 0 without one."""
     if pair.law is None:
-        return waves
+        return 0.0
     deepest = float((records["y_after"] - records["u_tip_after"]).max())
-    return max(waves, sqrt(pair.law.slope(deepest) * (ends.mobility + ends.per_mass)))
+    return sqrt(pair.law.slope(deepest) * (ends.mobility + ends.per_mass))
 
 
 def _under_forces(run: Known, defect: np.ndarray) -> Iterator[tuple[float, float]]:
@@ -119,16 +121,37 @@ def _under_forces(run: Known, defect: np.ndarray) -> Iterator[tuple[float, float
             yield ends.fly(run.steps.size[some], run.stiffness[some])
             continue
         for load, H, k, of_parts, *stroke in rows[some]:
-            for missed, early, stiffer, rate in of_parts:
-                demanded = missed + (0.5 * stiffer - rate / H) * (ends.y - ends.u)
-                follows = 0.5 * stiffer + rate / H
-                apart, gives = ends.drift(H, k, ends.per_mass, 0.5 * H * H * (early - missed))
-                ends.act((demanded + follows * apart) / (1.0 + follows * gives))
+            for part in of_parts:
+                _over_a_part(ends, H, k, *part)
                 yield ends.u, ends.y
             if load is not None:
                 ends.add(*load)
             ends.rebound(*stroke)
             yield ends.u, ends.y
+
+
+def _over_a_part(ends: Ends, H: float, k: float, *means: float) -> None:
+    """Advance ``ends`` by ``H`` [s] under a demand with ``means`` as of `springbeam.run.errors.soft`."""
+    missed, stiffness, damping, missed_early, stiffness_early, damping_early = means
+    before = ends.y - ends.u
+    rate = ends.z - ends.v
+    # First as if the misplacement grew linearly.
+    follows = 0.5 * stiffness + damping / H
+    apart, gives = ends.drift(H, k, ends.per_mass, 0.5 * H * H * (missed_early - missed))
+    C = (missed + (0.5 * stiffness - damping / H) * before + follows * apart) / (1.0 + follows * gives)
+    ends.act(C)
+    if stiffness * gives > _FOLLOWED:
+        return
+    # Then as the cubic through both ends of the part, under a demand that changes linearly.
+    grown = ends.y - ends.u - before
+    faster = ends.z - ends.v - rate
+    mean = before + 0.5 * grown - H * faster / 12.0
+    tilt = grown / 10.0 - H * (2.0 * rate + faster) / 120.0
+    stiffer = 6.0 * (stiffness - stiffness_early)
+    damped = 6.0 * (damping - damping_early)
+    evenly = missed + stiffness * mean + stiffer * tilt + damping * grown / H + damped * faster / 12.0
+    early = -2.0 * stiffness * tilt - (stiffer * mean + damping * faster + damped * grown / H) / 6.0
+    ends.act(evenly - C, 0.5 * H * H * early)
 
 
 def _under_ties(run: Known, parts: int, alone: bool, quiet: float) -> Iterator[tuple[float, float]]:

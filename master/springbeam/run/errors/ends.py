@@ -85,15 +85,14 @@ class Ends:
         """
         self._settle()
         moved, at_end, self._added, self._by_force, by_shift = self._moves(H)
-        self._due = [0.0, 0.0, shift]
-        u, v = at_end.dot(self._pairs).tolist()
+        self._due = [0.0, 0.0, 0.0]
+        self.u, self.v = at_end.dot(self._pairs).tolist()
         self._values *= moved
-        self.u = u + shift * by_shift[0]
-        self.v = v + shift * by_shift[1]
-        self.y -= shift * per_mass
+        self._by_shift = *by_shift, per_mass
         half = 0.5 * H
         faster = H * self._swing(H, stiffness) * per_mass
         self._lower = half * faster, faster
+        self.act(0.0, shift)
         return self.y - self.u, self._by_force[0] + half * faster
 
     def _settle(self) -> None:
@@ -127,12 +126,14 @@ class Ends:
             heights.append(abs(self.y))
         return float(np.abs((moved @ self.terms.shown[0]).real).max()), max(heights)
 
-    def act(self, C: float) -> None:
-        """Let the mean force ``C`` [N] act over the step of the last `drift`, too."""
+    def act(self, C: float, shift: float = 0.0) -> None:
+        """Let the mean force ``C`` [N] act over the step of the last `drift`, too, and a ``shift`` [N·s²] as there."""
         self._due[0] += C
-        self.u += C * self._by_force[0]
-        self.v += C * self._by_force[1]
-        self.y -= C * self._lower[0]
+        self._due[2] += shift
+        u, v, y = self._by_shift
+        self.u += C * self._by_force[0] + shift * u
+        self.v += C * self._by_force[1] + shift * v
+        self.y -= C * self._lower[0] + shift * y
         self.z -= C * self._lower[1]
 
     def add(self, terms: np.ndarray, u: float, v: float, y: float, z: float) -> None:

@@ -16,6 +16,8 @@ from ...results.records import Rows
 #: coefficients.
 _TURN = 1.5
 _PARTS = 6
+#: The largest angle of a soft contact [rad]: it reverses what it finds misplaced, a difference of large numbers.
+_CONTACT_TURN = 0.4
 
 
 class StepRecords(NamedTuple):
@@ -38,9 +40,13 @@ class StepRecords(NamedTuple):
         before, ends, last = (rows.among(which) for rows in (self.before, self.ends, self.last))
         return StepRecords(before, ends, last, self.size[which])
 
-    def parts(self, least: int, fastest: float) -> int:
-        """Return in how many equal parts of each step, at least, waves up to ``fastest`` [rad/s] are seen."""
-        return max(least, min(ceil(fastest * float(self.size.max()) / _TURN), _PARTS))
+    def parts(self, least: int, fastest: float, contact: float = 0.0) -> int:
+        """Return in how many equal parts of each step, at least, waves up to ``fastest`` [rad/s] are seen.
+
+        ``contact`` is the frequency of the ends in a soft contact [rad/s].
+        """
+        turns = max(fastest / _TURN, contact / _CONTACT_TURN)
+        return max(least, min(ceil(turns * float(self.size.max())), _PARTS))
 
     def ended_by(self, kind: EventKind, events: Sequence[Event]) -> np.ndarray:
         """Return the number of the step that each of the ``events`` of a ``kind`` ends, but those of the start."""

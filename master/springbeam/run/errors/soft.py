@@ -36,25 +36,25 @@ def defect_of_tip(tip: Body, steps: StepRecords, parts: int) -> np.ndarray:
 
 
 def _defect(demand: _Demand, path: Any, steps: StepRecords, parts: int, kinks: dict[int, list[float]]) -> np.ndarray:
-    """Return four means over equal parts of each step, (n, parts, 4).
+    """Return six means over equal parts of each step, (n, parts, 6).
 
-    They are the demanded force beyond that of the step, once evenly weighted and once by 2 (1 − s), s the
-    share of the part [N], and how it grows with the penetration [N/m] and with its rate [N·s/m]. ``kinks`` are the
-    shares of steps at which the demand is not smooth: quadrature goes from one to the next.
+    They are the demanded force beyond that of the step [N], and how it grows with the penetration [N/m] and with its
+    rate [N·s/m]; then the same weighted by 2 (1 − s), s the share of the part. ``kinks`` are the shares of steps at
+    which the demand is not smooth: quadrature goes from one to the next.
     """
-    found = np.zeros((len(steps.size), parts, 4))
+    found = np.zeros((len(steps.size), parts, 6))
     step, part, low, high = _stretches(len(steps.size), parts, kinks)
     size = steps.size[step]
     applied = {name: steps.ends[name][step] for name in FORCE_COLUMNS}
     path = path[:, step]
     slope = derivative(path)
-    means = np.zeros((4, len(step)))
+    means = np.zeros((6, len(step)))
     for at, share in _INSIDE:
         s = low + at * (high - low)
         demanded, *grows = demand(step, value(path, s), value(slope, s) / size)
-        beyond = demanded - force(applied, s * size)
+        each = np.array([demanded - force(applied, s * size), *grows])
         left = 1.0 - (s * parts - part)
-        means += share * np.array([beyond, 2.0 * left * beyond, *grows])
+        means += share * np.concatenate([each, 2.0 * left * each])
     np.add.at(found, (step, part), (means * (high - low) * parts).T)
     return found
 
