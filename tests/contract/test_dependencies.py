@@ -129,6 +129,11 @@ def test_a_direction_is_the_sum_of_its_inputs(case):
     (found,) = k.partials([output], *names, seed=(2.0, -3.0))
     a, b = (k.partials([output], name)[0] for name in names)
     assert found == 2.0 * a - 3.0 * b != 0.0
+    result = (ct.c_double * 1)(7.0)  # FMPy gives zeros, importers anything
+    seed = (ct.c_double * 1)(1.0)
+    arrays = (case.references(output), 1, case.references(names[0]), 1, seed, *k.counted(1), result, *k.counted(1))
+    assert k.call("GetDirectionalDerivative", *arrays) == 0
+    assert result[0] == a
 
 
 def test_derivatives_at_a_limit_of_a_parameter_are_one_sided(beam):
