@@ -299,3 +299,17 @@ def test_memory_is_flat_over_many_instances(case):
 def test_every_output_is_real(case):
     """Tools that read all outputs by one call for reals could not load them otherwise."""
     assert {case.variables[name].type for name in case.named("output")} <= {"Real", "Float64"}
+
+
+@pytest.mark.parametrize("version", ["2.0"])
+def test_there_is_no_variable_after_the_last_one(case):
+    k = case.running()
+    beyond = 1 + max(variable.valueReference for variable in case.variables.values())
+    assert k.access("GetFloat64", (ct.c_uint * 1)(beyond), 1, (ct.c_double * 1)()) == ERROR
+    assert f"value reference {beyond} does not exist" in k.message
+
+
+def test_a_start_value_is_known_before_initialization(spring):
+    k = spring.instance()
+    k.set("displacement", 0.25)
+    assert k.get("displacement") == 0.25
