@@ -164,3 +164,14 @@ def test_a_state_saved_in_event_mode_is_one_between_steps_where_there_is_no_even
     plain.restore(plain.deserialized(k.serialized()))
     assert plain.outputs() == k.outputs()
     plain.step(0.1, 0.1)
+
+
+def test_event_mode_takes_inputs_and_no_parameters(spring):
+    """An input acts after an update, too."""
+    k = spring.instance(events=True).start(mass=2.0)
+    k.set("contact_force", 3.0)
+    flags = [ct.byref(ct.c_bool(True)) for _ in range(5)]
+    assert k.call("UpdateDiscreteStates", *flags, ct.byref(ct.c_double())) == OK, k.message
+    assert k.get("acceleration") == -1.5
+    assert k.access("SetFloat64", spring.references("mass"), 1, (ct.c_double * 1)(4.0)) != OK
+    assert "'mass' can only be set before the end of initialization mode" in k.message
