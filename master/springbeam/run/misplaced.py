@@ -29,9 +29,8 @@ from .stepping import Pair
 HELD = 1e-9
 #: Relative error of an end from which on nothing more can be learnt.
 _LOST = 1e3
-#: A contact that turns by √(2 × x) [rad] in a part of a step is followed by a cubic if x is between these: a line does
-#: for slower ones, and faster ones are not seen.
-_SLOW, _FAST = 0.005, 1.0
+#: A contact that turns by more than √(2 × this) [rad] in a part of a step is not followed by a cubic.
+_FOLLOWED = 1.0
 #: A gap inside a step, or what a load adds, that is this share of the motion of an end does not count.
 _QUIET = 1e-8
 #: Most steps whose terms are moved at once, to bound the memory.
@@ -141,7 +140,7 @@ def _over_a_part(ends: Ends, H: float, k: float, *means: float) -> None:
     apart, gives = ends.drift(H, k, ends.per_mass, 0.5 * H * H * (missed_early - missed))
     C = (missed + (0.5 * stiffness - damping / H) * before + follows * apart) / (1.0 + follows * gives)
     ends.act(C)
-    if not _SLOW < stiffness * gives < _FAST:
+    if stiffness * gives > _FOLLOWED:
         return
     # Then as the cubic through both ends of the part, under a demand that changes linearly.
     grown = ends.y - ends.u - before
