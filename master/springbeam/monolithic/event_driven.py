@@ -74,8 +74,10 @@ def integrate(
         Times of the rows [s], as far as they lie in the run. Default: multiples of ``coupling.macro_step`` from the
         start (1000 of them where the scene gives tolerances instead), and a row before and after each event.
     velocity_perturbation
-        Added to ``initial_velocity_slope`` [1/s], or to the spring's initial velocity [m/s] without a beam that has
-        inertia: two runs that differ by it show how long a trajectory can be compared at all.
+        Added to ``initial_velocity_slope`` [1/s], with the sign changed in every second mode, or to the spring's
+        initial velocity [m/s] without a beam that has inertia: two runs that differ by it show how long a trajectory
+        can be compared at all. All modes in proportion would move no event of a motion without a scale, as that of a
+        beam on a stop at its rest.
     t_end
         Ends the run earlier than the scene does [s].
     time_limit
@@ -238,7 +240,8 @@ def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
             time = scene.contact_time
             slope = scene.tip_target.value / scene.beam.length
         x[: s.r] = slope * s.beam.slope_shape
-        x_dot[: s.r] = (rate + perturbation * inertia) * s.beam.slope_shape
+        alternating = (-1.0) ** np.arange(s.r)
+        x_dot[: s.r] = (rate + perturbation * inertia * alternating) * s.beam.slope_shape
         if scene.beam.approach == "elastic":
             s.synchronise(ReferencePhase("free"), X)
     X[s.T] = time
