@@ -248,6 +248,12 @@ class Fmu:
         reported()
         return reported
 
+    def write(self, values: Mapping[str, float]) -> None:
+        """Set real inputs by name, between two steps."""
+        kind = self._slave.REAL
+        setter = getattr(self._slave, f"set{kind}")
+        self._asked(f"cannot set {', '.join(values)}", setter, self._references([*values], kind), [*values.values()])
+
     def advancing(
         self, inputs: Sequence[str], impulse: Sequence[str], slopes: int, outputs: Sequence[str], always: bool
     ) -> tuple[Call, Any, Any]:

@@ -439,6 +439,10 @@ class FmuBeam(OwnBody):
             return _MEAN * beam.length * sum(map(abs, load.shape or (1.0,)))
         return 1.0
 
+    def start_under(self, contact: float) -> None:
+        values, _ = self._loads
+        self.fmu.write({"tip_force": contact, **dict(zip(self._shares, values, strict=True))})
+
     def inner_forces(self) -> InnerForces:
         return made_of(InnerForces, self._inner_forces())
 

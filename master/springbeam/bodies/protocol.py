@@ -307,6 +307,12 @@ class Body:
         Units are N, N/m or, for the base, m/s².
         """
 
+    def start_under(self, contact: float) -> None:
+        """Receive, before the first step, the contact force C [N] at the start, which acts there with the loads.
+
+        Acceleration and inner forces of the start depend on it.
+        """
+
     def load_on_end(self) -> Force:
         """Return these loads as an upward force on the end [N], which the foundation bears while the body is seated."""
         return NO_FORCE

@@ -172,6 +172,9 @@ class Master:
         state = self.state
         pair = self.pair
         start = pair.ends()
+        if pair.loads.any or state.contact[0] != 0.0:
+            pair.loads.act(state.time, SAME * self.controller.size)  # as at an instant
+            pair.upper.start_under(state.contact[0])
         step = Step(state.time, 0.0, NO_FORCE, NO_FORCE, start, start)
         # The ledger starts with the bodies as they arrive, before an impact.
         arriving = np.frombuffer(self._packed(step, start, state.present), STEP)
