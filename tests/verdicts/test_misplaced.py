@@ -193,7 +193,8 @@ def test_a_force_that_falls_through_zero_moves_a_mode(damping, H):
     rates[0, 1] = rates[2, 3] = 1.0
     rates[1] = -0.16, -damping, 1.5, 0.0
     at_end = expm(H * rates) @ [0.0, 0.0, 6.0 / H**2, -12.0 / H**3]
-    ends.drift(H, 0.0, 0.0, 1.0)
+    ends.drift(H, 0.0, 0.0)
+    ends.act(0.0, 1.0)
     assert [ends.u, ends.v] == pytest.approx(1.5 * at_end[:2], rel=1e-5)
     ends.drift(0.7, 0.0, 0.0)
     assert [ends.u, ends.v] == pytest.approx(1.5 * (expm(0.7 * rates[:2, :2]) @ at_end[:2]), rel=1e-5)
@@ -210,7 +211,8 @@ def test_ends_that_meet_later_and_part_at_once_are_as_far_off_as_exact_ones():
 
     met = (4.0 - np.sqrt(6.0)) / 5.0
     ends = Ends((np.array([0.0]), np.array([0.0]), np.array([2.0**-0.5])), 3.0, 0.0, 1.0)
-    ends.drift(1e-9, 0.0, ends.per_mass, 2.0)  # which lifts the tip by 1 m, and presses the other mass by 2/3 m
+    ends.drift(1e-9, 0.0, ends.per_mass)
+    ends.act(0.0, 2.0)  # which lifts the tip by 1 m, and presses the other mass by 2/3 m
     ends.y = 0.0
     ends.drift(met, 0.0, ends.per_mass)
     ends.bounce(np.sqrt(6.0), 5.0, ends.per_mass)

@@ -131,27 +131,40 @@ def _under_forces(run: Known, defect: np.ndarray) -> Iterator[tuple[float, float
 
 
 def _over_a_part(ends: Ends, H: float, k: float, *means: float) -> None:
-    """Advance ``ends`` by ``H`` [s] under a demand with ``means`` as of `springbeam.run.errors.soft`."""
+    """Advance ``ends`` by ``H`` [s] under a demand with ``means`` as of `springbeam.run.errors.soft`.
+
+    The misplacement is the cubic through both ends of the part, and the demand grows with it linearly in time: of the
+    fourth order, and symmetric in time, so that a lasting contact neither amplifies nor damps it. In a part in which
+    the contact turns by more than `_FOLLOWED` says it is a line.
+    """
     missed, stiffness, damping, missed_early, stiffness_early, damping_early = means
-    before = ends.y - ends.u
+    apart = ends.y - ends.u
     rate = ends.z - ends.v
-    # First as if the misplacement grew linearly.
-    follows = 0.5 * stiffness + damping / H
-    apart, gives = ends.drift(H, k, ends.per_mass, 0.5 * H * H * (missed_early - missed))
-    C = (missed + (0.5 * stiffness - damping / H) * before + follows * apart) / (1.0 + follows * gives)
-    ends.act(C)
+    _, gives = ends.drift(H, k, ends.per_mass)
+    half = 0.5 * H * H
+    shift = half * (missed_early - missed)
     if stiffness * gives > _FOLLOWED:
+        follows = 0.5 * stiffness + damping / H
+        ends.follow((missed + (0.5 * stiffness - damping / H) * apart, follows, 0.0), (shift, 0.0, 0.0))
         return
-    # Then as the cubic through both ends of the part, under a demand that changes linearly.
-    grown = ends.y - ends.u - before
-    faster = ends.z - ends.v - rate
-    mean = before + 0.5 * grown - H * faster / 12.0
-    tilt = grown / 10.0 - H * (2.0 * rate + faster) / 120.0
+    # ∫ x ds and ∫ (s − 1/2) x ds of the cubic, by the misplacement and its rate at its beginning; of its end the rate
+    # has the other sign in the first, the misplacement in the second.
+    mean = 0.5 * apart + H * rate / 12.0
+    tilt = -apart / 10.0 - H * rate / 120.0
     stiffer = 6.0 * (stiffness - stiffness_early)
     damped = 6.0 * (damping - damping_early)
-    evenly = missed + stiffness * mean + stiffer * tilt + damping * grown / H + damped * faster / 12.0
-    early = -2.0 * stiffness * tilt - (stiffer * mean + damping * faster + damped * grown / H) / 6.0
-    ends.act(evenly - C, 0.5 * H * H * early)
+    ends.follow(
+        (
+            missed + stiffness * mean + stiffer * tilt - damping * apart / H - damped * rate / 12.0,
+            0.5 * stiffness + stiffer / 10.0 + damping / H,
+            -H * (stiffness / 12.0 + stiffer / 120.0) + damped / 12.0,
+        ),
+        (
+            shift - half * (2.0 * stiffness * tilt + (stiffer * mean - damping * rate - damped * apart / H) / 6.0),
+            -half * (stiffness / 5.0 + (0.5 * stiffer + damped / H) / 6.0),
+            half * (H * stiffness / 60.0 + (H * stiffer / 12.0 - damping) / 6.0),
+        ),
+    )
 
 
 def _under_ties(run: Known, parts: int, alone: bool, quiet: float) -> Iterator[tuple[float, float]]:

@@ -76,12 +76,11 @@ class Ends:
         self._due = [0.0, 0.0, 0.0]
         self._added = np.zeros((3, len(self._pairs)))
 
-    def drift(self, H: float, stiffness: float, per_mass: float, shift: float = 0.0) -> tuple[float, float]:
+    def drift(self, H: float, stiffness: float, per_mass: float) -> tuple[float, float]:
         """Advance by ``H`` [s] without a force, the lower end by the midpoint rule.
 
-        Return y − u at the end [m], and by how much `act` with 1 N reduces it. ``shift`` [N·s²] moves free masses
-        besides. ``stiffness`` is the spring's over its mass [1/s²], ``per_mass`` that of the lower end [1/kg], 0 while
-        the foundation holds it.
+        Return y − u at the end [m], and by how much `act` with 1 N reduces it. ``stiffness`` is the spring's over its
+        mass [1/s²], ``per_mass`` that of the lower end [1/kg], 0 while the foundation holds it.
         """
         self._settle()
         moved, at_end, self._added, self._by_force, by_shift = self._moves(H)
@@ -92,7 +91,6 @@ class Ends:
         half = 0.5 * H
         faster = H * self._swing(H, stiffness) * per_mass
         self._lower = half * faster, faster
-        self.act(0.0, shift)
         return self.y - self.u, self._by_force[0] + half * faster
 
     def _settle(self) -> None:
@@ -127,7 +125,10 @@ class Ends:
         return float(np.abs((moved @ self.terms.shown[0]).real).max()), max(heights)
 
     def act(self, C: float, shift: float = 0.0) -> None:
-        """Let the mean force ``C`` [N] act over the step of the last `drift`, too, and a ``shift`` [N·s²] as there."""
+        """Let the mean force ``C`` [N] act over the step of the last `drift`, too.
+
+        A ``shift`` [N·s²] moves free masses besides, as a force does that acts early.
+        """
         self._due[0] += C
         self._due[2] += shift
         u, v, y = self._by_shift
@@ -135,6 +136,25 @@ class Ends:
         self.v += C * self._by_force[1] + shift * v
         self.y -= C * self._lower[0] + shift * y
         self.z -= C * self._lower[1]
+
+    def follow(self, force: tuple[float, float, float], shift: tuple[float, float, float]) -> None:
+        """Let a mean ``force`` [N] and a ``shift`` [N·s²] act as by `act`, which depend on what they lead to.
+
+        Each is given by what it is without y − u and z − v at the end of the step, and by how it grows with these.
+        """
+        by_force = self._by_force[0] + self._lower[0], self._by_force[1] + self._lower[1]
+        by_shift = self._by_shift[0] + self._by_shift[2], self._by_shift[1]
+        apart = self.y - self.u
+        rate = self.z - self.v
+        (C, by_apart, by_rate), (jump, jump_by_apart, jump_by_rate) = force, shift
+        C += by_apart * apart + by_rate * rate
+        jump += jump_by_apart * apart + jump_by_rate * rate
+        # Both reduce what they depend on: two linear equations.
+        a = 1.0 + by_apart * by_force[0] + by_rate * by_force[1]
+        b = by_apart * by_shift[0] + by_rate * by_shift[1]
+        c = jump_by_apart * by_force[0] + jump_by_rate * by_force[1]
+        d = 1.0 + jump_by_apart * by_shift[0] + jump_by_rate * by_shift[1]
+        self.act((d * C - b * jump) / (a * d - b * c), (a * jump - c * C) / (a * d - b * c))
 
     def add(self, terms: np.ndarray, u: float, v: float, y: float, z: float) -> None:
         """Add what something else does over the step of the last `drift`."""

@@ -17,7 +17,7 @@ from ...results.records import Rows
 _TURN = 1.5
 _PARTS = 6
 #: The largest angle of a soft contact [rad]: it reverses what it finds misplaced, a difference of large numbers.
-_CONTACT_TURN = 0.4
+_CONTACT_TURN = 0.2
 
 
 class StepRecords(NamedTuple):
