@@ -146,7 +146,8 @@ class Ends:
         by_shift = self._by_shift[0] + self._by_shift[2], self._by_shift[1]
         apart = self.y - self.u
         rate = self.z - self.v
-        (C, by_apart, by_rate), (jump, jump_by_apart, jump_by_rate) = force, shift
+        C, by_apart, by_rate = force
+        jump, jump_by_apart, jump_by_rate = shift
         C += by_apart * apart + by_rate * rate
         jump += jump_by_apart * apart + jump_by_rate * rate
         # Both reduce what they depend on: two linear equations.

@@ -11,8 +11,11 @@ from ...motion.paths import derivative, value
 from ...scene.laws import SoftLaw
 from .records import StepRecords, penetration
 
-#: Number of samples of the law in a window, and in a step, and the most of all.
-_IN_A_WINDOW, _IN_A_STEP, _MOST = 100, 8, 10_000
+#: Number of samples of the law in a window, and in a step.
+_IN_A_WINDOW = 100
+_IN_A_STEP = 8
+#: The most samples of all.
+_MOST = 10_000
 
 
 def peak_beside_law(law: SoftLaw, records: np.ndarray, peak: float, window: float, begins: float) -> float:
