@@ -113,7 +113,7 @@ def test_a_tied_step_passes_at_most_49_functions_in_12_files():
 
 
 def test_the_judge_passes_the_curves_of_a_run_once_and_a_flight_at_once(monkeypatch):
-    """Of the steps of `soft` 4 in 7 are a flight; the others are taken one by one, at an event in up to 4 parts."""
+    """The judge moves a flight, 4 in 7 steps of `soft`, at once, and other steps one by one, in up to 4 parts."""
     calls = Counter()
 
     def counted(owner, name):

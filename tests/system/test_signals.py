@@ -268,7 +268,7 @@ def spectra_drawn(run):
 
 
 def test_the_picture_and_the_tables_of_a_driven_run_have_its_spectra_and_points(driven):
-    """Of the power, what is below 1e-12 of the highest line is left out, and on a logarithmic axis the mean at 0 Hz."""
+    """The picture leaves out power below 1e-12 of the highest line, and the mean at 0 Hz on a logarithmic axis."""
     found, tables, drawn, looks = spectra_drawn(driven)
     density = np.column_stack(found.power["y"][:2])
     assert np.array_equal(tables["power-y"][:, :2], density)

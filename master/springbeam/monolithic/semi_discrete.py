@@ -267,7 +267,10 @@ def singular_modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
-    """Return the lowest modes, the static shapes and the start, (2N, n_modes + 3)."""
+    """Return the lowest modes, the start and the static shapes, (2N, n_modes + 3).
+
+    Sorted by how slowly they converge in modes: what depends on those before adds nothing to those after it, either.
+    """
     dense = isinstance(discrete.K, np.ndarray)
     # Without units of length and time, in unknowns (L θ, u): no wanted eigenvalue of K⁻¹M far below 1.
     unit = np.where(np.arange(discrete.size) % 2, 1.0, 1.0 / discrete.length)[:, None]
@@ -287,7 +290,7 @@ def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
         M = (D @ discrete.M @ D).tocsc()
         fastest = K.diagonal().max() / M.diagonal().min()  # rad²/s²
         modes = unit * spla.eigsh(K / fastest, k=beam.n_modes, M=M, sigma=0.0, v0=np.ones(discrete.size))[1]
-    return np.column_stack([modes, unit * static, discrete.slope_shape])
+    return np.column_stack([modes, discrete.slope_shape, unit * static])
 
 
 def _rayleigh_ritz(discrete: SemiDiscreteBeam, space: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:

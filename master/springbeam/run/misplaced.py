@@ -134,8 +134,8 @@ def _over_a_part(ends: Ends, H: float, k: float, *means: float) -> None:
     """Advance ``ends`` by ``H`` [s] under a demand with ``means`` as of `springbeam.run.errors.soft`.
 
     The misplacement is the cubic through both ends of the part, and the demand grows with it linearly in time: of the
-    fourth order, and symmetric in time, so that a lasting contact neither amplifies nor damps it. In a part in which
-    the contact turns by more than `_FOLLOWED` says it is a line.
+    fourth order, and symmetric in time, so that a lasting contact neither amplifies nor damps it. Where the contact
+    turns too far for that (`_FOLLOWED`), the misplacement grows linearly over the part.
     """
     missed, stiffness, damping, missed_early, stiffness_early, damping_early = means
     apart = ends.y - ends.u
