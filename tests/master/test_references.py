@@ -161,11 +161,10 @@ def test_a_beam_of_few_modes_starts_and_answers_static_forces_as_that_of_all(n_m
     np.testing.assert_allclose(few.basis @ few.slope_shape, assemble(given).slope_shape, atol=1e-12)
 
 
-@pytest.mark.parametrize("n_modes", [80, 150])
-def test_a_slender_beam_of_many_modes_starts_as_it_is_given(n_modes):
+def test_a_slender_beam_of_many_modes_starts_as_it_is_given():
     """A static shape that the modes span but for 1e-10 takes nothing of the start u = x, of which they lack 1e-3."""
     scales = {"length": 1.0, "area": 1e-4, "second_moment_of_area": 1e-9, "density": 1.0}
-    given = beam(1.0, 0.4, **scales, n_elements=60, element_degree=3, n_modes=n_modes)
+    given = beam(1.0, 0.4, **scales, n_elements=60, element_degree=3, n_modes=150)
     found = modal_beam(given)
     deflections = (found.basis @ found.slope_shape)[1::2]
     np.testing.assert_allclose(deflections, assemble(given).slope_shape[1::2], atol=1e-12)
