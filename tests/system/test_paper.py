@@ -21,21 +21,33 @@ def found(program, number):
     return PROGRAMS[program].algorithm_1(load_scene(f"paper-fig{number}"))
 
 
+def extremes(run):
+    """Return the smallest and the largest value of each recorded curve."""
+    curves = {**run.columns, "energy": run.e_beam + run.e_spring + run.e_load}
+    return {name: np.array([curves[name].min(), curves[name].max()]) for name in RECORDED["curves"]}
+
+
 # -- the figures
 
 
-@pytest.mark.parametrize(
-    ("program", "number"), [(program, number) for program, figures in RECORDED.items() for number in map(int, figures)]
-)
-def test_the_figures_have_the_numbers_that_they_had(program, number):
-    """Rounding moves them by at most 5e-12 of their size."""
+@pytest.mark.parametrize(("program", "number"), [(program, number) for program in PROGRAMS for number in (2, 4)])
+def test_the_figures_keep_their_numbers_up_to_rounding(program, number):
+    """Within ten times what one rounding of a modulus or of the density does to them, and 1e-12 of their size.
+
+    That is up to 6e-8 of z where the beam is solved as one mesh, and 1e-10 where it is by modes.
+    """
     run = found(program, number)
+    beam = load_scene(f"paper-fig{number}").beam
+    rounded = [
+        PROGRAMS[program].algorithm_1(with_changes(run.scene, beam={key: np.nextafter(getattr(beam, key), np.inf)}))
+        for key in ("young_modulus", "shear_modulus", "density")
+    ]
     before = RECORDED[program][str(number)]
-    curves = {**run.columns, "energy": run.e_beam + run.e_spring + run.e_load}
-    assert run.summary["iterations_per_solve"] == pytest.approx(before["iterations"], abs=1e-12)
-    for name, (low, high) in before["extremes"].items():
-        size = 1e-8 * max(abs(low), abs(high))
-        assert (curves[name].min(), curves[name].max()) == pytest.approx((low, high), abs=size, rel=0.0), name
+    now = extremes(run)
+    for name in RECORDED["curves"]:
+        moved = max(np.abs(extremes(other)[name] - now[name]).max() for other in rounded)
+        bound = 10.0 * moved + 1e-12 * np.abs(before[name]).max()
+        assert now[name] == pytest.approx(np.array(before[name]), abs=bound, rel=0.0), name
 
 
 @pytest.mark.parametrize(("number", "reported"), [(2, 1.990), (4, 2.000)])
@@ -46,7 +58,8 @@ def test_the_iterations_are_those_of_table_2_and_the_tip_flips(number, reported)
     """
     run = found("monolithic", number)
     loaded = found("monolithic", number + 1)
-    assert run.summary["iterations_per_solve"] == pytest.approx(reported, abs=0.01)
+    for program in PROGRAMS:
+        assert found(program, number).summary["iterations_per_solve"] == pytest.approx(reported, abs=0.01)
     v = run.v_tip
     assert (run.time[0], len(run)) == (0.5, 876)
     np.testing.assert_allclose(v[:5], [-1.0, 1.0, -1.0, 1.0, -1.0], atol=2e-4)
