@@ -20,9 +20,9 @@ from springbeam.monolithic.event_driven import initial
 from springbeam.monolithic.hybrid_system import HybridSystem, ReferenceFailure
 from springbeam.monolithic.laws import Link, ReferencePhase, Watch
 from springbeam.monolithic.transitions import HybridState
+from springbeam.results.distance import motion
 from springbeam.results.trajectory import Trajectory
 from springbeam.scene import Scene
-from springbeam.studies.distance import motion
 from springbeam.studies.tables import Row
 
 #: Relative tolerances of scipy's solvers; they are stable from loose ones on, at the step that they take themselves.

@@ -8,9 +8,10 @@ from runs import a_trajectory
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.motion.events import Event, EventKind
+from springbeam.results.contact_changes import _merged, contact_changes
+from springbeam.results.distance import apart, distance, motion
 from springbeam.results.records import joined
-from springbeam.studies.contact_changes import _merged, contact_changes
-from springbeam.studies.distance import HELD, apart, distance, motion
+from springbeam.results.spans import FLOOR, ROUNDING, rounding_of, span
 
 TIMES = np.linspace(0.0, 1.0, 11)
 
@@ -26,9 +27,14 @@ def test_the_motion_is_that_of_the_worse_end_over_its_largest_change(y_off, u_of
     assert motion({}, exact) == np.inf
 
 
-def test_an_end_that_does_not_move_is_judged_by_what_is_given_or_absolutely():
+def test_a_range_has_a_floor_and_differences_within_rounding_are_none():
+    """An end at 0 whose position is rounded to 1e-13 m, and one that stays at 2 m."""
     still = np.zeros(3)
-    assert apart(still + 1e-12, still, 1e-9) == pytest.approx(1e-3)
+    assert span(still, 1e-13) == FLOOR * 1e-13
+    assert span(still + 2.0) == FLOOR * ROUNDING * 2.0
+    assert span([0.0, -0.3, 0.1], 1e-13) == 0.3
+    assert apart(still + 1e-12, still, 1e-13) == pytest.approx(0.9e-12 / (FLOOR * 1e-13))
+    assert not apart(still + 1e-13, still, 1e-13).any()
     assert apart(still + 1e-12, still) == pytest.approx(1e-12)
 
 
@@ -74,12 +80,13 @@ def test_curves_are_compared_between_the_rows_too_and_the_peaks_of_a_soft_force(
 def test_a_tip_that_loads_hold_is_judged_by_the_deflection_of_its_beam():
     """Its row is made 0: 1e-13 m is the whole of what it moves, and next to nothing of what the beam does."""
     run = simulate(load_scene("soft", ["time.t_end=0.02", "beam.n_elements=4"]))
-    largest = np.abs(run.shapes[1]).max()
+    rounding = rounding_of(run)
+    assert rounding >= ROUNDING * np.abs(run.shapes[1]).max()
     columns = {"time": run.time, "phase": run.phase, "u_tip": np.zeros(len(run))}
     still = replace(run, columns=columns, steps=None)
     columns["u_tip"][-1] = -1e-13
     off = np.abs(run.u_tip - columns["u_tip"]).max()
-    assert distance(run, still, 0.0).motion == pytest.approx(off / (HELD * largest))
+    assert distance(run, still, 0.0).motion == pytest.approx((off - rounding) / (FLOOR * rounding))
 
 
 def test_a_top_stays_on_the_foundation_when_the_tip_leaves_it():

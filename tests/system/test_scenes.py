@@ -6,7 +6,7 @@ import scenes
 from references import integrated_anew, reference
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
-from springbeam.studies.contact_changes import contact_changes
+from springbeam.results.contact_changes import contact_changes
 
 CASES = scenes.TABLE["cases"]
 

@@ -6,10 +6,10 @@ from commands import HANGS
 from references import reference
 from scenes import kinds, soft
 
+from springbeam.results.distance import motion
 from springbeam.scene import load_scene, with_changes
 from springbeam.studies import tradeoff
 from springbeam.studies.design import with_keys
-from springbeam.studies.distance import motion
 from springbeam.studies.metrics import costs
 from springbeam.studies.tradeoff import Tradeoff, cheapest, pareto
 

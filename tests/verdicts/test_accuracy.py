@@ -11,6 +11,7 @@ from references import reference
 from scenes import scene_from_dict
 
 from springbeam import RunStopped, SceneError, load_scene, with_changes
+from springbeam.results.distance import Distance, distance
 from springbeam.results.files import load_trajectory
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.runner import run
@@ -19,7 +20,6 @@ from springbeam.scene.files import tomllib
 from springbeam.studies import accuracy as search
 from springbeam.studies.accuracy import simulate
 from springbeam.studies.crosscheck import orders
-from springbeam.studies.distance import Distance, distance
 from springbeam.studies.stability.judge import ERRORS, Reference, judge
 
 SCENES, FOUND = (

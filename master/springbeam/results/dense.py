@@ -33,6 +33,7 @@ from ..motion.paths import LAST_MOMENT, Path, derivative, sign_changes, value
 from ..scene import Scene
 from .columns import columns
 from .records import Records, Rows, common, joined, reduced_mass
+from .spans import rounding_of_steps, span
 from .trajectory import Trajectory
 
 #: Fields that are linear between rows, and do not change with an event.
@@ -75,8 +76,6 @@ _CLOSER = _bernstein(8)
 #: Positions and velocities of both ends.
 _PLACES = ("u_tip", "y")
 _SPEEDS = ("v_tip", "z")
-#: Share of the largest position that the rounding of a step's moments may add to its curve.
-_ROUNDING = 1e-13
 #: Values that differ by less than this share of the largest one are equal: well above rounding.
 _ALIKE = 1e-13
 
@@ -167,6 +166,7 @@ def inside(rigid: bool, steps: np.ndarray, *names: str) -> Inside:
     places["gap"] = places["u_tip"] - places["y"]
     known = {name: [*Extremes.of_rows(steps["time"], places[name])] for name in names}
     error = 0.0
+    rounding = rounding_of_steps(steps)
     made = np.flatnonzero(steps["size"] > 0.0)
     for begin in range(0, len(made), _TOGETHER):
         after = made[begin : begin + _TOGETHER]
@@ -179,9 +179,8 @@ def inside(rigid: bool, steps: np.ndarray, *names: str) -> Inside:
                     found[place] = sign * lowest
                     found[place + 1] = float(steps["time"][end - 1] + share * steps["size"][end])
         for name in _PLACES:
-            unsure = LAST_MOMENT * np.abs(curves[name][_DEGREE]).max() - _ROUNDING * np.abs(places[name]).max()
-            if (moved := np.abs(places[name] - places[name][0]).max()) > 0.0:
-                error = max(error, float(unsure / moved))
+            unsure = LAST_MOMENT * np.abs(curves[name][_DEGREE]).max() - rounding
+            error = max(error, float(unsure) / (span(places[name], rounding) or 1.0))
     return Inside({name: Extremes(*found) for name, found in known.items()}, error)
 
 

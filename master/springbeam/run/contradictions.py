@@ -12,6 +12,7 @@ import numpy as np
 from ..contact.interface import Rigid
 from ..motion.events import Event
 from ..results.dense import Extremes
+from ..results.spans import rounding_of_steps, span
 from .setup import Setup
 
 #: Columns whose extremes are searched.
@@ -44,24 +45,25 @@ def contradictions(
     """
     if not len(steps):
         return []
-    return [*_ends(setup, *(places[name] for name in PLACES)), *_times(steps, events, contact_time)]
+    rounding = rounding_of_steps(steps, setup.tolerance)
+    return [*_ends(setup, rounding, *(places[name] for name in PLACES)), *_times(steps, events, contact_time)]
 
 
-def _ends(setup: Setup, tip: Extremes, top: Extremes, gap: Extremes) -> Iterator[str]:
+def _ends(setup: Setup, rounding: float, tip: Extremes, top: Extremes, gap: Extremes) -> Iterator[str]:
     meeting = isinstance(setup.law, Rigid)
     if setup.floor is not None:
         places, name = (top, "the spring's top") if setup.lower else (tip, "the tip")
-        if setup.floor - places.lowest > _MOST * _range(places):
+        if setup.floor - places.lowest > _MOST * _range(places, rounding):
             yield (
                 f"{name} is at {places.lowest:.6g} m at {places.lowest_time:.6g} s, below the rigid stop at "
                 f"{setup.floor:.6g} m"
             )
-    if meeting and -gap.lowest > _MOST * min(_range(tip), _range(top)):
+    if meeting and -gap.lowest > _MOST * min(_range(tip, rounding), _range(top, rounding)):
         yield f"the tip is {-gap.lowest:.6g} m below the spring's top at {gap.lowest_time:.6g} s"
 
 
-def _range(places: Extremes) -> float:
-    return places.highest - places.lowest
+def _range(places: Extremes, rounding: float) -> float:
+    return span((places.lowest, places.highest), rounding)
 
 
 def _times(steps: np.ndarray, events: Sequence[Event], contact_time: float) -> Iterator[str]:

@@ -8,11 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from ..motion.paths import EPS
 from ..results.columns import ledger
+from ..results.spans import energy_of_force
 from .stepping import Pair
 
 #: Relative energy residual up to which a coupling that creates no energy is exact: rounding and solvers' tolerances.
 EXACT = 1e-8
+#: Share of the energy that a contact force alone would give: energies below are the rounding of works that cancel.
+_HELD = 10.0 * EPS / EXACT
 #: What a warning says where more of the energy has changed.
 CHANGED = "has changed the energy"
 #: Largest such residual where a scheme changes the energy itself.
@@ -51,7 +55,7 @@ def errors(
             initial = float(ledger(first, received)["e_total"][0])
         # Beyond its hilltop a softening spring has a negative potential, which may cancel its kinetic energy.
         of_spring = np.maximum(np.abs(found["e_spring"]), steps["spring_kinetic"])
-        size = np.abs(found["e_beam"]) + of_spring + found["e_contact"]
+        size = np.maximum(np.abs(found["e_beam"]) + of_spring + found["e_contact"], _HELD * energy_of_force(steps))
         largest = np.maximum.accumulate(np.maximum(size, max(scale, abs(initial))))
         residual = found["e_total"] - initial
         return np.divide(residual, largest, out=np.zeros_like(residual), where=largest > 0.0), largest

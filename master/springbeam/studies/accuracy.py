@@ -17,6 +17,7 @@ import numpy as np
 
 from ..bodies.factory import load_bodies
 from ..bodies.protocol import Body
+from ..results.distance import distance
 from ..results.trajectory import Trajectory
 from ..run import runner
 from ..run.ledger import CHANGED
@@ -26,7 +27,6 @@ from ..run.setup import Setup, set_up
 from ..scene import Scene, SceneError, as_scene, with_changes
 from ..scene.frequencies import DIES_OUT
 from ..scene.laws import stiffest
-from .distance import distance
 
 #: Fewest and most macro steps of a run.
 _FEWEST, _MOST = 8.0, 50_000

@@ -29,13 +29,13 @@ import numpy as np
 
 from ..monolithic import event_driven
 from ..pictures.drawing import present
+from ..results.contact_changes import ContactChange, contact_changes
 from ..results.dense import rows_at
+from ..results.distance import apart
 from ..results.trajectory import BODY_COLUMNS, Trajectory, columns_of
 from ..run.runner import run_in_memory
 from ..scene import Scene, SceneError, with_changes
 from ..scene.frequencies import mesh_frequency, slowest_frequency
-from .contact_changes import ContactChange, contact_changes
-from .distance import apart
 from .tables import Done, Row, unseen
 
 Verdict = Literal["agrees", "differs", "not comparable"]

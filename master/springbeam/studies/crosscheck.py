@@ -12,12 +12,12 @@ from rich.text import Text
 
 from ..monolithic import event_driven
 from ..pictures.diagrams import Diagram, draw_diagrams
+from ..results.contact_changes import contact_changes
 from ..results.trajectory import Trajectory, columns_of
 from ..run.outcome import RunStopped
 from ..scene import Scene, with_changes
 from .accuracy import simulate
 from .comparison import SHORT, Verdict, away_from, compare, macro_points, quantities, sample
-from .contact_changes import contact_changes
 from .tables import Done, Findings, Row, difference, in_words, table, unseen
 
 #: Exit codes of the command.

@@ -19,6 +19,7 @@ import numpy as np
 from ..monolithic import event_driven
 from ..pictures.diagrams import Diagram, draw_diagrams
 from ..results.dense import at
+from ..results.distance import distance
 from ..results.trajectory import Trajectory
 from ..run.outcome import RunStopped
 from ..run.runner import run_in_memory
@@ -26,7 +27,6 @@ from ..scene import Scene, SceneError, with_changes
 from ..scene.frequencies import slowest_frequency
 from .comparison import SHORT_SHARE, comparable_until
 from .design import RIGID, SOFT, with_keys
-from .distance import distance
 from .engine import Measure
 from .metrics import costs
 from .study import Study

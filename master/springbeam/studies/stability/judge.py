@@ -10,6 +10,7 @@ import numpy as np
 
 from ...bodies.protocol import FmuError
 from ...monolithic import event_driven
+from ...results.distance import distance
 from ...results.trajectory import Trajectory
 from ...run.ledger import EXACT, bounds
 from ...run.outcome import RunStopped
@@ -19,7 +20,6 @@ from ...scene import Scene, SceneError
 from ...scene.suspicions import suspicions
 from ..accuracy import pick
 from ..comparison import perturbed
-from ..distance import distance
 from ..tables import Row
 
 #: Classes of runs (bounds: `ledger.EXACT`, `ledger.bounds`), in the order of pictures and tables; the last must stay

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..results.dense import at
-from ..results.trajectory import Trajectory
-from ..run.misplaced import HELD
 from .contact_changes import contact_time_difference, impulse_difference
+from .dense import at
+from .spans import rounding_of, span
+from .trajectory import Trajectory
 
 #: Shares of the time from one row to the next, of either run, at which two runs are compared.
 _BETWEEN = np.arange(4.0) / 4.0
@@ -39,9 +39,9 @@ def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
     Returns
     -------
     Distance
-        ``motion``: the largest difference of u_tip or of y, over the largest change of the exact one from its start
-        (`apart`), taken at all rows of both and at three times between each two; with a reference at its rows. ∞ where
-        the two have no body in common. ``times``: the largest difference of a beginning or an end of a contact, over
+        ``motion``: the largest difference of u_tip or of y, over the range of the exact one (`apart`), taken at all
+        rows of both and at three times between each two; with a reference at its rows. ∞ where the two have no body in
+        common. ``times``: the largest difference of a beginning or an end of a contact, over
         the length of the run. ``impulses``: the difference of the sums of all impacts' impulses on the tip and on the
         foundation, over the smaller sum that is not 0; 0 where both are. ``force``: the difference of the peaks of a
         soft contact force, each a mean over its window, over the larger; ``None`` for a rigid law and unknown peaks.
@@ -49,32 +49,28 @@ def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
     times = exact.time if exact.steps is None else _all_times(run, exact)
     if run.steps is None:
         times = times[np.isin(times, run.time)]
-    shapes = exact.shapes or run.shapes
-    held = 0.0 if shapes is None else HELD * float(np.abs(shapes[1]).max(initial=0.0))
-    span = float(exact.time[-1] - exact.time[0])
+    rounding = max(rounding_of(run), rounding_of(exact))
+    duration = float(exact.time[-1] - exact.time[0])
     impulses = [impulse_difference(run, exact), impulse_difference(exact, run)]
     return Distance(
-        motion(_columns_at(run, times), _columns_at(exact, times), held),
-        contact_time_difference(run, exact, window) / span,
+        motion(_columns_at(run, times), _columns_at(exact, times), rounding),
+        contact_time_difference(run, exact, window) / duration,
         max(np.nan_to_num(impulses).tolist()),
         None if exact.scene.contact.rigid else _peaks_apart(run, exact),
     )
 
 
-def motion(columns: Mapping[str, np.ndarray], exact: Mapping[str, np.ndarray], held: float = 0.0) -> float:
+def motion(columns: Mapping[str, np.ndarray], exact: Mapping[str, np.ndarray], rounding: float = 0.0) -> float:
     """Return the larger of the largest differences of u_tip and of y, `apart`, at equal times; ∞ without any."""
     names = [name for name in ("u_tip", "y") if name in columns and name in exact]
-    found = (apart(columns[name], exact[name], held * (name == "u_tip")) for name in names)
+    found = (apart(columns[name], exact[name], rounding) for name in names)
     return max((float(each.max(initial=0.0)) for each in found), default=inf)
 
 
-def apart(values: np.ndarray, exact: np.ndarray, least: float = 0.0) -> np.ndarray:
-    """Return the differences over the largest change of ``exact`` from its start, or over ``least`` if it is more.
-
-    Where nothing changes and ``least`` is 0 they stay absolute.
-    """
-    scale = max(float(np.abs(exact - exact[0]).max(initial=0.0)), least) or 1.0
-    return np.asarray(np.abs(values - exact) / scale)
+def apart(values: np.ndarray, exact: np.ndarray, rounding: float = 0.0) -> np.ndarray:
+    """Return the differences beyond ``rounding``, over the range of ``exact`` as of `span`; absolute if all are 0."""
+    scale = span(exact, rounding) or 1.0
+    return np.asarray(np.maximum(np.abs(values - exact) - rounding, 0.0) / scale)
 
 
 def _columns_at(run: Trajectory, times: np.ndarray) -> Mapping[str, np.ndarray]:

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..results.contact_times import Interval, foundation_contacts, kicks, tip_contacts
-from ..results.records import impulse
-from ..results.trajectory import Trajectory
+from .contact_times import Interval, foundation_contacts, kicks, tip_contacts
+from .records import impulse
+from .trajectory import Trajectory
 
 #: Share of the impulse of a run below which a contact or a stroke is negligible.
 SLIGHT = 2e-3

@@ -1,0 +1,75 @@
+"""Range of a quantity of a run: what errors, contradictions and residuals are relative to.
+
+A range that is no larger than the rounding of what the quantity is computed from is no scale, so each has a floor.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .records import FORCE_COLUMNS
+from .trajectory import Trajectory
+
+#: Rounding of a position, as a share of the largest one that it is computed from.
+ROUNDING = 1e-13
+#: Least range of a quantity over its rounding; an end that has less does not move.
+FLOOR = 1e4
+
+
+def span(values: Any, rounding: float = 0.0) -> float:
+    """Return the largest change of ``values`` from the first one, at least `FLOOR` times their rounding.
+
+    ``rounding`` is that of what they are computed from, in their unit: of positions `rounding_of`. It counts as at
+    least `ROUNDING` of the values.
+    """
+    values = np.asarray(values, float)
+    if not values.size:
+        return FLOOR * rounding
+    least = max(rounding, ROUNDING * float(np.abs(values).max()))
+    return max(float(np.abs(values - values[0]).max()), FLOOR * least)
+
+
+def rounding_of(run: Trajectory) -> float:
+    """Return the rounding [m] of the positions of ``run``: of its ends, and of the beam between them."""
+    found = [float(np.abs(run.columns[name]).max(initial=0.0)) for name in ("u_tip", "y") if name in run.columns]
+    if run.shapes is not None:
+        found.append(float(np.abs(run.shapes[1]).max(initial=0.0)))
+    of_positions = ROUNDING * max(found, default=0.0)
+    return of_positions if run.steps is None else max(of_positions, rounding_of_steps(run.steps, _tolerance(run)))
+
+
+def rounding_of_steps(steps: np.ndarray, tolerance: float = ROUNDING) -> float:
+    """Return the rounding [m] of the positions of both ends by their records.
+
+    That is `ROUNDING` of the largest one, and ``tolerance``, that of the coupling, of the displacement by the contact
+    force of a step alone: ends that the force holds differ from their place by that.
+    """
+    positions = max(float(np.abs(steps[f"{name}_after"]).max(initial=0.0)) for name in ("u_tip", "y"))
+    moved = 0.5 * _impulses(steps) * steps["size"] * _per_mass(steps)
+    return max(ROUNDING * positions, tolerance * float(moved.max(initial=0.0)))
+
+
+def energy_of_force(steps: np.ndarray) -> np.ndarray:
+    """Return the energy [J] that the contact force of each of ``steps`` alone would give to both ends.
+
+    The works of forces that hold the ends cancel, and leave a rounding relative to it.
+    """
+    return np.asarray(0.5 * _impulses(steps) ** 2 * _per_mass(steps))
+
+
+def _tolerance(run: Trajectory) -> float:
+    return max(ROUNDING, run.scene.coupling.tolerance)
+
+
+def _impulses(steps: np.ndarray) -> np.ndarray:
+    """Return the largest impulse [N·s] that the polynomial of the contact force may have over each of ``steps``."""
+    size = steps["size"]
+    return sum((np.abs(steps[name]) * size ** (k + 1) for k, name in enumerate(FORCE_COLUMNS)), np.zeros_like(size))
+
+
+def _per_mass(steps: np.ndarray) -> np.ndarray:
+    """Return the inverse of the reduced mass of ends that a rigid law joins [1/kg], else 0."""
+    mass = steps["reduced_mass"]
+    return np.asarray(np.divide(1.0, mass, out=np.zeros_like(mass), where=mass > 0.0))
