@@ -14,7 +14,6 @@ from springbeam.pictures.drawing import GLOSSARY
 from springbeam.results.totals import LOSS_NAMES, TOTALS
 from springbeam.results.trajectory import BODY_COLUMNS, COLUMNS
 from springbeam.scene import shipped_scenes
-from springbeam.studies.stability.judge import MEANINGS
 
 
 def scenes() -> list[str]:
@@ -59,10 +58,6 @@ def results() -> list[str]:
     return table(("key", "unit", ""), rows)
 
 
-def classes() -> list[str]:
-    return table(("class", "the run"), MEANINGS.items())
-
-
 def words() -> list[str]:
     return table(("word", "meaning"), [(name.replace("_", " "), meaning) for name, meaning in GLOSSARY.items()])
 
@@ -90,7 +85,6 @@ BLOCKS: dict[Path, dict[str, Callable[[], list[str]]]] = {
     DOCS / "api.md": {"body": body},
     DOCS / "commands.md": {"commands": commands, "options": options},
     DOCS / "files.md": {"columns": columns, "results": results},
-    DOCS / "measured.md": {"classes": classes},
     DOCS / "model.md": {"phases": phases, "words": words},
 }
 

@@ -27,7 +27,7 @@ from springbeam.monolithic import event_driven
 ROOT = Path(__file__).resolve().parents[1]
 
 # The folders of the helper modules: commands.py here, the others beside the tests that use them.
-sys.path[:0] = [str(ROOT / "tests" / folder) for folder in (".", "master", "system")]
+sys.path[:0] = [str(ROOT / "tests" / folder) for folder in (".", "campaign", "master", "system")]
 
 from references import reference  # noqa: E402
 

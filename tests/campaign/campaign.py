@@ -5,13 +5,13 @@ from math import inf, sqrt
 from typing import ClassVar
 
 import tomli_w
+from draw import USUAL, drawn, scene_dict
+from judge import ERRORS, Reference, ended, judge
 from pages import table
 
 from springbeam import RunStopped, simulate
 from springbeam.results.distance import distance
 from springbeam.scene import SceneError, scene_from_dict, with_changes
-from springbeam.studies.stability.draw import USUAL, drawn, scene_dict
-from springbeam.studies.stability.judge import ERRORS, Reference, ended, judge
 from springbeam.studies.study import Study
 from springbeam.studies.tables import Findings
 

@@ -29,7 +29,7 @@ from springbeam.run.stepping import Pair
 from springbeam.run.summary import summary
 from springbeam.scene import Beam
 from springbeam.scene.statics import tip_reach
-from springbeam.studies.stability.predict import impulse_integrals
+from springbeam.studies.predict import impulse_integrals
 
 
 class Double(Body):

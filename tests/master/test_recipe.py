@@ -14,7 +14,7 @@ from springbeam.run.resolution import WINDOW
 from springbeam.scene import Scene, laws, load_scene, with_changes
 from springbeam.scene.linearised import contact_energy
 from springbeam.scene.statics import tip_inertia
-from springbeam.studies.stability.predict import predict
+from springbeam.studies.predict import predict
 
 PAGE = Path(__file__).parents[2] / "docs" / "contributing.md"
 BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.M | re.S)

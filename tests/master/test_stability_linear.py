@@ -14,7 +14,7 @@ from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.laws import Link
 from springbeam.scene.statics import tip_inertia
-from springbeam.studies.stability.predict import (
+from springbeam.studies.predict import (
     LinearBody,
     LinearPair,
     amplification,

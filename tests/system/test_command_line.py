@@ -17,7 +17,6 @@ from typer.testing import CliRunner
 from springbeam import simulate
 from springbeam.cli import app
 from springbeam.scene import load_scene
-from springbeam.studies.stability.grid import Grid
 
 pytestmark = pytest.mark.usefixtures("unpainted", "kept_references")
 
@@ -40,7 +39,6 @@ TABLES = {
     "converge": "soft --levels 3 --set beam.n_elements=4 --set time.t_end=0.05",
     "tradeoff": "duffing --until 0.5 --quick --out traded",
     "crosscheck": "soft --set time.t_end=0.1 --set beam.n_elements=6",
-    "stability": "--samples 2 --resolution 0 --workers 1 --out grid",
     "doctor": "",
 }
 
@@ -56,7 +54,6 @@ DOCUMENTS = {
     "crosscheck": {"verdict", "quantities", "events"},
     "doctor": {"fmus"},
     "predict": {"estimates", "exchange", "notes"},
-    "stability": {"classes", "cells"},
 }
 
 
@@ -95,13 +92,12 @@ def test_every_command_is_looked_at():
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_what_a_command_prints_fits_80_columns_and_its_json_is_one_document(place, arguments, monkeypatch, name):
-    """Studies show what they have found once more; cells of the grid are computed in this process."""
-    monkeypatch.setattr(Grid, "parallel", False)
+def test_what_a_command_prints_fits_80_columns_and_its_json_is_one_document(place, arguments, name):
+    """Studies show what they have found once more."""
     line = [name, *arguments(TABLES[name])]
     shown = printed(*line)
     assert max(map(len, lines_without_paths(shown))) <= 80
-    assert "…" not in shown or name == "stability"  # nothing cut off but reasons, which are in its table
+    assert "…" not in shown  # nothing cut off
     if name in WITHOUT_JSON:
         return
     document = json.loads(printed(*line, "--json"))

@@ -44,12 +44,11 @@ NOT_RUN = {
     "SPRINGBEAM_STEPS=1000000": "takes minutes; test_long.py makes fewer steps",
     ".venv/bin/python docs/accuracy.py": "takes minutes",
     ".venv/bin/python docs/paper.py": "takes minutes",
-    "./build.sh campaign": "takes minutes; test_accuracy.py judges a scene with it",
+    "./build.sh campaign": "takes minutes; test_accuracy.py judges a scene with it, test_stability.py extreme ones",
     "springbeam animate results/soft": "draws for half a minute; the command is in test_animation.py",
     "springbeam sweep vibro-impact": "takes a minute; the command is in test_sweep.py",
     "springbeam sweep pulse": "takes some seconds; what it asks for is in test_signals.py",
     "springbeam sweep soft": "starts a process for each core; the command is in test_command_line.py",
-    "springbeam stability": "takes minutes; parts of it are run in test_stability.py",
     "springbeam sweep bumper.toml": "takes half a minute; the command is in test_sweep.py",
 }
 

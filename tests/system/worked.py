@@ -4,8 +4,9 @@ import os
 import signal
 from pathlib import Path
 
-from springbeam.studies.stability.draw import EXTREME, drawn, slice_cells
-from springbeam.studies.stability.grid import Grid
+from draw import EXTREME, drawn, slice_cells
+from grid import Grid
+
 from springbeam.studies.sweep import Sweep
 
 

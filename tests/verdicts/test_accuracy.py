@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import printed
+from judge import ERRORS, Reference, judge
 from references import reference
 from scenes import scene_from_dict
 
@@ -20,7 +21,6 @@ from springbeam.scene.files import tomllib
 from springbeam.studies import accuracy as search
 from springbeam.studies.accuracy import simulate
 from springbeam.studies.crosscheck import orders
-from springbeam.studies.stability.judge import ERRORS, Reference, judge
 
 SCENES, FOUND = (
     tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import tomli_w
 from commands import command, printed
+from draw import USUAL, drawn, scene_dict
 
 from springbeam import load_scene, with_changes
 from springbeam.monolithic import event_driven
@@ -14,7 +15,6 @@ from springbeam.scene import scene_from_dict
 from springbeam.studies import comparison
 from springbeam.studies.comparison import _judged, compare
 from springbeam.studies.crosscheck import crosscheck, orders, parts_of_orders
-from springbeam.studies.stability.draw import USUAL, drawn, scene_dict
 
 SOFT = load_scene("soft")
 

@@ -6,10 +6,13 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
+import judge
 import numpy as np
 import pytest
 from bodies import couple
-from commands import command
+from draw import AT_REST, EXTREME, SLICES, drawn, scene_dict, slice_cells
+from grid import Grid
+from judge import CLASSES, Reference, ended, judged
 from worked import Part
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
@@ -26,11 +29,7 @@ from springbeam.scene.frequencies import slowest_frequency
 from springbeam.scene.laws import LAW
 from springbeam.scene.linearised import hilltop, spring_frequency
 from springbeam.scene.statics import bending_stiffness, shear_stiffness, tip_compliance, tip_inertia, tip_reach
-from springbeam.studies.stability import judge
-from springbeam.studies.stability.draw import AT_REST, EXTREME, SLICES, drawn, scene_dict, slice_cells
-from springbeam.studies.stability.grid import Grid
-from springbeam.studies.stability.judge import CLASSES, Reference, ended, judged
-from springbeam.studies.stability.predict import THRESHOLD, critical_step, linear_pair
+from springbeam.studies.predict import THRESHOLD, critical_step, linear_pair
 
 SMALL = {"time": {"t_end": 0.05}, "beam": {"n_elements": 5}, "coupling": {"macro_step": 2e-3}}
 
@@ -279,23 +278,22 @@ def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else():
     assert {r["kind"] for r in records.values()} >= {"conserved", "dissipative", "approximate", "stopped"}
 
 
-# -- the command ----------------------------------------------------------------------------------------------------
+# -- what the program writes ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("kinds", "code"), [(CLASSES[:-1], 0), (CLASSES, 1)])
-def test_command(tmp_path, monkeypatch, unpainted, kinds, code):
-    ends = itertools.cycle(kinds)
-    monkeypatch.setattr(Grid, "parallel", False)
-    monkeypatch.setattr(Grid, "record", lambda self, case: ended(next(ends)) | {"residual": 1e-9})
-    result = command("stability", "--samples", "30", "--resolution", "2", "--out", tmp_path)
-    cases = 30 + 4 * len(SLICES)
-    assert result.exit_code == code, result.output
-    assert max(map(len, result.stdout[: result.stdout.index("results  ")].splitlines())) <= 80
-    assert len((tmp_path / "stability.csv").read_text().splitlines()) == 1 + cases
-    assert all((tmp_path / f"stability-{name}.png").is_file() for name in ("classes", "residuals"))
-    scenes = sorted(tmp_path.glob("stability-garbage-*.toml"))
-    assert len(scenes) == code * (cases // len(CLASSES))
-    for path in scenes[-3:]:  # of slices, which all can be run
+def test_the_tables_count_every_cell_and_garbage_is_written_as_scenes(tmp_path, monkeypatch, kinds, code):
+    monkeypatch.syspath_prepend(Path(__file__).parents[2] / "docs")
+    grid = Grid(samples=30, resolution=2)
+    cells = grid.cases()
+    assert len(cells) == 30 + 4 * len(SLICES)
+    records = {name: ended(kind) | {"residual": 1e-9} for name, kind in zip(cells, itertools.cycle(kinds))}
+    found = grid.findings(records)
+    found.written(tmp_path, pictures=False)
+    counts = [int(line.split("|")[3]) for line in found.shown[2 : 2 + len(CLASSES)]]
+    assert (sum(counts), counts[-1]) == (len(cells), len(found.texts))
+    assert (found.code, len(found.texts)) == (code, code * (len(cells) // len(CLASSES)))
+    for path in sorted(tmp_path.glob("garbage-*.toml"))[-3:]:  # of slices, which all can be run
         assert load_scene(path).time.t_end > 0.0
 
 

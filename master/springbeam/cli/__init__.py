@@ -89,7 +89,7 @@ _TITLES: dict[str, dict[str, tuple[str, ...]]] = {
     "Run": {"run": ("run",), "studies": ("sweep",), "paper": ("paper",)},
     "Look": {"look": ("report", "plot", "animate", "export", "compare", "spectrum"), "studies": ("fit",)},
     "Choose step, accuracy and mesh": {"scenes": ("predict",), "studies": ("tradeoff", "converge")},
-    "Check": {"studies": ("crosscheck", "stability"), "checks": ("doctor",)},
+    "Check": {"studies": ("crosscheck",), "checks": ("doctor",)},
 }
 
 

@@ -115,7 +115,7 @@ def predict(
     Example: springbeam predict soft --set coupling.macro_step=4e-3
     """
     from ..scene import load_scene
-    from ..studies.stability.predict import predict as prediction_of
+    from ..studies.predict import predict as prediction_of
 
     what = load_scene(scene, settings or ())
     with progress("modes and stability", None, silent=as_json):

@@ -1,4 +1,4 @@
-"""The commands that carry out a study: sweep, fit, tradeoff, converge, crosscheck, stability.
+"""The commands that carry out a study: sweep, fit, tradeoff, converge, crosscheck.
 
 Each is a function that makes the study of its own options. `study_command` adds the common parts: directory, progress,
 interruption and continuation.
@@ -224,7 +224,6 @@ MetricOption = Annotated[
         help="A metric of each run (springbeam keys --metrics), or a Python function of it; may be repeated.",
     ),
 ]
-QuickOption = Annotated[bool, typer.Option("--quick", help="A smaller study, for a first impression.")]
 SeedOption = Annotated[
     int, typer.Option("--seed", metavar="N", min=0, help="Seed of the samples; the same seed gives the same runs.")
 ]
@@ -418,23 +417,3 @@ def crosscheck(
         parts = study.parts_of_orders(quick)
         return Once("orders", f"a reference and {parts - 1} runs", parts + searches, compare)
     return Once("crosscheck", "2 runs and 2 references", PARTS + searches, compare)
-
-
-@study_command("workers")
-def stability(
-    samples: Annotated[
-        int, typer.Option("--samples", metavar="N", min=0, help="Cells of the hypercube over all parameters.")
-    ] = 300,
-    resolution: Annotated[
-        int, typer.Option("--resolution", metavar="N", min=0, help="Values of each parameter of a slice; 0: no slices.")
-    ] = 6,
-    seed: SeedOption = 1,
-    quick: QuickOption = False,
-) -> Study:
-    """Run extreme scenes and classify each result. Exit code 1 if one is garbage.
-
-    Example: springbeam stability --samples 100 --resolution 0
-    """
-    from ..studies.stability.grid import Grid
-
-    return Grid(samples=samples, resolution=resolution, seed=seed, quick=quick)

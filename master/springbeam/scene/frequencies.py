@@ -1,6 +1,6 @@
 """Frequencies of our beam, and of the waves that an impact excites, without the mesh.
 
-`springbeam.studies.stability.predict` has those of the mesh.
+`springbeam.studies.predict` has those of the mesh.
 """
 
 from __future__ import annotations

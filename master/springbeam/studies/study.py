@@ -43,7 +43,7 @@ Make = Callable[[Mapping[str, Row]], dict[str, Row]]
 
 FILE = "study.jsonl"
 #: Format of the files of studies.
-_KINDS = ("sweep", "tradeoff", "stability", "fit")
+_KINDS = ("sweep", "tradeoff", "fit")
 
 
 class Study(BaseModel, ABC):

@@ -24,12 +24,12 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from ...monolithic.semi_discrete import ModalBeam, modal_beam
-from ...scene import Beam, Scene
-from ...scene.laws import depth
-from ...scene.linearised import contact_energy, spring_frequency, spring_stiffness
-from ...scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
-from ...scene.suspicions import suspicions
+from ..monolithic.semi_discrete import ModalBeam, modal_beam
+from ..scene import Beam, Scene
+from ..scene.laws import depth
+from ..scene.linearised import contact_energy, spring_frequency, spring_stiffness
+from ..scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
+from ..scene.suspicions import suspicions
 
 #: A coupling is called unstable where its spectral radius exceeds 1 by more than this: e-fold growth in 1000 steps.
 THRESHOLD = 1e-3
@@ -228,7 +228,7 @@ def impulse_integrals(omega2: np.ndarray, c: np.ndarray, h: float) -> np.ndarray
     (7, r) array
         Row j + 1 is S_j [s^{j+1}].
     """
-    from ...monolithic.oscillators import GAUSS, Oscillators  # a second to load: only for exchanges
+    from ..monolithic.oscillators import GAUSS, Oscillators  # a second to load: only for exchanges
 
     at_end = Oscillators(omega2, c).weights(h, slice(-1, None))
     forces = [(h * GAUSS.nodes) ** j / math.factorial(j) for j in range(5)]

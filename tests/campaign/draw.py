@@ -6,19 +6,17 @@ covers a range; a slice of the extreme one varies two parameters over their rang
 seed gives the same cells.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import inf, sqrt
 from pathlib import Path
 from typing import Any
 
-from ...scene import Beam
-from ...scene.files import tables_of
-from ...scene.frequencies import slowest_frequency
-from ...scene.laws import LAWS
-from ...scene.statics import tip_compliance, tip_inertia
-from ..design import RIGID, SOFT, Axis, design
+from springbeam.scene import Beam
+from springbeam.scene.files import tables_of
+from springbeam.scene.frequencies import slowest_frequency
+from springbeam.scene.laws import LAWS
+from springbeam.scene.statics import tip_compliance, tip_inertia
+from springbeam.studies.design import RIGID, SOFT, Axis, design
 
 #: Radians of the spring's own motion in one macro step, and in a cell: IDA takes some hundred steps for each.
 _MOST_PHASE_PER_STEP, _MOST_PHASE = 30.0, 1000.0

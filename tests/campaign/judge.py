@@ -1,26 +1,24 @@
 """Judge a run: classify it by its records, and compare it with the event-driven reference."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ...bodies.protocol import FmuError
-from ...monolithic import event_driven
-from ...results.distance import distance
-from ...results.trajectory import Trajectory
-from ...run.ledger import EXACT, bounds
-from ...run.outcome import RunStopped
-from ...run.resolution import PEAK_DOUBTED
-from ...run.runner import Simulation
-from ...scene import Scene, SceneError
-from ...scene.suspicions import suspicions
-from ..accuracy import pick
-from ..comparison import perturbed
-from ..tables import Row
+from springbeam.bodies.protocol import FmuError
+from springbeam.monolithic import event_driven
+from springbeam.results.distance import distance
+from springbeam.results.trajectory import Trajectory
+from springbeam.run.ledger import EXACT, bounds
+from springbeam.run.outcome import RunStopped
+from springbeam.run.resolution import PEAK_DOUBTED
+from springbeam.run.runner import Simulation
+from springbeam.scene import Scene, SceneError
+from springbeam.scene.suspicions import suspicions
+from springbeam.studies.accuracy import pick
+from springbeam.studies.comparison import perturbed
+from springbeam.studies.tables import Row
 
 #: Classes of runs (bounds: `ledger.EXACT`, `ledger.bounds`), in the order of pictures and tables; the last must stay
 #: empty.
