@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from scenes import soft
 
+from springbeam import load_scene, simulate, with_changes
+from springbeam.monolithic import event_driven
+
 #: Length of a smooth phase: the tip comes down on the spring at its start, and stays with it [s].
 T = 0.064
 LAWS = {
@@ -47,7 +50,20 @@ def halfway(law, scheme, degree, count):
 
 @pytest.mark.parametrize(("law", "scheme", "degree", "order", "count"), SCHEMES)
 def test_order(law, scheme, degree, order, count):
-    """Beside degree 2 in 256 steps. The force of a tie is that of `crosscheck --orders` (test_crosscheck.py)."""
+    """Beside degree 2 in 256 steps."""
     exact = halfway(law, "energy", 2, 256)
     coarse, fine = (np.abs(halfway(law, scheme, degree, n) - exact) for n in (count, 2 * count))
     assert np.log2(coarse / fine) == pytest.approx(np.full(len(exact), order), abs=0.25)
+
+
+def test_order_of_the_force_of_a_tie():
+    """The largest error of displacement, velocity and force in the FMUs' first contact, beside the reference."""
+    scene = load_scene("soft", ["time.t_end=0.07"])
+    errors = []
+    for count in (64, 128):
+        run = simulate(with_changes(scene, coupling={"degree": 0, "macro_step": 0.07 / count}))
+        exact = event_driven.integrate(scene, sample_times=run.time)
+        at = np.searchsorted(exact.time, run.time)
+        late = run.time > 0.01
+        errors.append([np.abs(run[name] - exact[name][at])[late].max() for name in ("y", "z", "contact_force")])
+    assert np.log2(np.divide(*errors)) == pytest.approx(np.full(3, 4.0), abs=0.5)

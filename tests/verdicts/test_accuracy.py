@@ -20,7 +20,6 @@ from springbeam.scene import as_scene
 from springbeam.scene.files import tomllib
 from springbeam.studies import accuracy as search
 from springbeam.studies.accuracy import simulate
-from springbeam.studies.crosscheck import orders
 
 SCENES, FOUND = (
     tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
@@ -217,8 +216,6 @@ def test_what_runs_a_scene_as_it_is_wants_the_accuracy_picked():
     scene = scene_from_dict(ASKING)
     with pytest.raises(SceneError, match=r"accuracy = 0\.0001"):
         run(scene, MemoryRecorder(scene))
-    with pytest.raises(SceneError, match=r"accuracy = 0\.0001 picks"):
-        orders(scene)
 
 
 def test_command(tmp_path):

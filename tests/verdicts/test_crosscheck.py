@@ -14,7 +14,7 @@ from springbeam.monolithic import event_driven
 from springbeam.scene import scene_from_dict
 from springbeam.studies import comparison
 from springbeam.studies.comparison import _judged, compare
-from springbeam.studies.crosscheck import crosscheck, orders, parts_of_orders
+from springbeam.studies.crosscheck import crosscheck
 
 SOFT = load_scene("soft")
 
@@ -116,18 +116,13 @@ def test_a_wrong_reference_fails(monkeypatch, what):
     assert compare(scene)["verdict"] == "differs"
 
 
-def test_quick_compares_the_first_quarter_and_leaves_the_last_halving_out(here, unpainted):
+def test_quick_compares_the_first_quarter(here, unpainted):
     changes = ("time.t_end=0.2", "beam.n_elements=6", "coupling.macro_step=1e-3")
     settings = [*(f"--set={change}" for change in changes), "--quick", "--json"]
     found = json.loads(printed("crosscheck", "soft", *settings))
     assert (found["verdict"], found["scene"]["time"]["t_end"]) == ("agrees", 0.05)
     rows = list(csv.DictReader((here / found["files"][0]).open()))
     assert [float(row["error"]) for row in rows] == [row["error"] for row in found["quantities"]]
-    found = json.loads(printed("crosscheck", "soft", *settings, "--orders"))
-    assert "error_H/4" in found["orders"][0]
-    assert "error_H/8" not in found["orders"][0]
-    rows = list(csv.DictReader((here / found["files"][0]).open()))
-    assert [float(row["order_H"]) for row in rows] == [row["order_H"] for row in found["orders"]]
 
 
 def test_quick_counts_from_the_arrival_of_the_tip():
@@ -204,24 +199,3 @@ def test_a_third_run_is_made_only_where_two_do_not_agree_with_the_reference(monk
     sizes.clear()
     compare(with_changes(SOFT, time={"t_end": 0.05}, coupling={"macro_step": 1e-3}))
     assert sizes == [1e-3, 5e-4]
-
-
-def test_orders_are_those_of_the_scheme():
-    """Degree 0: displacement, velocity and force of order 4. Each part is reported, for a progress bar that ends."""
-    done = []
-    coupling = {"macro_step": 1e-3, "degree": 0}
-    scene = with_changes(SOFT, time={"t_end": 0.07}, coupling=coupling)
-    found = orders(scene, quick=True, done=lambda: done.append(1))
-    assert len(done) == parts_of_orders(quick=True)
-    by_name = {row["quantity"]: row["order_H/2"] for row in found.tables["orders"]}
-    assert [by_name[name] for name in ("y", "z", "contact_force")] == pytest.approx([4.0] * 3, abs=0.5)
-
-
-def test_orders_of_runs_that_all_stop_are_no_success():
-    """Jacobi on a contact that is far too stiff for it: there was an empty table, and exit code 0."""
-    contact = {"law": "compliance", "stiffness": 1e9, "exponent": 1.0}
-    coupling = {"scheme": "jacobi", "macro_step": 1e-2}
-    wild = with_changes(SOFT, contact=contact, coupling=coupling, time={"t_end": 0.1}, beam={"n_elements": 3})
-    found = orders(wild, quick=True)
-    assert (found.code, found.tables["orders"], list(found.document["stopped"])) == (3, [], ["H", "H/2", "H/4"])
-    assert "fewer than two of the runs came to their end" in found.error

@@ -250,14 +250,6 @@ def sweep(
     ] = "latin_hypercube",
     seed: SeedOption = 0,
     metric: MetricOption = None,
-    boundary: Annotated[
-        str,
-        typer.Option(
-            "--boundary",
-            metavar="METRIC=LIMIT",
-            help="Over amplitude and duration of a pulse: the damage boundary, where the metric reaches its limit.",
-        ),
-    ] = "",
 ) -> Study:
     """Run a scene with many values of its keys, on all cores or a Dask cluster; write one row per run.
 
@@ -272,7 +264,6 @@ def sweep(
         sampling=sampling,
         seed=seed,
         metric=tuple(metric or ()),
-        boundary=boundary,
     )
 
 
@@ -380,18 +371,13 @@ def converge(
 def crosscheck(
     scene: SceneArgument,
     settings: SettingsOption = None,
-    with_orders: Annotated[
-        bool, typer.Option("--orders", help="Repeat the run at H/2, H/4, H/8; print observed orders instead.")
-    ] = False,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Compare only the first quarter of the time; with --orders, not H/8.")
-    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Compare only the first quarter of the time.")] = False,
 ) -> Once:
     """Compare the co-simulation with the monolithic reference of its law.
 
     Exit code 1 if they differ, 4 if they cannot be compared over the whole run.
 
-    Example: springbeam crosscheck soft --set coupling.degree=2 --orders
+    Example: springbeam crosscheck soft --set coupling.degree=2
     """
     from ..monolithic import event_driven
     from ..studies import crosscheck as study
@@ -399,7 +385,6 @@ def crosscheck(
 
     what = scenes.load_scene(scene, settings or ())
     event_driven.refuse(what)
-    look = study.orders if with_orders else study.crosscheck
 
     def compare(done: Done) -> Findings:
         made = picked(what, silent=True)
@@ -407,13 +392,9 @@ def crosscheck(
         if made is not None:
             compared = made.scene
             done()
-        found = look(compared, quick=quick, done=done)
+        found = study.crosscheck(compared, quick=quick, done=done)
         if made is None:
             return found
         return replace(found, shown=[f"accuracy {picked_in_words(made.summary['accuracy'])}", *found.shown])
 
-    searches = int(what.accuracy is not None)
-    if with_orders:
-        parts = study.parts_of_orders(quick)
-        return Once("orders", f"a reference and {parts - 1} runs", parts + searches, compare)
-    return Once("crosscheck", "2 runs and 2 references", PARTS + searches, compare)
+    return Once("crosscheck", "2 runs and 2 references", PARTS + (what.accuracy is not None), compare)

@@ -1,30 +1,21 @@
-"""``springbeam crosscheck``: compare a run with the reference of its law, and show the orders of smaller steps."""
+"""``springbeam crosscheck``: compare a run with the reference of its law."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-import numpy as np
 from rich.text import Text
 
 from ..monolithic import event_driven
-from ..pictures.diagrams import Diagram, draw_diagrams
-from ..results.contact_changes import contact_changes
 from ..results.trajectory import Trajectory, columns_of
-from ..run.outcome import RunStopped
 from ..scene import Scene, with_changes
-from .accuracy import simulate
-from .comparison import SHORT, Verdict, away_from, compare, macro_points, quantities, sample
-from .tables import Done, Findings, Row, difference, in_words, table, unseen
+from .comparison import Verdict, compare
+from .tables import Done, Findings, difference, table, unseen
 
 #: Exit codes of the command.
 CODES: dict[Verdict, int] = {"agrees": 0, "differs": 1, "not comparable": 4}
-_STOPPED = 3
-#: Number of halvings of the macro step; one less if quick.
-_HALVINGS = 3
 
 
 def crosscheck(scene: Scene, *, quick: bool = False, done: Done = unseen) -> Findings:
@@ -76,84 +67,3 @@ def _drawn(runs: Mapping[str, Trajectory]) -> Any:
 
 def _ok(row: Mapping[str, Any]) -> str:
     return "ok" if row["passed"] else "DIFFERS"
-
-
-def orders(scene: Scene, *, quick: bool = False, done: Done = unseen) -> Findings:
-    """Compare ``scene`` at H, H/2, H/4, … with the event-driven reference: errors and observed orders.
-
-    Errors of displacement, velocity and contact force are in the max norm between two changes of contact, at the macro
-    points that all runs share and two macro steps away from the events. A run that stops early leaves its column empty;
-    fewer than two runs show no order: exit code 3. ``done`` is called after each of `parts_of_orders`.
-
-    Raises
-    ------
-    SceneError
-        If there is no reference to converge to, or ``scene`` asks for an accuracy.
-    ReferenceFailure
-        If the reference stops early.
-    """
-    event_driven.refuse(scene)
-    H = scene.coupling.H
-    sizes = {f"H/{2**k}" if k else "H": H / 2**k for k in range(parts_of_orders(quick) - 1)}
-    reference = event_driven.integrate(scene, sample_times=macro_points(scene))
-    done()
-    found = dict[str, list[Row]]()
-    stopped = dict[str, str]()
-    for step, size in sizes.items():
-        try:
-            found[step] = _errors(scene, simulate(with_changes(scene, coupling={"macro_step": size})), reference)
-        except RunStopped as error:
-            stopped[step] = str(error)
-        done()
-    rows = list[Row]()
-    cells = list[tuple[Any, ...]]()
-    curves = dict[str, dict[str, Any]]()
-    for several in zip(*found.values(), strict=True):
-        errors = dict(zip(found, (row["error"] for row in several), strict=True))
-        observed = {
-            a: float(np.log2(errors[a] / errors[b])) / float(np.log2(sizes[a] / sizes[b]))
-            for a, b in itertools.pairwise(errors)
-            if errors[a] and errors[b]
-        }
-        row = {name: several[0][name] for name in ("phase", "begin", "end", "quantity")}
-        between = " ".join(in_words(observed.get(step), ".1f") or "–" for step in list(errors)[:-1])
-        shown = (errors.get(step) for step in sizes)
-        cells.append((row["phase"], row["begin"], row["quantity"], *shown, between))
-        of_stretch = curves.setdefault(f"{row['phase']} from {row['begin']:.4g} s", {})
-        of_stretch[row["quantity"]] = [(sizes[step], error) for step, error in errors.items()]
-        row |= {f"error_{step}": errors.get(step) for step in sizes}
-        rows.append(row | {f"order_{step}": observed.get(step) for step in list(sizes)[:-1]})
-    names = ("phase", "from [s]:.4f", "quantity", *(f"{step}:.1e" for step in sizes), "orders")
-    diagrams = [Diagram("macro step [s]", "unit of the quantity", lines, stretch) for stretch, lines in curves.items()]
-    draw = partial(draw_diagrams, diagrams, f"{scene.title}: largest errors")
-    return Findings(
-        {"orders": rows, "stopped": stopped},
-        [table(names, cells, "largest errors")] + [f"{step}: {why}" for step, why in stopped.items()],
-        code=_STOPPED if len(found) < 2 else 0,
-        error="no orders: fewer than two of the runs came to their end" if len(found) < 2 else "",
-        tables={"orders": rows},
-        pictures={"orders": draw} if rows else {},
-    )
-
-
-def parts_of_orders(quick: bool) -> int:
-    """Return how many solutions `orders` computes: the reference and the runs."""
-    return 1 + _HALVINGS + 1 - quick
-
-
-def _errors(scene: Scene, run: Trajectory, reference: Trajectory) -> list[Row]:
-    """Return a row per quantity between two changes of contact, with the largest error."""
-    times = macro_points(scene)
-    H = scene.coupling.H
-    names = [name for name in quantities(scene) if name not in ("e_beam", "e_spring")]
-    sampled = sample(run, times)
-    off = {name: np.abs(sampled[name] - reference[name]) for name in names}
-    changes = [change.time for change in contact_changes(reference, SHORT * H)]
-    found = []
-    for begin, end in itertools.pairwise([times[0], *changes, scene.time.t_end]):
-        inside = np.flatnonzero((times > begin) & (times < end) & away_from(times, (begin, end), H))
-        phase = str(reference.phase[inside[len(inside) // 2]]) if len(inside) >= 4 else ""
-        for name in (name for name in names if phase and (name, phase) != ("contact_force", "free")):
-            error = float(np.nanmax(off[name][inside]))
-            found.append({"phase": phase, "begin": begin, "end": end, "quantity": name, "error": error})
-    return found
