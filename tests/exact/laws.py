@@ -6,15 +6,21 @@ Two free masses meet: with the reduced mass μ = 1/(1/m₁ + 1/m₂) the penetra
     μ w dw/(1 + χ w) = −λ p^q dp,     G(w) = (χ w − ln(1 + χ w))/χ²,     G(w) = G(v) − λ p^{q+1}/(q + 1)μ
 
 so that G = 0 at the largest penetration, and the ends part with −w, G(w) = G(v), w < 0 (χ → 0: G = w²/2, w = −v).
+
+A unilateral spring and damper, C = (λ p + c ṗ)₊, is a damped oscillator until −μ p̈ = C = 0 (Schwager & Pöschel 2007)::
+
+    ω² = λ/μ,     ζ = sin φ = c/2μω < 1,     p = v e^{−ζωt} sin(ω t cos φ)/(ω cos φ)
+    C = 0 at ω t cos φ = π − 2φ,     ṗ = −e v there,     e = e^{−(π − 2φ) tan φ}
 """
 
 from __future__ import annotations
 
 from functools import partial
 from itertools import product
-from math import nan, pi, sin, sqrt
+from math import asin, cos, exp, nan, pi, sin, sqrt, tan
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.special import beta, lambertw, spherical_jn
 
 from springbeam.run.runner import run_in_memory
@@ -141,6 +147,58 @@ def hunt_crossley(q):
         ),
     )
     yield from _halving(quantities, scene, duration / 20.0, ida_error(pi))
+
+
+@section("Law: unilateral spring and damper", *product((0, 1, 2), (0.1, 0.5)))
+def kelvin_voigt(degree, ratio):
+    """C = (λ p + c ṗ)₊ at a damping ratio ζ, λ = 1e4 N/m: C ends at p > 0, which opens at e v; a step ends there."""
+    omega = sqrt(_STIFFNESS / _REDUCED)
+    phi = asin(ratio)
+    pulls = (pi - 2.0 * phi) / (omega * cos(phi))
+    rebound = exp(-(pi - 2.0 * phi) * tan(phi))
+    opens = pulls + sin(2.0 * phi) / (omega * cos(phi))
+    law = {"law": "kelvin_voigt", "stiffness": _STIFFNESS, "damping": 2.0 * ratio * _REDUCED * omega}
+    scene = partial(masses, *_MEETING, law, 1.5 * opens, degree=degree)
+    quantities = (
+        (f"degree {degree}, ζ = {ratio:g}: part at [m/s]", rebound, _parting),
+        (f"degree {degree}, ζ = {ratio:g}: lasts [s]", opens, _duration),
+        (
+            f"degree {degree}, ζ = {ratio:g}: dissipated [J]",
+            0.5 * _REDUCED * (1.0 - rebound**2),
+            lambda run: float(run["e_dissipated"][-1]),
+        ),
+    )
+    yield from _halving(quantities, scene, pulls / 20.0, ida_error(pi))
+
+
+@section("Law: rigid ends that only push")
+def unilateral():
+    """Unit masses held by 12π² and 4π² N/m, the lower one lifted by f = 1 N, meet at −1 m/s and y = Ψ = 0.
+
+    One oscillator of ω² = 8π² from ẏ = −½ m/s about y∞ = f/16π², until C = 4π² y + f/2 = 0 at y = −2 y∞ < Ψ; then two.
+    """
+    omega = sqrt(8.0) * pi
+    middle = 1.0 / (16.0 * pi**2)
+
+    def height(t):
+        return middle * (1.0 - cos(omega * t)) - 0.5 / omega * sin(omega * t)
+
+    part = brentq(lambda t: height(t) + 2.0 * middle, 0.0, 0.5 * pi / omega, xtol=1e-15)
+    speed = middle * omega * sin(omega * part) - 0.5 * cos(omega * part)
+    own = 2.0 * pi
+    tau = 0.05 - part
+    rest = 1.0 / own**2
+    beam, spring = held(12.0 * pi**2, own**2, initial_velocity_slope=-1.0)
+    scene = partial(masses, beam, spring | {"external_force": 1.0}, {"law": "unilateral"}, 0.05, degree=2)
+    top = rest - (rest + 2.0 * middle) * cos(own * tau) + speed / own * sin(own * tau)
+    fast = sqrt(3.0) * own
+    tip = -2.0 * middle * cos(fast * tau) + speed / fast * sin(fast * tau)
+    quantities = (
+        ("part at [s]", part, _duration),
+        ("y(0.05) [m]", top, lambda run: float(run["y"][-1])),
+        ("u(0.05) [m]", tip, lambda run: float(run["u_tip"][-1])),
+    )
+    yield from _halving(quantities, scene, 0.01, ida_error(omega))
 
 
 @section("Law: two masses on a link", *product((0, 1, 2), (0.025, 0.0125)))

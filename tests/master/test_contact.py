@@ -9,7 +9,7 @@ from springbeam import Motion, load_scene, with_changes
 from springbeam.contact.impacts import NO_IMPACT, foundation_impact, meeting
 from springbeam.contact.phases import Automaton, Instant, Joint, Outcome, Phase
 from springbeam.motion.events import EventKind
-from springbeam.scene.laws import Compliance, Link, depth
+from springbeam.scene.laws import Compliance, KelvinVoigt, Link, depth
 
 
 def automaton_of(scene="soft", tip_mass=0.01, mass=1.0, equilibrium=0.0, **tables):
@@ -127,10 +127,10 @@ def test_a_depth_is_found_where_the_energy_of_a_little_more_is_no_double():
     assert depth(Compliance(1e-3, 2000.0), 1.0) == pytest.approx(2.001e6 ** (1.0 / 2001.0), rel=1e-15)
 
 
-@pytest.mark.parametrize("law", [Compliance(1e4, 1.5, 0.5), Link(1e4, 3.0)], ids=repr)
+@pytest.mark.parametrize("law", [Compliance(1e4, 1.5, 0.5), KelvinVoigt(1e4, 1.5, 5.0), Link(1e4, 3.0)], ids=repr)
 @pytest.mark.parametrize("rate", [0.3, -1.9, -2.1])
 def test_the_slopes_of_what_damping_adds_are_those_of_its_force(law, rate):
-    """Compliance pushes no more where the ends part at 2 m/s or faster."""
+    """Both one-sided laws push no more where the ends part at 2 m/s or faster."""
 
     def damping(p, rate):
         return law.force(p, rate) - law.force(p)

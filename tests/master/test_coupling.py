@@ -13,7 +13,7 @@ from springbeam.coupling.projection import Projection
 from springbeam.coupling.protocol import NotConverged
 from springbeam.coupling.soft import SoftSolver
 from springbeam.coupling.solver import StepSolver
-from springbeam.scene.laws import Compliance, Link
+from springbeam.scene.laws import Compliance, KelvinVoigt, Link
 
 # -- the tie by itself, on bodies exact to rounding: conditions, energy, orders, cost, stability, failures ------------
 
@@ -89,7 +89,10 @@ def test_a_body_may_be_rounded_by_a_thousand_tolerances_and_no_more(grain, found
 # -- soft laws on bodies exact to rounding: energy at any stiffness, orders 2, 4 and 6, cost --------------------------
 
 
-@pytest.mark.parametrize("law", [Compliance(1e4, 1.5, 0.5), Compliance(1e6, 1.0, 5.0), Link(1e4, 3.0)], ids=repr)
+DAMPED = [Compliance(1e4, 1.5, 0.5), Compliance(1e6, 1.0, 5.0), KelvinVoigt(1e4, 1.0, 5.0), Link(1e4, 3.0)]
+
+
+@pytest.mark.parametrize("law", DAMPED, ids=repr)
 @pytest.mark.parametrize(("degree", "size"), [(0, 1e-3), (1, 2e-2), (2, 2e-2)])
 def test_what_damping_takes_is_booked(law, degree, size):
     """The bodies' and the law's energies and what the law dissipated: constant to rounding, at any step."""

@@ -11,7 +11,7 @@ from scipy.special import airy
 
 from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
 from springbeam.coupling import solver
-from springbeam.scene.laws import Compliance
+from springbeam.scene.laws import Compliance, KelvinVoigt
 
 
 @pytest.mark.parametrize("section", exact.SECTIONS, ids=lambda section: section.solution.__name__)
@@ -57,7 +57,7 @@ def test_a_body_that_is_off_by_one_percent_fails(section, body, key, change, cha
 
 
 RIGHT = {method: getattr(FmuBeam, method) for method in ("advance", "energies")}
-RESISTANCE = Compliance.resistance
+RESISTANCE = {law: law.resistance for law in (Compliance, KelvinVoigt)}
 
 
 def pushed(self, time, size, force, *rest):
@@ -72,8 +72,8 @@ def energies(self, part):
 
 
 def hardly_damped(law, p, rate):
-    """The contact takes 1 % less than χ would."""
-    return RESISTANCE(replace(law, damping=0.99 * law.damping), p, rate)
+    """The contact takes 1 % less than its damping would."""
+    return RESISTANCE[type(law)](replace(law, damping=0.99 * law.damping), p, rate)
 
 
 @pytest.mark.parametrize(
@@ -84,8 +84,9 @@ def hardly_damped(law, p, rate):
         (exact.energy_scheme, FmuBeam, "energies", partialmethod(energies, "potential")),
         (exact.energy_scheme, FmuBeam, "energies", partialmethod(energies, "dissipated")),
         (exact.hunt_crossley, Compliance, "resistance", hardly_damped),
+        (exact.kelvin_voigt, KelvinVoigt, "resistance", hardly_damped),
     ],
-    ids=["force", "kinetic", "potential", "dissipated", "damping"],
+    ids=["force", "kinetic", "potential", "dissipated", "damping", "damper"],
 )
 def test_a_part_that_is_wrong_fails(section, owner, method, wrong, monkeypatch, none_kept):
     monkeypatch.setattr(owner, method, wrong)

@@ -15,6 +15,7 @@ T = 0.064
 LAWS = {
     "tie": {"law": "tie"},
     "link": {"law": "link", "stiffness": 1e3, "damping": 1.0},
+    "kelvin_voigt": {"law": "kelvin_voigt", "stiffness": 1e6, "exponent": 3.0, "damping": 2.0},
     "compliance": {"law": "compliance", "stiffness": 1e6, "exponent": 3.0},
 }
 SCHEMES = [
@@ -25,6 +26,9 @@ SCHEMES = [
     ("link", "energy", 0, 2, 32),
     ("link", "energy", 1, 4, 16),
     ("link", "energy", 2, 6, 16),
+    ("kelvin_voigt", "energy", 0, 2, 64),
+    ("kelvin_voigt", "energy", 1, 4, 32),
+    ("kelvin_voigt", "energy", 2, 6, 16),
     ("compliance", "energy", 0, 2, 64),
     ("compliance", "energy", 1, 4, 32),
     ("compliance", "energy", 2, 6, 16),

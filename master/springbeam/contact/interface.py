@@ -15,6 +15,7 @@ class Rigid:
     """A law that holds ends together where they meet, by whatever force that takes."""
 
     lasting: bool = False  #: from the start and for good, for either sign of the force
+    ties: bool = False  #: for either sign of the force as long as the ends are below Ψ; above, they only push
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Interface:
     law
         What acts between the ends; ``None`` where nothing does, as of one body alone.
     equilibrium
-        Ψ: the height below which a rigid law ties the ends [m].
+        Ψ: the height below which a law that ties does so [m].
     floor, restitution
         φ: the height of the rigid foundation [m], ``None`` without one; e of impacts on it.
     alone

@@ -74,7 +74,7 @@ class Guards(NamedTuple):
     """What may end a phase."""
 
     functions: list[tuple[EventKind, EventFunction]]
-    force: tuple[EventKind, PushingForce] | None
+    forces: list[tuple[EventKind, PushingForce]]
 
 
 class Automaton:
@@ -95,7 +95,7 @@ class Automaton:
         self._mass = interface.lower.mass
         self._hardest = 0.0  #: speed of the fastest impact on the foundation so far [m/s]
         self._phase: Phase | None = None
-        self._guards = Guards([], None)
+        self._guards = Guards([], [])
         #: The ends of the last call, and the samples there: a step starts where the one before has ended.
         self._ends: Ends | None = None
         self._samples: list[Sample] = []
@@ -121,15 +121,15 @@ class Automaton:
 
     def _guards_of(self, phase: Phase) -> Guards:
         functions: list[tuple[EventKind, EventFunction]] = []
-        force = None
+        forces: list[tuple[EventKind, PushingForce]] = []
         for row in TRANSITIONS:
             if row.where(self._interface) and row.joint in (None, phase.joint) and phase.seated in row.seated:
                 guard = row.guard(self._interface, phase)
                 if isinstance(guard, str):
-                    force = (row.kind, guard)
+                    forces.append((row.kind, guard))
                 else:
                     functions.append((row.kind, guard))
-        return Guards(functions, force)
+        return Guards(functions, forces)
 
     # -- effects ----------------------------------------------------------------------------------------------------
 
@@ -138,8 +138,8 @@ class Automaton:
         tip, low = at.ends
         impact = meeting(tip.velocity, low.velocity, self._tip_mass, self._mass)
         common = low.velocity + impact.on_spring / self._mass
-        if self._interface.lasting:
-            tied = True
+        if not ties(self._interface):
+            tied = self._interface.lasting
         elif self._is_at_equilibrium(at):
             tied = common < 0.0 or (common == 0.0 and not self._rises_from_rest())
         else:
@@ -162,7 +162,8 @@ class Automaton:
     def part(self, at: Instant) -> Outcome:
         """The ends take their common velocity and part: *free*; a massless tip that falls through Ψ is *tied*."""
         _, low = at.ends
-        if self._tip_mass == 0.0 and low.velocity < 0.0 and self._is_at_equilibrium(at):
+        falls = low.velocity < 0.0 and ties(self._interface) and self._is_at_equilibrium(at)
+        if self._tip_mass == 0.0 and falls:
             return self.tie(at)  # C vanishes at Ψ, where they are tied again
         opened = Phase(Joint.FREE, seated=at.phase.seated and not self._interface.alone)
         return Outcome(EventKind.SEPARATION, opened, self._parting(opened, at))
@@ -234,8 +235,18 @@ def joins(interface: Interface) -> bool:
 
 
 def lets_part(interface: Interface) -> bool:
-    """the law `transmission`"""
+    """the laws `transmission` and `unilateral`"""
     return joins(interface) and not interface.lasting
+
+
+def ties(interface: Interface) -> bool:
+    """the law `transmission`"""
+    return isinstance(interface.law, Rigid) and interface.law.ties
+
+
+def only_pushes(interface: Interface) -> bool:
+    """the law `unilateral`"""
+    return lets_part(interface) and not ties(interface)
 
 
 def has_foundation(interface: Interface) -> bool:
@@ -314,9 +325,10 @@ _EITHER = (False, True)
 #: What ends each phase. Where two guards become zero at once, the first one counts.
 TRANSITIONS = (
     Transition(joins, Joint.FREE, _EITHER, gap_above_zero, EventKind.IMPACT, Automaton.meet),
-    Transition(lets_part, Joint.TIED, _OFF, below_equilibrium, EventKind.RELEASE, Automaton.release),
-    Transition(lets_part, Joint.TOUCH, _EITHER, above_equilibrium, EventKind.RETIE, Automaton.tie),
+    Transition(ties, Joint.TIED, _OFF, below_equilibrium, EventKind.RELEASE, Automaton.release),
+    Transition(ties, Joint.TOUCH, _EITHER, above_equilibrium, EventKind.RETIE, Automaton.tie),
     Transition(lets_part, Joint.TOUCH, _OFF, contact_pushes, EventKind.SEPARATION, Automaton.part),
+    Transition(only_pushes, Joint.TOUCH, _ON, contact_pushes, EventKind.SEPARATION, Automaton.part),
     Transition(has_foundation, None, _OFF, above_foundation, EventKind.STOP_IMPACT, Automaton.strike),
     Transition(carries_two_ends, None, _ON, foundation_pushes, EventKind.UNSEATED, Automaton.leave),
     Transition(carries_the_tip, None, _ON, contact_pushes, EventKind.SEPARATION, Automaton.part),

@@ -96,7 +96,7 @@ class Projection:
                 raise OverflowError
             return [mean]
         path = b0, b1, b2, b3 = _path(start, x)
-        rule = self._quadrature(path, start, x[0])
+        rule = self._quadrature(path, start, x[0], size)
         m0 = m1 = m2 = 0.0
         for s, weight in rule:
             m = weight * law(b0 + s * (b1 + s * (b2 + s * b3)))
@@ -129,7 +129,7 @@ class Projection:
             of_mean = law.slope(mean)
             return [[of_mean * value for value in row] for row in self._by_x_projected]
         path = _path(start, x)
-        rule = self._quadrature(path, start, x[0])
+        rule = self._quadrature(path, start, x[0], size)
         rows = [[0.0] * len(x) for _ in x]
         for s, weight in rule:
             p, rate = _at(path, s, size)
@@ -150,7 +150,7 @@ class Projection:
         """Return ∫ D ṗ dτ ≥ 0 [J] over a step of ``size`` [s]."""
         path = _path(start, x)
         total = 0.0
-        for s, weight in self._quadrature(path, start, x[0]):
+        for s, weight in self._quadrature(path, start, x[0], size):
             p, rate = _at(path, s, size)
             total += weight * self.law.resistance(p, rate)[0] * rate
         return 0.5 * size * total
@@ -169,8 +169,8 @@ class Projection:
         square = 2.0 * (b1 + b3) ** 2 + 8.0 / 3.0 * b2 * b2 + 1.6 * b3 * b3
         return missing / square if square > 0.0 else 0.0
 
-    def _quadrature(self, path: _Path, start: float, end: float) -> _Rule:
-        """Return a rule for the pieces of the step where the law acts, without points if there are none."""
+    def _quadrature(self, path: _Path, start: float, end: float, size: float) -> _Rule:
+        """Return a rule for the pieces of a step of ``size`` [s] in each of which the law is smooth."""
         if not self.law.one_sided:
             return self._few
         _, b1, b2, b3 = path
@@ -180,14 +180,35 @@ class Projection:
         high = max(start, second, third, end)  # of the Bézier points
         if high <= 0.0:
             return ()
-        if low > _OFF_ZERO * high:
+        away = low > _OFF_ZERO * high
+        breaks = [-1.0, *(() if away else sign_changes(path, -1.0, 1.0)), 1.0]
+        limits = self._limits(path, size, breaks) if self._damped else []
+        if away and not limits:
             return self._few if low > _STEADY * high else _MANY
         rule: list[tuple[float, float]] = []
-        for left, right in pairwise([-1.0, *sign_changes(path, -1.0, 1.0), 1.0]):
+        for left, right in pairwise(sorted(breaks + limits)):
             if _at(path, 0.5 * (left + right))[0] > 0.0:
                 length = right - left
                 rule += [(left + length * t, length * weight) for t, weight in _GRADED]
         return rule
+
+    def _limits(self, path: _Path, size: float, breaks: Sequence[float]) -> list[float]:
+        """Return where between ``breaks`` the resistance reaches or leaves its limit, at which the force is 0."""
+
+        def varies(s: float) -> bool:
+            return self.law.resistance(*_at(path, s, size))[2] > 0.0
+
+        found = []
+        for left, right in pairwise(breaks):
+            points = [left + 0.5 * (1.0 + s) * (right - left) for s, _ in _MANY]
+            for (low, before), (high, after) in pairwise((s, varies(s)) for s in points):
+                if before is not after:
+                    a = low
+                    b = high
+                    while a < (middle := 0.5 * (a + b)) < b:
+                        a, b = (middle, b) if varies(middle) is before else (a, middle)
+                    found.append(b)
+        return found
 
 
 def _changes(start: float, end: float) -> bool:

@@ -140,6 +140,19 @@ class Transmission(Law):
         return ("tied", "impact") if happened == "meet" and height < 0.0 else _AFTER[happened]
 
 
+class Unilateral(Law):
+    """Ends that touch with C ≥ 0 at any height."""
+
+    rigid = True
+
+    def inside(self, C: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return zeros: nothing is compliant."""
+        return np.zeros_like(C)
+
+    def watched(self, phase: ReferencePhase) -> list[Watch]:
+        return [Watch("separate", lambda m: m.C, "N")] if phase.contact == "touch" else super().watched(phase)
+
+
 class Tie(Law):
     """Ends that are one from the start, for either sign of C."""
 
@@ -169,24 +182,29 @@ class Link(Law):
         return np.asarray(self.damping * rate**2)
 
 
-class Compliance(Law):
-    """Normal compliance with a moving obstacle, C = F (1 + χ ṗ) with F = λ_nc p₊^q (Hunt & Crossley 1975).
+class _Pressing(Law):
+    """A damped law that never pulls, with F = λ p₊^q.
 
-    C is never negative: where the ends part faster than 1/χ the contact is `slack` until they slow down or p = 0.
+    Where its `force` would be negative the contact is `slack`, until it would be positive again or p = 0.
     """
 
     def _elastic(self, p: np.ndarray) -> np.ndarray:
         """Return F [N]."""
         return np.asarray(self.stiffness * np.maximum(p, 0.0) ** self.exponent)
 
-    def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        return self._elastic(p) * (1.0 + self.damping * rate)
-
     def potential(self, p: np.ndarray) -> np.ndarray:
         return np.asarray(self._elastic(p) * np.maximum(p, 0.0) / (self.exponent + 1.0))
 
     def dissipation(self, contact: ContactState, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        return np.asarray(self._elastic(p) * rate * (-1.0 if contact == "slack" else self.damping * rate))
+        elastic = self._elastic(p)
+        return np.asarray(((0.0 if contact == "slack" else self.force(p, rate)) - elastic) * rate)
+
+
+class Compliance(_Pressing):
+    """Normal compliance with a moving obstacle, C = F (1 + χ ṗ) with F = λ_nc p₊^q (Hunt & Crossley 1975)."""
+
+    def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        return self._elastic(p) * (1.0 + self.damping * rate)
 
     def watched(self, phase: ReferencePhase) -> list[Watch]:
         watched = super().watched(phase)
@@ -198,10 +216,27 @@ class Compliance(Law):
         return [*watched, Watch("slacken", lambda m: m.z - m.v + fastest, "m/s")]
 
 
+class KelvinVoigt(_Pressing):
+    """A unilateral spring and damper, C = F + c ṗ with F = λ p^q."""
+
+    def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        return self._elastic(p) + self.damping * rate
+
+    def watched(self, phase: ReferencePhase) -> list[Watch]:
+        watched = super().watched(phase)
+        if self.damping == 0.0 or phase.contact == "free":
+            return watched
+        if phase.contact == "slack":
+            return [*watched, Watch("press", lambda m: -self.force(m.y - m.u, m.z - m.v), "N")]
+        return [*watched, Watch("slacken", lambda m: self.force(m.y - m.u, m.z - m.v), "N")]
+
+
 #: By their names in a scene.
 REFERENCE_LAWS: dict[str, type[Law]] = {
     "transmission": Transmission,
+    "unilateral": Unilateral,
     "compliance": Compliance,
+    "kelvin_voigt": KelvinVoigt,
     "tie": Tie,
     "link": Link,
 }

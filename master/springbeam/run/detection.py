@@ -64,15 +64,15 @@ class Detector:
         for (kind, _), (value, rate) in zip(
             self._automaton.guards(phase).functions, self._automaton.samples(phase, start), strict=True
         ):
-            if rate < 0.0 and value <= self.tolerance(start) and rate < -self._rest(state, start):
+            soon = self.tolerance(start) - SAME * self._controller.size * rate  # it would fall so far in no time
+            if rate < 0.0 and value <= soon and rate < -self._rest(state, start):
                 return kind
             if kind is EventKind.SEPARATION and value < -self.simultaneity_tolerance(start):
                 return kind
-        by_force = self._automaton.guards(phase).force
-        if by_force is None:
-            return None
-        kind, force = by_force
-        return kind if self._pulls(force, state, state.present, start) else None
+        for kind, force in self._automaton.guards(phase).forces:
+            if self._pulls(force, state, state.present, start):
+                return kind
+        return None
 
     def first_event(self, state: State, step: Step) -> tuple[Step, EventKind | None]:
         """The step, cut to its first event, and the kind of that; ``None`` if nothing happens in it."""
@@ -85,10 +85,14 @@ class Detector:
         if step.size == 0.0:
             return step, found
         step = self._pair.repeated(state, step)
-        pulled = self._first_by_force(state, step)
-        if pulled is None:
+        cut = step
+        kind = None
+        for of_force, force in self._automaton.guards(state.phase).forces:
+            if cut.size > 0.0 and (pulled := self._first_by_force(state, cut, force)) is not None:
+                cut = pulled
+                kind = of_force
+        if kind is None:
             return self._pair.repeated(state, step), found
-        cut, kind = pulled
         if 0.0 < cut.size < step.size:
             # Under the force of the shorter step the ends move differently: they may strike something before.
             cut, found = self._first_by_position(state, cut)
@@ -144,17 +148,13 @@ class Detector:
         mass = pair.lower.mass if force == "foundation" else pair.reduced_mass(state.phase)
         return pull * H > mass * VELOCITY_ROUNDING * state.fastest and pull * H * H > 2.0 * mass * self.tolerance(ends)
 
-    def _first_by_force(self, state: State, step: Step) -> tuple[Step, EventKind] | None:
-        """Return ``step``, cut to where a force that can only push vanishes, and the event; the bodies are at its end.
+    def _first_by_force(self, state: State, step: Step, force: PushingForce) -> Step | None:
+        """Return ``step``, cut to where a ``force`` that can only push vanishes; the bodies are at its end.
 
         ``None`` if it pushes all the time; of size 0 if it pulls from the start.
         """
         pair = self._pair
         H = self._controller.size
-        by_force = self._automaton.guards(state.phase).force
-        if by_force is None:
-            return None
-        kind, force = by_force
         start = max(state.present.of(force), 0.0)
         last = step
 
@@ -189,8 +189,8 @@ class Detector:
             # strong damping turns into a force: the parabola through the whole step shows better when it vanishes.
             last = pair.attempt(state, guess, step.start)
         if last.size >= SAME * H:
-            return last, kind
-        return None if state.met_again == state.time else (self._no_step(last), kind)
+            return last
+        return None if state.met_again == state.time else self._no_step(last)
 
     # -- events by positions --------------------------------------------------------------------------------------
 

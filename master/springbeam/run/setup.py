@@ -64,7 +64,7 @@ def set_up(scene: Scene, *abilities: Abilities) -> Setup:
         degree = min([scene.degree, *allowed])
     law: SoftLaw | Rigid | None = scene.soft_law
     if law is None and scene.coupled:
-        law = Rigid(scene.contact.lasting)
+        law = Rigid(scene.contact.lasting, scene.contact.ties)
     stop = scene.stop
     rigid = None if scene.elastic_stop else stop
     return Setup(

@@ -62,8 +62,8 @@ class SoftLaw:
 
 
 @dataclass(frozen=True)
-class Compliance(SoftLaw):
-    """Normal compliance C = λ p₊^q (1 + χ ṗ)₊ (Ahn & Tate, (5), with the moving obstacle y; χ: Hunt & Crossley 1975).
+class _Power(SoftLaw):
+    """A law with F = λ p₊^q.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Compliance(SoftLaw):
     exponent
         q ≥ 1.
     damping
-        χ ≥ 0 [s/m]; the force never pulls.
+        Of the law, ≥ 0; the force never pulls.
     """
 
     stiffness: float
@@ -83,12 +83,6 @@ class Compliance(SoftLaw):
     def damped(self) -> bool:
         return self.damping > 0.0
 
-    def force(self, p: float, rate: float = 0.0) -> float:
-        if p <= 0.0:
-            return 0.0
-        elastic: float = self.stiffness * p**self.exponent
-        return elastic if rate == 0.0 else elastic * max(1.0 + self.damping * rate, 0.0)
-
     def potential(self, p: float) -> float:
         q = self.exponent + 1.0
         return float(self.stiffness * p**q / q) if p > 0.0 else 0.0
@@ -96,10 +90,41 @@ class Compliance(SoftLaw):
     def slope(self, p: float) -> float:
         return float(self.exponent * self.stiffness * p ** (self.exponent - 1.0)) if p > 0.0 else 0.0
 
+
+class Compliance(_Power):
+    """Normal compliance C = λ p₊^q (1 + χ ṗ)₊ (Ahn & Tate, (5), with the moving obstacle y; χ: Hunt & Crossley 1975).
+
+    ``damping`` is χ [s/m].
+    """
+
+    def force(self, p: float, rate: float = 0.0) -> float:
+        if p <= 0.0:
+            return 0.0
+        elastic: float = self.stiffness * p**self.exponent
+        return elastic if rate == 0.0 else elastic * max(1.0 + self.damping * rate, 0.0)
+
     def resistance(self, p: float, rate: float) -> tuple[float, float, float]:
         force = self.force(p)
         share = max(self.damping * rate, -1.0)
         return force * share, self.slope(p) * share, self.damping * force if share > -1.0 else 0.0
+
+
+class KelvinVoigt(_Power):
+    """Unilateral spring and damper, C = (λ p^q + c ṗ)₊ for p > 0, else 0; ``damping`` is c [N·s/m]."""
+
+    def force(self, p: float, rate: float = 0.0) -> float:
+        if p <= 0.0:
+            return 0.0
+        return max(float(self.stiffness * p**self.exponent) + self.damping * rate, 0.0)
+
+    def resistance(self, p: float, rate: float) -> tuple[float, float, float]:
+        if p <= 0.0:
+            return 0.0, 0.0, 0.0
+        elastic = self.force(p)
+        viscous = self.damping * rate
+        if elastic + viscous > 0.0:
+            return viscous, 0.0, self.damping
+        return -elastic, -self.slope(p), 0.0
 
 
 @dataclass(frozen=True)
@@ -181,6 +206,8 @@ class Contact(Table):
     rigid: ClassVar[bool] = True
     #: Whether the law joins the ends from the start and for good, for either sign of C.
     lasting: ClassVar[bool] = False
+    #: Whether a rigid law ties the ends below Ψ, so that C may pull there.
+    ties: ClassVar[bool] = False
     #: Legend of the column ``compliance_force``, and its addition for a damped law.
     legend: ClassVar[str] = ""
     damper: ClassVar[str] = ""
@@ -230,17 +257,27 @@ class Contact(Table):
 
 
 class TransmissionContact(Contact):
-    """Tip and spring top move together while they touch; the keys are of the column ``compliance_force`` alone."""
+    """Ends that have met are tied below Ψ, where C may pull, and only push above; the keys are those of a column alone.
 
-    law: Literal["transmission"] = key("–", "the tip and the spring move together while they touch", "transmission")
+    They determine ``compliance_force``, a part of C that drives nothing.
+    """
+
+    law: Literal["transmission"] = key("–", "tied below Ψ, rigid ends that only push above", "transmission")
     stiffness: float = key("N/m^p", "λ_nc of the part of C that is normal compliance", 1.0e4, ge=0.0)
     exponent: float = key("–", "exponent p of normal compliance", 3.0, ge=1.0, le=100.0)
 
+    ties = True
     legend = "part λ(Ψ − u)₊ᵖ"
 
     def compliance(self, p: "np.ndarray") -> "np.ndarray":
         with np.errstate(over="ignore"):
             return np.asarray(self.stiffness * np.maximum(p, 0.0) ** self.exponent)
+
+
+class UnilateralContact(Contact):
+    """Rigid ends that only push, 0 ≤ C ⊥ u_tip − y ≥ 0 (Signorini); those that meet get one velocity."""
+
+    law: Literal["unilateral"] = key("–", "rigid ends that only push", "unilateral")
 
 
 class ComplianceContact(Contact):
@@ -257,6 +294,22 @@ class ComplianceContact(Contact):
 
     def force(self) -> Compliance:
         return Compliance(self.stiffness, self.exponent, self.damping)
+
+
+class KelvinVoigtContact(Contact):
+    """A unilateral spring and damper, C = (λ p^q + c ṗ)₊ for p > 0."""
+
+    law: Literal["kelvin_voigt"] = key("–", "a unilateral spring and damper", "kelvin_voigt")
+    stiffness: float = key("N/m^p", "stiffness λ of the contact", gt=0.0)
+    exponent: float = key("–", "exponent of the penetration in the elastic force", 1.0, ge=1.0, le=100.0)
+    damping: float = key("N·s/m", "damping c of the contact", 0.0, ge=0.0)
+
+    rigid = False
+    legend = "of the law λ(y − u)₊ᵖ"
+    damper = " + c(z − v)"
+
+    def force(self) -> KelvinVoigt:
+        return KelvinVoigt(self.stiffness, self.exponent, self.damping)
 
 
 class TieContact(Contact):
@@ -292,8 +345,29 @@ class LinkContact(Contact):
 #: By their names in a scene.
 LAWS: dict[str, type[Contact]] = {
     "transmission": TransmissionContact,
+    "unilateral": UnilateralContact,
     "compliance": ComplianceContact,
+    "kelvin_voigt": KelvinVoigtContact,
     "tie": TieContact,
     "link": LinkContact,
 }
-LAW = OneOf(Contact, "law", "the interface law (docs/choose.md helps to choose)", LAWS, "transmission")
+#: Names of laws elsewhere.
+_ELSEWHERE = {
+    "elastogap": "kelvin_voigt",
+    "impact": "kelvin_voigt",
+    "springdamper": "kelvin_voigt",
+    "voigt": "kelvin_voigt",
+    "huntcrossley": "compliance",
+    "hertz": "compliance",
+    "penalty": "compliance",
+    "normalcompliance": "compliance",
+    "signorini": "unilateral",
+    "rigid": "unilateral",
+    "hard": "unilateral",
+    "bonded": "tie",
+    "fixed": "tie",
+    "bushing": "link",
+}
+LAW = OneOf(
+    Contact, "law", "the interface law (docs/choose.md helps to choose)", LAWS, "transmission", elsewhere=_ELSEWHERE
+)

@@ -230,10 +230,13 @@ def explain(error: Any) -> str:
     there = keys_of(models_of(table)[variant]) if keys else keys_of(Scene)
     name = keys[0] if keys else table
     said = there.get(name, {"type": "table"})
+    meant = ""
     if kind == "union_tag_invalid" and choice is not None:
         keys = [choice.name]
         value = value[choice.name]
         said = {"enum": choice.named}
+        known = choice.elsewhere.get(re.sub(r"[\W_]", "", str(value).lower()))
+        meant = f'{one_line(str(value))} is "{known}" here; ' if known else nearest(str(value).lower(), choice.named)
     if name == "parameters" and len(keys) > 1:
         keys = keys[:2]
         said = {"type": "parameter"}
@@ -249,7 +252,7 @@ def explain(error: Any) -> str:
         otherwise = f" ({said['otherwise']})" if "otherwise" in said else ""
         what = f"the {said['description']} [{said['unit']}]{otherwise}: " if keys else ""
         return f"{place}: missing; {needed}give {what}{allowed(said)}"
-    return f"{given}: {GONE.get(given) or 'must be ' + allowed(said)}"
+    return f"{given}: {GONE.get(given) or meant + 'must be ' + allowed(said)}"
 
 
 def _unknown(place: str, name: str, there: Iterable[str]) -> str:

@@ -7,7 +7,7 @@ Field names are those of the FMU parameters; units are SI. `springbeam.scene.rul
 import re
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import reduce
 from itertools import chain
 from math import pi
@@ -171,6 +171,8 @@ class OneOf:
     tables: dict[str, Any]
     #: Its value where it is left out.
     default: str
+    #: Values of it by the names that other programs have for them, in small letters and digits.
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
 
     def kind(self, content: Any) -> str:
         """Return which of ``tables`` the content of a table belongs to, or the unknown value of its key."""
