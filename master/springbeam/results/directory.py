@@ -61,6 +61,7 @@ class RunDirectory:
         self.trajectory = self.path / "trajectory.csv"
         self.summary = self.path / "summary.json"
         self._claim: finalize[..., RunDirectory] | None = None
+        self._made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
 
     def results(self) -> list[Path]:
         """Return the result files that exist, and the files made from them."""
@@ -88,10 +89,11 @@ class RunDirectory:
             self._claim = None
 
     def discard(self) -> None:
-        """Let other processes in, and remove the directory if nothing is in it."""
+        """Let other processes in, and remove the folders that were made for it, if nothing is in them."""
         self.release()
         with suppress(OSError):
-            self.path.rmdir()
+            for folder in self._made:
+                folder.rmdir()
 
     @classmethod
     def create(cls, path: str | Path, *, replace: bool = False) -> RunDirectory:
@@ -131,8 +133,10 @@ class RunDirectory:
         first = Path(path)
         for candidate in chain([first], (first.with_name(f"{first.name}-{number}") for number in count(2))):
             with suppress(FileExistsError):
+                directory = cls(candidate)
                 candidate.mkdir(parents=True)
-                return cls.create(candidate)
+                directory.claim()
+                return directory
         raise AssertionError("unreachable")
 
 

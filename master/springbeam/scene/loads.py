@@ -301,7 +301,7 @@ class TableLoad(Reading, _Started):
         try:
             return _record(path, path.stat().st_mtime_ns, self.interpolation, self.unit, reading)
         except (OSError, ValueError) as error:
-            why = error.strerror if isinstance(error, OSError) else error
+            why = f"{error.strerror}; give a file of numbers" if isinstance(error, OSError) else error
             raise ValueError(f'file = "{path}": {why}') from error
 
     @property

@@ -188,7 +188,7 @@ GONE: dict[str, str] = {
     '[coupling] scheme = "auto"': "is gone; leave scheme and degree out: the highest degree that fits is the default",
     '[beam] integrator = "generalized_alpha"': 'is gone; use "midpoint", which is what it was with rho_inf = 1',
     "[beam] rho_inf": 'is gone; leave it out: integrator = "midpoint" is rho_inf = 1, alpha_b > 0 damps',
-    '[contact] law = "paper"': "is no law of a run; springbeam paper 2, 3, 4 or 5 runs Algorithm 1",
+    '[contact] law = "paper"': "is no law of a run; use springbeam paper 2, 3, 4 or 5 for Algorithm 1",
     "[contact] impact": "is gone; leave it out: ends that a rigid law joins meet inelastically",
     "[coupling] feedback": "is gone; leave it out: the contact force always acts on both bodies",
     "[coupling] feedback_tolerance": "is gone with feedback; leave it out",

@@ -113,7 +113,10 @@ def scene_from_dict(data: dict[str, Any], source: str = "scene") -> Scene:
         scene = Scene.model_validate(data)
         lines = impossible(scene)
     except ValidationError as error:
-        lines = list(dict.fromkeys(map(explain, error.errors())))
+        found = error.errors()
+        # A list with a bad item is too short without it: only the item is to be mended.
+        within = {one["loc"][:depth] for one in found for depth in range(len(one["loc"]))}
+        lines = list(dict.fromkeys(explain(one) for one in found if one["loc"] not in within))
     if lines:
         raise SceneError("\n".join(f"{source}: {line}" for line in lines))
     return scene

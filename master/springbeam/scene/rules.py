@@ -115,7 +115,7 @@ def _gap(scene: Scene) -> Iterator[str]:
 def _law(scene: Scene) -> Iterator[str]:
     for table in ("beam", "spring"):
         if scene.contact.lasting and scene.under(table) is None and not scene.elastic_stop:
-            yield f"[contact.law]: joins a [beam] and a [spring]; this scene has no [{table}]"
+            yield f"[contact.law]: joins a [beam] and a [spring]; this scene has no [{table}], which it needs"
     if scene.elastic_stop and scene.stop is not None and scene.stop.restitution != 1.0:
         yield (
             "[stop.restitution]: [contact.law] makes the stop elastic; leave restitution out, and give its loss by "

@@ -126,6 +126,11 @@ class Table(BaseModel):
         """Return the keys that follow from those that are ``given``; of ``keys`` a bad or missing value is 1."""
         return {}
 
+    @classmethod
+    def _in_range(cls, name: str, value: float) -> bool:
+        bounds = cls.model_fields[name].metadata if name in cls.model_fields else ()
+        return abs(value) <= float_info.max and all(value > bound.gt for bound in bounds if hasattr(bound, "gt"))
+
     @model_validator(mode="wrap")
     @classmethod
     def _completed(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
@@ -137,8 +142,8 @@ class Table(BaseModel):
         for name in data:
             if name in given and (others := given & cls.other_ways(name)):
                 raise ValueError(f"{', '.join([name, *sorted(others)])}: alternatives; leave one out")
-        # A bad value is reported as such.
-        sane = {name: x for name, x in data.items() if isinstance(x, (int, float)) and abs(x) <= float_info.max}
+        # A bad value is reported as such, and not what would follow from it.
+        sane = {name: x for name, x in data.items() if isinstance(x, (int, float)) and cls._in_range(name, x)}
         follows = cls.following(given, defaultdict(lambda: 1.0, sane))
         if given.isdisjoint(cls.SCALES):
             follows |= {name: one for name, one in cls.ones().items() if name in cls.SCALES}

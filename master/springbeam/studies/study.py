@@ -138,6 +138,7 @@ class Records:
     def __init__(self, study: Study, directory: Path, *, replace: bool = False) -> None:
         self._settings = study.settings()
         self.path = directory / FILE
+        self._directory = RunDirectory(directory)
         settings, self.by_name, self._whole = ({}, {}, 0) if replace else _read(self.path)
         if settings not in ({}, self._settings):
             raise ResultsExist(f"{directory}: holds another study, or one of another springbeam or FMU ({FILE})")
@@ -155,7 +156,7 @@ class Records:
         self._file.close()
         if self.path.stat().st_size == 0:
             self.path.unlink()
-            RunDirectory(self.path.parent).discard()
+            self._directory.discard()
 
     def add(self, name: str, record: Row) -> None:
         """Append a record; the first one removes what it replaces. Raises OSError if the disk is full."""
