@@ -9,14 +9,15 @@ from scenes import load_of
 
 from springbeam.scene.files import tomllib
 from springbeam.scene.recorded import Reading, Recorded
+from springbeam.scene.units import factor
 
 
 def read(path, content, **keys):
     """The rows (time, value) of a file in metres, and what was done to them."""
     path.write_bytes(content)
     found = Recorded(path, Reading(**keys))
-    times, columns = found.read({1: "m"})
-    return np.column_stack([times, columns[1]]).tolist(), found.notes
+    times, columns = found.read({1 - found.time: "m"})
+    return np.column_stack([times, *columns.values()]).tolist(), found.notes
 
 
 @pytest.fixture
@@ -56,6 +57,35 @@ def test_nothing_is_guessed(file, what):
     said = keys.pop("said")
     with pytest.raises(ValueError, match=re.escape(said)):
         read(file, text.encode(), **keys)
+
+
+#: Spellings of units, and how many m/s² each is; `None`: refused.
+ACCELERATIONS = {
+    **dict.fromkeys(("m/s²", "m/s^2", "m/s2", "m s-2", "m s^-2", "m.s-2", "m·s⁻²", "m*s**-2", "m/s/s", "µm/ms²"), 1.0),
+    **dict.fromkeys(("g", "G", "gn", "g_n", "g0"), 9.80665),
+    "mg": 9.80665e-3,
+    "Gal": 1e-2,
+    "mm/s2": 1e-3,
+    "in/s²": 0.0254,
+    **dict.fromkeys(("m/s", "(", "3", "m/", "m s-", "foo", "m/s2)", "-", "lambda", "kg", "degC", "1/s"), None),
+}
+
+
+@pytest.mark.parametrize("unit", ACCELERATIONS)
+def test_an_acceleration_is_read_in_any_spelling_of_its_unit(unit):
+    due = ACCELERATIONS[unit]
+    if due is None:
+        with pytest.raises(ValueError, match=re.escape(f"[{unit}] is no unit")):
+            factor(unit, "m/s²")
+    else:
+        assert factor(unit, "m/s²") == pytest.approx(due, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("unit", "wanted", "due"), [("Nm", "N·m", 1.0), ("lbf", "N", 4.4482216152605), ("N/mm²", "Pa", 1e6)]
+)
+def test_other_quantities_have_the_units_of_their_field(unit, wanted, due):
+    assert factor(unit, wanted) == pytest.approx(due, rel=1e-15)
 
 
 def test_a_load_takes_the_same_keys(file):

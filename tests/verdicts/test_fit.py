@@ -69,7 +69,10 @@ def test_units_and_names_of_a_file(tmp_path):
     assert list(read_measured(path, OSCILLATOR).values) == ["y"]
     twice = f"{__name__}:twice"
     assert read_measured(path, OSCILLATOR, {"y": twice}).values[twice] == pytest.approx(TIMES, rel=1e-15)
-    for what, why in ((twice, "a function has no unit"), ("y + z", "y \\+ z: is unknown; allowed: time, y")):
+    for what, why in (
+        (twice, "is in mm, and the function states no unit"),
+        ("y + z", "y \\+ z: is unknown; allowed: time, y"),
+    ):
         with pytest.raises(SceneError, match=why):
             read_measured(path, OSCILLATOR, {"CH1": what})
 
@@ -77,6 +80,34 @@ def test_units_and_names_of_a_file(tmp_path):
 def twice(run):
     """A curve of the user."""
     return 2.0 * run["y"]
+
+
+def seen(run):
+    """What a laser with 2.5 mm/V gives."""
+    return run["y"] / 2.5e-3
+
+
+seen.unit = "V"
+
+
+def test_a_column_in_volts_is_scaled_or_compared_with_a_function_in_volts(tmp_path):
+    path = written(tmp_path / "m.csv", "t [ms],Kanal A [mV],CH2", 1e3 * TIMES, exact() / 2.5e-6, exact())
+    scaled = read_measured(path, OSCILLATOR, {"Kanal A": "y"}, None, {"Kanal A": "2.5 mm/V"})
+    assert scaled.values["y"] == pytest.approx(exact(), rel=1e-14)
+    in_volts = f"{__name__}:seen"
+    found = read_measured(path, OSCILLATOR, {"Kanal A": in_volts, "CH2": "y"}, None, {"CH2": "-2"})
+    assert found.values[in_volts] == pytest.approx(exact() / 2.5e-3, rel=1e-14)
+    assert found.values["y"] == pytest.approx(-2.0 * exact(), rel=1e-15)
+    assert found.notes == ["column CH2 has no unit: m is assumed"]
+    for scale, why in (
+        ("2.5", r"\[mV\] is no unit of what a run has in m"),
+        ("2.5mm/V", "must be a number"),
+        ("0", "must be"),
+    ):
+        with pytest.raises(SceneError, match=why):
+            read_measured(path, OSCILLATOR, {"Kanal A": "y"}, None, {"Kanal A": scale})
+    with pytest.raises(SceneError, match="scale Kanal: there are the columns Kanal A, CH2"):
+        read_measured(path, OSCILLATOR, {"Kanal A": "y"}, None, {"Kanal": "2"})
 
 
 def test_residuals_are_those_of_each_curve(tmp_path):
@@ -90,7 +121,7 @@ def test_residuals_are_those_of_each_curve(tmp_path):
     assert of_y[1:] == pytest.approx(expected, rel=1e-6)
     assert of_z.relative == of_z.rms
     assert of_z.largest == pytest.approx(np.abs(run.at(TIMES)["z"]).max(), rel=1e-12)
-    with pytest.raises(SceneError, match="they have no times in common"):
+    with pytest.raises(SceneError, match="fewer than two lie in the run"):
         residuals(run, read_measured(path, OSCILLATOR), 9.0)
 
 

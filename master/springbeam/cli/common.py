@@ -83,7 +83,13 @@ MeasuredArgument = Annotated[
 ]
 MapOption = Annotated[
     list[str] | None,
-    typer.Option("--map", metavar="NAME=COLUMN", help="Column of a run, or module:function, that was measured."),
+    typer.Option("--map", metavar="NAME=COLUMN", help="Column of the run, or module:function, that was measured."),
+]
+ScaleOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--scale", metavar="NAME=FACTOR", help="Factor of a measured column, which may have a unit: CH1=2.5 mm/V."
+    ),
 ]
 ReadOption = Annotated[
     list[str] | None,

@@ -20,6 +20,7 @@ from .common import (
     QuietOption,
     ReadOption,
     RunArgument,
+    ScaleOption,
     fail,
     progress,
     results_directory,
@@ -151,6 +152,7 @@ def compare(
         typer.Argument(metavar="DIR…", help="Directories of two runs or more; or of one, and a file of measurements."),
     ],
     names: MapOption = None,
+    scale: ScaleOption = None,
     read: ReadOption = None,
     shift: Annotated[
         float | None,
@@ -172,11 +174,12 @@ def compare(
     if len(runs) > 1 and not runs[-1].exists():
         fail(BAD_INPUT, f"{runs[-1]}: no such file or directory; compare takes runs, or a run and a file")
     measured = runs[-1].is_file()
-    of_files = names or read or shift is not None
+    of_files = names or scale or read or shift is not None
     if len(runs) < 2 or (measured and len(runs) > 2) or (not measured and of_files):
-        what = "compare takes runs; or one run and a file of measurements, with --map, --read and --shift of these"
+        what = "compare takes runs; or one run and a file of measurements, with --map, --scale, --read and --shift"
         fail(BAD_INPUT, what)
     from ..results.files import load_trajectory
+    from ..signals.measured import measured_as
     from ..studies.beside import beside_measured, beside_one_another
 
     directories = [results_directory(run) for run in runs[: 1 if measured else None]]
@@ -184,7 +187,8 @@ def compare(
         trajectories = [load_trajectory(directory) for directory in directories]
         show(1, "compares")
         if measured:
-            found = beside_measured(trajectories[0], runs[1], names or [], shift, read or [])
+            run = trajectories[0]
+            found = beside_measured(run, measured_as(runs[1], run.scene, names or (), scale or (), read or ()), shift)
         else:
             found = beside_one_another([str(run) for run in runs], trajectories)
         if no_plots:

@@ -29,6 +29,7 @@ from .common import (
     NoPlotsOption,
     QuietOption,
     ReadOption,
+    ScaleOption,
     SceneArgument,
     SettingsOption,
     cause_of,
@@ -281,6 +282,7 @@ def fit(
         ),
     ] = None,
     names: MapOption = None,
+    scale: ScaleOption = None,
     read: ReadOption = None,
     shift: Annotated[
         float | None,
@@ -304,6 +306,7 @@ def fit(
         file=measured,
         vary=tuple(vary or ()),
         names=tuple(names or ()),
+        scale=tuple(scale or ()),
         read=tuple(read or ()),
         shift=shift,
         repeat=repeat,

@@ -357,9 +357,10 @@ def _record(path: Path, modified: int, interpolation: str, unit: str, reading: R
     recorded = Recorded(path, reading)
     if len(recorded.units) != 2:
         raise ValueError(f"{len(recorded.units)} columns; a table has two, time and value")
-    times, columns = recorded.read({1: unit})
-    values = columns[1]
-    notes = [note for note in recorded.notes if not note.endswith("is assumed")]
+    value = 1 - recorded.time
+    times, columns = recorded.read({value: unit})
+    values = columns[value]
+    notes = recorded.notes
     from scipy.interpolate import CubicSpline, PPoly  # takes half a second to load: only if there is a table
 
     if interpolation == "cubic":

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
 from pkgutil import resolve_name
 from typing import Any
 
@@ -26,6 +27,13 @@ def check(text: str, columns: Iterable[str]) -> None:
         raise SceneError(
             f"{text}: is unknown; {nearest(text, names)}allowed: {', '.join(names)}, or your own, module:function"
         )
+
+
+def unit_of(text: str, units: Mapping[str, str]) -> str:
+    """Return the unit of a column, or that which a function states as its attribute ``unit``; "" if it states none."""
+    if text in units:
+        return units[text]
+    return str(getattr(function_of(text), "unit", ""))
 
 
 def signal(run: Trajectory, text: str) -> np.ndarray:
@@ -61,6 +69,7 @@ def function_of(text: str) -> Callable[[Trajectory], Any] | None:
     if not callable(found):
         raise SceneError(f"{text}: is a {type(found).__name__}, not a function of a run")
 
+    @wraps(found)
     def guarded(run: Trajectory) -> Any:
         try:
             return found(run)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +18,7 @@ from ..results.dense import rows_at
 from ..results.trajectory import Trajectory, columns_of
 from ..scene import ArgumentError, Scene, SceneError
 from ..scene.recorded import Reading, Recorded
-from .curves import check, signal
+from .curves import check, signal, unit_of
 
 #: Most steps of a correlation, and fewest in the run.
 _MOST = 200_000
@@ -68,8 +70,21 @@ class Residual(NamedTuple):
     at: float  #: [s], in the time of the run
 
 
+def measured_as(file: Path, scene: Scene, names: Sequence[str], scales: Sequence[str], read: Sequence[str]) -> Measured:
+    """Read a file of measurements as the options ``--map``, ``--scale`` and ``--read`` of a command say.
+
+    Raises SceneError, which names option or file, line, column and remedy.
+    """
+    columns = by_column("map", names, "CH1=a_tip")
+    return read_measured(file, scene, columns, reading_of(read), by_column("scale", scales, "CH1=2.5 mm/V"))
+
+
 def read_measured(
-    path: str | Path, scene: Scene, names: Mapping[str, str] | None = None, reading: Reading | None = None
+    path: str | Path,
+    scene: Scene,
+    names: Mapping[str, str] | None = None,
+    reading: Reading | None = None,
+    scales: Mapping[str, str] | None = None,
 ) -> Measured:
     """Read a file of measurements.
 
@@ -84,39 +99,59 @@ def read_measured(
         Without any, columns that are called as those of a run belong to these. Others are left out.
     reading
         Format of the file.
+    scales
+        By the column of the file a number by which it is multiplied, which may have a unit: ``{"CH1": "2.5 mm/V"}``
+        gives a column in mV millimetres.
 
     Raises SceneError, which names file, line, column and remedy.
     """
     path = Path(path)
     units = columns_of(scene)
     try:
-        return _read(Recorded(path, reading), units, names or {})
+        return _read(Recorded(path, reading), units, names or {}, scales or {})
     except OSError as error:
         raise SceneError(f"{path}: {error.strerror}") from error
     except ValueError as error:
         raise ArgumentError(f"{path}: {error}") from error
 
 
-def _read(file: Recorded, units: Mapping[str, str], names: Mapping[str, str]) -> Measured:
+def _read(file: Recorded, units: Mapping[str, str], names: Mapping[str, str], scales: Mapping[str, str]) -> Measured:
     if not file.names:
         raise ValueError("the first line must name the columns, as in time [ms],acceleration [g]")
-    there = file.names[1:]
-    if wrong := [name for name in names if name not in there]:
-        raise ValueError(f"--map {wrong[0]}: there are the columns {', '.join(there)}")
+    there = [name for k, name in enumerate(file.names) if k != file.time]
+    for option, given in {"map": names, "scale": scales}.items():
+        if wrong := [name for name in given if name not in there]:
+            raise ValueError(f"--{option} {wrong[0]}: there are the columns {', '.join(there)}")
     wanted = names or {name: name for name in there if name in units and name != "phase"}
     if not wanted:
         raise ValueError(
             f"no column is called as one of the run ({', '.join(units)}); --map NAME=COLUMN says which is which"
         )
+    factors = {}
     wanted_units = {}
     for name, what in wanted.items():
         check(what, units)
-        k = 1 + there.index(name)
-        if what not in units and file.units[k]:
-            raise ValueError(f"{what}: a function has no unit; give the measured column without one")
-        wanted_units[k] = units.get(what, "")
+        k = file.names.index(name)
+        factors[k], unit = _scale(name, scales[name]) if name in scales else (1.0, "")
+        file.units[k] = f"{file.units[k]} {unit}".strip()
+        wanted_units[k] = unit_of(what, units)
+        if file.units[k] and not wanted_units[k]:
+            raise ValueError(
+                f"{what}: the measurement is in {file.units[k]}, and the function states no unit; write "
+                f'{what.partition(":")[2]}.unit = "{file.units[k]}" below it, if it has this one'
+            )
     times, values = file.read(wanted_units)
-    return Measured(times, dict(zip(wanted.values(), values.values(), strict=True)), file.notes)
+    curves = {what: values[k] * factors[k] for k, what in zip(factors, wanted.values(), strict=True)}
+    return Measured(times, curves, file.notes)
+
+
+def _scale(name: str, text: str) -> tuple[float, str]:
+    """Return number and unit of a scale, ``2.5 mm/V``. Raises SceneError if it is none."""
+    number, _, unit = text.strip().partition(" ")
+    with suppress(ValueError):
+        if math.isfinite(found := float(number)) and found != 0.0:
+            return found, unit.strip(" []")
+    raise ArgumentError(f"--scale {name}={text}: must be a number, or one and a unit, as in CH1=2.5 mm/V")
 
 
 def reading_of(texts: Sequence[str]) -> Reading:
@@ -132,14 +167,14 @@ def reading_of(texts: Sequence[str]) -> Reading:
         raise ArgumentError(f"--read {key}={given[key]}: {first['msg'].lower()}") from None
 
 
-def mapping(names: Sequence[str]) -> dict[str, str]:
-    """Return what ``NAME=COLUMN`` say. Raises SceneError for anything else."""
+def by_column(option: str, texts: Sequence[str], example: str) -> dict[str, str]:
+    """Return what ``NAME=VALUE`` texts of an option say of columns of a file. Raises SceneError for anything else."""
     found = {}
-    for text in names:
-        name, _, column = (part.strip() for part in text.partition("="))
-        if not name or not column:
-            raise ArgumentError(f"--map {text}: must be NAME=COLUMN, as in CH1=a_tip")
-        found[name] = column
+    for text in texts:
+        name, _, value = (part.strip() for part in text.rpartition("="))
+        if not name or not value:
+            raise ArgumentError(f"--{option} {text}: must be as in {example}")
+        found[name] = value
     return found
 
 
@@ -261,6 +296,8 @@ def shifts(run: Trajectory, measured: Measured) -> list[tuple[float, float]]:
     one = np.ones(len(times))
     points = np.bincount(cells).astype(float)
     number = np.rint(correlated(one, points))
+    if number.max() < 2.0:
+        raise ArgumentError(_apart(run, measured, "however its clock is moved"))
     total = np.zeros(len(number))
     for what, values in measured.values.items():
         a = curves[what]
@@ -279,7 +316,7 @@ def shifts(run: Trajectory, measured: Measured) -> list[tuple[float, float]]:
         inside = (times >= begin) & (times <= end)
         off = {what: splines[what](times[inside]) - values[inside] for what, values in measured.values.items()}
         if not inside.any():
-            return math.inf
+            return sys.float_info.max
         # Of periods that fit as well, the one that covers more of the measurement.
         return (float(np.mean(weighed(off, measured) ** 2)) + ALIKE) / float(inside.mean())
 
@@ -311,12 +348,18 @@ def model(run: Trajectory, measured: Measured, shift: float = 0.0) -> tuple[np.n
     times = measured.time + shift
     covered = measured.covered(run, shift)
     if covered.sum() < 2:
-        raise SceneError(
-            f"the run is known from {run.time[0]:g} s to {run.time[-1]:g} s, the measurement from {times[0]:g} s to "
-            f"{times[-1]:g} s: they have no times in common"
-        )
+        raise ArgumentError(_apart(run, measured, f"with its clock moved by {shift:g} s" if shift else ""))
     found = rows_at(run, times[covered])
     return covered, {what: signal(found, what) for what in measured.values}
+
+
+def _apart(run: Trajectory, measured: Measured, moved: str) -> str:
+    """Return in words that fewer than two points of the measurement lie in the run."""
+    return (
+        f"the run is known from {run.time[0]:g} s to {run.time[-1]:g} s, the measurement has "
+        f"{len(measured.time)} points from {measured.time[0]:g} s to {measured.time[-1]:g} s of its own clock: "
+        f"{f'{moved}, ' * bool(moved)}fewer than two lie in the run; check the unit of the time, time.t_end and --shift"
+    )
 
 
 def residuals(run: Trajectory, measured: Measured, shift: float = 0.0) -> list[Residual]:

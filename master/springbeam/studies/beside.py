@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from ..pictures.diagrams import Diagram, draw_diagrams
 from ..results.totals import LOSS_NAMES, TOTALS, peak_force
 from ..results.trajectory import Trajectory
 from ..scene import Scene
-from ..signals.measured import mapping, model, read_measured, reading_of, residuals, time_shift
+from ..signals.measured import Measured, model, residuals, time_shift
 from ..signals.spectra import without_peak
 from .tables import Findings, table
 
@@ -33,9 +32,8 @@ def beside_one_another(names: list[str], runs: list[Trajectory]) -> Findings:
     return Findings({"runs": names, "keys": keys, "results": results}, shown, pictures={"comparison": draw})
 
 
-def beside_measured(run: Trajectory, file: Path, names: list[str], shift: float | None, read: list[str]) -> Findings:
+def beside_measured(run: Trajectory, measured: Measured, shift: float | None) -> Findings:
     """Compare a run with measured curves."""
-    measured = read_measured(file, run.scene, mapping(names), reading_of(read))
     moved = time_shift(run, measured) if shift is None else shift
     found = residuals(run, measured, moved)
 

@@ -25,10 +25,8 @@ from ...signals.measured import (
     Aligned,
     Measured,
     at_shift,
-    mapping,
+    measured_as,
     period,
-    read_measured,
-    reading_of,
     rms,
     settled,
     shifts,
@@ -64,6 +62,7 @@ class Fit(Study):
     file: Path  #: the measured columns, time first
     vary: tuple[str, ...]  #: ``KEY=GUESS`` or ``KEY=LOW:HIGH`` each
     names: tuple[str, ...] = ()  #: ``NAME=COLUMN`` each: which column of a run a measured one is
+    scale: tuple[str, ...] = ()  #: ``NAME=NUMBER [UNIT]`` each: by what a measured column is multiplied
     read: tuple[str, ...] = ()  #: ``KEY=VALUE`` each: how the file is read
     shift: float | None = None  #: by which the clock of the measurement is moved [s]; found if it is left out
     repeat: Path | None = None  #: a second measurement of the same, which shows the noise
@@ -73,14 +72,14 @@ class Fit(Study):
     @cached_property
     def data(self) -> Measured:
         """What is measured. Raises SceneError if the file cannot be used."""
-        return read_measured(self.file, self.scene, mapping(self.names), reading_of(self.read))
+        return measured_as(self.file, self.scene, self.names, self.scale, self.read)
 
     @cached_property
     def repeated(self) -> Measured | None:
         """The second measurement."""
         if self.repeat is None:
             return None
-        return read_measured(self.repeat, self.scene, mapping(self.names), reading_of(self.read))
+        return measured_as(self.repeat, self.scene, self.names, self.scale, self.read)
 
     @cached_property
     def ranges(self) -> Ranges:
