@@ -191,6 +191,11 @@ build() {
   exec 9<&-
 }
 
+# Pages and texts of the package have none of the words of docs/words.txt.
+no_words_to_avoid() {
+  ! grep -rnE --include='*.md' --include='*.py' -f <(sed -n '/^#/!s/ -> .*//p' docs/words.txt) README.md docs src_* master/springbeam
+}
+
 readonly fuzzers=(fuzz_beam fuzz_spring fuzz_beam3 fuzz_spring3)
 # build_sanitized NAME SANITIZERS TARGET… — in build/NAME.
 build_sanitized() {
@@ -329,6 +334,7 @@ print(*(name for name in extra if has[name]))')
     run $venv/bin/ruff check .
     run $venv/bin/ruff format --check .
     run $venv/bin/mypy
+    run no_words_to_avoid
     mapfile -t sources < <(find src_beam src_spring fmus master tests/cpp tests/fuzz -name '*.cpp' -o -name '*.hpp')
     run $venv/bin/clang-format --dry-run -Werror "${sources[@]}"
     mapfile -t units < <(find src_beam src_spring fmus master -name '*.cpp')

@@ -24,7 +24,7 @@ or the signal by `--set` keeps the keys that the new one has too. Symbols are th
 """
 
 
-#: How the values of a key are told in a narrow column.
+#: The values of a key in a narrow column.
 SHORT = {
     "a finite number": "number",
     "a whole number": "integer",

@@ -42,37 +42,15 @@ SLOW = (
 
 
 #: Commands that load none of it.
-LIGHT = (
-    "",
-    "--help",
-    "scenes",
-    "run --help",
-    "crosscheck --help",
-)
+LIGHT = ("", "--help", "scenes", "run --help", "crosscheck --help")
 
 
-SMALL = "--no-plots --set time.t_end=0.01 --set beam.n_elements=4"
-#: What the others load.
-LOADED = {
-    "new mine": "pydantic",
-    "keys": "pydantic",
-    "keys --schema": "pydantic",
-    "keys beam --json": "pydantic",
-    "doctor": "numpy fmpy pydantic",
-    f"run soft {SMALL}": "numpy fmpy pydantic",
-    f"run steel-bumper {SMALL} --set beam.n_modes=2": "numpy fmpy pydantic",
-    "report results/soft": "numpy pydantic",
-    "export results/soft": "numpy pydantic",
-    f"crosscheck soft {SMALL}": "numpy fmpy pyarrow numpy.ma pydantic",
-}
-
-
-def test_a_command_loads_what_it_uses_and_nothing_else(tmp_path):
+def test_help_loads_nothing_that_is_slow(tmp_path):
     """Each in a process of its own, forked from one that has imported the command alone."""
     script = f"""
 import os, sys
 from springbeam.cli import app
-for line in {[*LIGHT, *LOADED]}:
+for line in {LIGHT}:
     if (child := os.fork()) == 0:
         try:
             app(line.split())
@@ -83,26 +61,4 @@ for line in {[*LIGHT, *LOADED]}:
 """
     lines = ran(sys.executable, "-c", script, cwd=tmp_path).splitlines()
     found = [line for line in lines if line.startswith("LOADED")]
-    assert found == [f"LOADED 0 {names}".strip() for names in (*[""] * len(LIGHT), *LOADED.values())]
-
-
-def test_a_run_is_not_searched_for_garbage(tmp_path):
-    """The modules and the picture of a run stay; to search them took a sixth of its time."""
-    arguments = ["springbeam", "run", "soft", "-o", "run", "--set", "time.t_end=0.01", "--set", "beam.n_elements=4"]
-    script = f"""
-import gc, sys
-from springbeam.cli import main
-before = gc.get_stats()[0]["collections"]
-sys.argv = {arguments}
-try:
-    main()
-except SystemExit as end:
-    print("\\nSEARCHED", end.code, gc.get_stats()[0]["collections"] - before)
-"""
-    assert ran(sys.executable, "-c", script, cwd=tmp_path).splitlines()[-1] == "SEARCHED 0 0"
-
-
-def test_no_command_starts_threads_of_blas():
-    """On matrices as small as ours they wait for each other, and take processor time."""
-    script = "import springbeam.cli, numpy, os; print(len(os.listdir('/proc/self/task')))"
-    assert int(ran("env", "-u", "OPENBLAS_NUM_THREADS", sys.executable, "-c", script)) == 1
+    assert found == ["LOADED 0"] * len(LIGHT)

@@ -6,23 +6,17 @@ import signal
 import subprocess
 import sys
 import time
-from functools import partial
-from io import StringIO
 from pathlib import Path
 
 import pytest
 import typer
 from bodies import simulate
 from commands import command
-from rich.console import Console
 from runs import block
 
 import springbeam.run.runner
 from springbeam import Event, RunStopped, load_scene, with_changes
-from springbeam.cli import common
 from springbeam.cli.common import interruptible
-from springbeam.cli.run import _event_table
-from springbeam.motion.events import EventKind
 from springbeam.results.directory import PICTURES
 from springbeam.results.files import load_trajectory
 from springbeam.results.totals import peak_force
@@ -111,21 +105,6 @@ def test_peaks_are_compared_over_one_window():
     assert results_of(runs)["contact_force_max [N]"] == [None, own[1]]
 
 
-def test_many_events_of_a_kind_push_out_no_others():
-    """Ninety-five strokes on the stop, and a contact that opens before the last one: all are in the table."""
-    bounces = [
-        Event(time, kind, 0.0, 0.0, impulse_foundation=1.0)
-        for stroke in range(95)
-        for time, kind in ((float(stroke), EventKind.STOP_IMPACT), (stroke + 0.5, EventKind.UNSEATED))
-    ]
-    events = [*bounces[:-1], Event(94.1, EventKind.SEPARATION, 0.0, 0.0), bounces[-1]]
-    table = _event_table(events, load_scene("soft"))
-    kinds = [str(cell) for cell in table.columns[0].cells]
-    assert kinds.count("stop_impact") == kinds.count("unseated") == 8
-    assert kinds[-3:] == ["separation", "+87 stop_impact, until", "+87 unseated, until"]
-    assert [str(cell) for cell in table.columns[5].cells][-2:] == ["87", "87"]  # impulses
-
-
 def test_an_interrupt_that_is_lost_in_a_finaliser_is_not_the_last(capsys):
     """Python reports what a finaliser raises, or a function called from C, and goes on: the command had not ended."""
 
@@ -150,27 +129,3 @@ def test_an_interrupt_that_is_lost_in_a_finaliser_is_not_the_last(capsys):
 
 
 # -- waiting ------------------------------------------------------------------------------------------------------
-
-
-#: Commands, and what each says that it does.
-WAITED_FOR = {
-    "run soft --no-plots --set time.t_end=0.01": {"run"},
-    "run soft --no-plots --set time.t_end=0.01 --accuracy 1e-2": {"pilot runs", "run"},
-    "predict soft": {"modes and stability"},
-    "report results/soft": {"makes the page"},
-    "compare results/soft results/soft --no-plots": {"compares"},
-    "spectrum results/soft --no-plots": {"computes spectra"},
-}
-
-
-def test_a_terminal_shows_what_is_waited_for_and_how_much_is_done(here, fmu_folder, monkeypatch):
-    """The share of the whole is shown where that is known; without a terminal nothing is printed."""
-    for line, words in WAITED_FOR.items():
-        output = StringIO()
-        with monkeypatch.context() as patch:
-            patch.setattr(common, "Console", partial(Console, file=output, force_terminal=True, width=200))
-            patch.setattr(common, "console_for", lambda *, silent: Console(quiet=True))
-            assert command(*line.split()).exit_code == 0, line
-        assert [word for word in words if word not in output.getvalue()] == [], line
-        assert ("%" in output.getvalue()) == ("predict" not in line), line
-        assert command(*line.split(), *["--force"] * ("report" in line)).stderr == "", line

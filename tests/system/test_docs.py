@@ -1,4 +1,4 @@
-"""The documentation is followed literally: programs and commands run, links lead somewhere, its table is current."""
+"""The documentation is followed literally: programs and commands run, links lead somewhere, made pages are current."""
 
 import importlib.util
 import json
@@ -8,7 +8,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-import tokenize
 from pathlib import Path
 
 import numpy as np
@@ -144,22 +143,6 @@ def shown(text, output):
     return None if skips or at == len(lines) else f"the end, before {lines[at]}"
 
 
-@pytest.mark.parametrize(
-    ("text", "wrong"),
-    [
-        ("one\ntwo\nthree\n", None),
-        ("⋮\nthree\n", None),
-        ("one\n⋮\n", None),
-        ("one\nt…\nt…\n", None),
-        ("one\nthree\n", "three"),
-        ("⋮\nthree\ntwo\n", "two"),
-        ("one\ntwo\n", "the end, before three"),
-    ],
-)
-def test_a_line_that_is_not_printed_is_found(text, wrong):
-    assert shown(text, "one  \ntwo\nthree\n") == wrong
-
-
 @pytest.mark.parametrize("page", shell_pages(), ids=lambda page: page.name)
 def test_commands_of_the_documentation_run(desk, page, unpainted, kept_references, monkeypatch):
     """They end well, complain of nothing, and print what the block ``console`` after them shows."""
@@ -219,90 +202,3 @@ def test_links_between_pages_lead_somewhere():
                 titles = re.findall(r"^#+ (.*)$", file.read_text(encoding="utf-8"), re.M)
                 slugs = [re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles]
                 assert anchor in slugs, f"{page.name}: {target}#{anchor}"
-
-
-#: By path: what a page may name of the code.
-SOURCES = {
-    f"/{path.relative_to(ROOT).as_posix()}": path.read_text(encoding="utf-8")
-    for folder in ("master", "src_beam", "src_spring", "fmus", "tests", "docs")
-    for path in (ROOT / folder).rglob("*")
-    if path.suffix in (".py", ".cpp", ".hpp", ".c", ".xml", ".md")
-}
-
-
-def sources(path):
-    """Return the sources at the end of whose path this one stands, or all of a folder."""
-    return [text for at, text in SOURCES.items() if at.endswith(f"/{path}") or (path[-1] == "/" and f"/{path}" in at)]
-
-
-def holds(text, name):
-    return all(re.search(rf"\b{word}\b", text) for word in re.split(r"\W+", name))
-
-
-def missing(text):
-    """Names of a page that are not there: `path/file.py`, `file.py: name`, `name` of `file.py`, `Class.member`, and the
-    functions in a line of a table that ends with their files."""
-    for span in re.findall(r"`([^`\n]+)`", text):
-        if found := re.fullmatch(r"([\w/]+\.(?:py|cpp|hpp|c|xml|md))(?:: ([\w.]+))?", span):
-            path, name = found.groups()
-            if not any(holds(source, name or "") for source in sources(path)):
-                yield span
-        elif found := re.fullmatch(r"(_?[A-Z]\w+)(?:\.|::)(?!fmu\b)(\w+)", span):
-            made = rf"(class|struct) {found[1]}\b|TEST\({found[1]},"
-            if not any(re.search(made, source) and holds(source, found[2]) for source in SOURCES.values()):
-                yield span
-    for name, path in re.findall(r"`([\w.:]+)`(?: of | in | \()`([\w/]+\.(?:py|cpp|hpp))`", text):
-        if not any(holds(source, name) for source in sources(path)):
-            yield f"{name} of {path}"
-    for line in text.splitlines():
-        *_, names, paths, _ = ["", "", "", *re.split(r"(?<!\\)\|", line)]
-        files = re.findall(r"`([\w/]+(?:\.py|\.cpp|\.hpp|/))`", paths)
-        if files and re.fullmatch(r"[`\w/.,; ]+", paths):
-            inside = [source for path in files for source in sources(path)]
-            for name in re.findall(r"`([\w.:]+)`", names):
-                if not any(holds(source, name) for source in inside):
-                    yield name
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_files_and_names_of_the_code_are_there(page):
-    without_blocks = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
-    assert [*missing(without_blocks)] == []
-
-
-#: Tokens with text; strings with values in braces are several from Python 3.12 on.
-TEXTS = (tokenize.STRING, tokenize.COMMENT, getattr(tokenize, "FSTRING_MIDDLE", tokenize.STRING))
-
-
-def avoided():
-    """Return the patterns of docs/words.txt, each with what to use."""
-    lines = (DOCS / "words.txt").read_text(encoding="utf-8").splitlines()
-    return [line.split(" -> ") for line in lines if not line.startswith("#")]
-
-
-def texts_of_the_package():
-    """Return all docstrings, comments and other strings of the package, by file and line."""
-    for path in sorted((ROOT / "master/springbeam").rglob("*.py")):
-        with path.open(encoding="utf-8") as file:
-            for token in tokenize.generate_tokens(file.readline):
-                if token.type in TEXTS:
-                    yield f"{path.name}:{token.start[0]}", " ".join(token.string.split())
-
-
-def test_pages_and_texts_of_the_package_use_no_word_to_avoid():
-    texts = [(page.name, page.read_text(encoding="utf-8")) for page in PAGES]
-    texts.extend(texts_of_the_package())
-    found = [
-        (place, match[0], use)
-        for place, text in texts
-        for pattern, use in avoided()
-        for match in re.finditer(pattern, text)
-    ]
-    assert found == []
-
-
-@pytest.mark.parametrize(
-    "text", ["both ends are let go", "what it passes on", "the master is told", "is off by 3 %", "none to speak of"]
-)
-def test_a_word_to_avoid_is_found(text):
-    assert any(re.search(pattern, text) for pattern, _ in avoided())
