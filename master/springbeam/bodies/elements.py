@@ -1,4 +1,4 @@
-"""Simple partners that need no FMU: a free mass, a mass on a linear spring and damper, an end that moves as prescribed.
+"""Simple partners that need no FMU: a free mass, a mass on a linear spring and damper, an end that moves as given.
 
 They fit in either place. Each step of a mass is exact: the state with the polynomial force and the integrals is one
 linear system, s = (x, ẋ, F, Ḟ, F̈, ∫x, ∫∫x), ṡ = A s, stepped by exp(A H). Dissipation is the work of the forces
@@ -16,6 +16,14 @@ import numpy as np
 from ..scene import Load
 from .force import combined, value, work_on
 from .protocol import NO_FORCE, SIZES_REMEMBERED, Body, Energies, Force, Motion
+
+#: Points of the quadrature of a height over a step, and one more for each radian that it turns.
+_WALL_POINTS = 8
+#: How far before the end of a step its speed is taken, and the length of differences of it, over the step.
+_BEFORE = 1e-12
+_TRIAL = 2.0**-8
+#: The derivative by five values backward, to fourth order.
+_BACKWARD = np.array([25.0, -48.0, 36.0, -16.0, 3.0]) / 12.0
 
 
 class EndLoaded(Body):
@@ -172,6 +180,12 @@ class Prescribed(Body):
         motion: Motion = self.state
         return motion
 
+    def acceleration(self) -> float | None:
+        return 0.0
+
+    def trial_acceleration(self, time: float, size: float) -> float | None:
+        return 0.0
+
     def apply_impulse(self, impulse: float) -> None: ...
 
 
@@ -189,8 +203,90 @@ class RigidWall(Prescribed):
     def expect_loads(self, loads: Sequence[Load]) -> None: ...
 
 
+class WallState(NamedTuple):
+    """State of a moving wall."""
+
+    motion: Motion
+    time: float  #: [s]
+    size: float  #: of the last step [s]
+    received: float = 0.0  #: work of the forces on it so far [J]
+
+
+class MovingWall(Prescribed):
+    """An end that moves as the sum of ``loads`` [m] about ``position`` [m], whatever force acts on it.
+
+    The work of that force leaves the pair: it counts as minus the work of a load. ``time`` [s] is that of the start.
+    """
+
+    state: WallState
+
+    def __init__(self, position: float, loads: Sequence[Load], time: float = 0.0) -> None:
+        self._position = position
+        self._loads = loads
+        self._sign = 1.0
+        self.state = WallState(Motion(float(self._height(time)), float(self._speed(time)), 0.0, 0.0), time, 0.0)
+
+    def take_place(self, *, upper: bool) -> None:
+        self._sign = 1.0 if upper else -1.0
+
+    def rewind(self) -> None:
+        Body.rewind(self)
+
+    def expect_loads(self, loads: Sequence[Load]) -> None: ...
+
+    def _height(self, times: Any) -> Any:
+        return sum((load.value(times) for load in self._loads), start=self._position)
+
+    def _speed(self, times: Any) -> Any:
+        return sum((load.change(times) for load in self._loads), start=0.0)
+
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        before, _, _, received = self.state
+        until = time + size
+        inside = {edge for load in self._loads for edge in load.edges if time < edge < until}
+        edges = np.array([time, *sorted(inside), until])
+        half = 0.5 * np.diff(edges)[:, None]
+        turns = max((load.rate for load in self._loads), default=0.0) * size
+        nodes, weights = np.polynomial.legendre.leggauss(_WALL_POINTS + int(turns))
+        times = edges[:-1, None] + half * (nodes + 1.0)
+        weighted = half * weights * self._height(times)
+        left = until - _BEFORE * size  # at a kink, the speed before it
+        end = Motion(
+            float(self._height(left) + _BEFORE * size * self._speed(left)),
+            float(self._speed(left)),
+            float(weighted.sum()),
+            float((weighted * (until - times)).sum()),
+        )
+        received += work_on(combined([self._sign, 1.0], [contact, foundation]), before, end, size)
+        self.state = WallState(end, until, size, received)
+        return end
+
+    def motion(self) -> Motion:
+        return self.state.motion
+
+    def acceleration(self) -> float | None:
+        """Return the derivative of the speed at the end of the last step, from points before it."""
+        _, time, size, _ = self.state
+        if size == 0.0:
+            return None
+        step = _TRIAL * size
+        speeds = self._speed(time - _BEFORE * size - step * np.arange(5.0))
+        return float(_BACKWARD @ speeds) / step
+
+    def trial_acceleration(self, time: float, size: float) -> float | None:
+        step = _TRIAL * size
+        return -float(_BACKWARD @ self._speed(time + _BEFORE * size + step * np.arange(5.0))) / step
+
+    def energies(self) -> Energies:
+        return Energies(0.0, 0.0, 0.0, self.state.received)
+
+    def apply_impulse(self, impulse: float) -> None:
+        state = self.state
+        self.state = state._replace(received=state.received + impulse * state.motion.velocity)
+
+
 #: The elements by their names in a scene; the keys of their tables are the parameters.
-ELEMENTS: dict[str, Callable[..., Body]] = {
+ELEMENTS: dict[str, Callable[..., Body]] = {  # a moving wall is made with its loads
     "point_mass": PointMass,
     "spring_damper": SpringDamper,
     "rigid_wall": RigidWall,

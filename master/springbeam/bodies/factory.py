@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from ..scene import Beam, Scene, SceneError, Spring
 from ..scene.linearised import hilltop
-from ..scene.partners import ForeignFmu, Partner, RigidWallElement, SpringDamperElement
+from ..scene.partners import ForeignFmu, MovingWallElement, Partner, RigidWallElement, SpringDamperElement
 from ..scene.statics import resting_height, tip_compliance, tip_load_deflection
-from .elements import ELEMENTS
+from .elements import ELEMENTS, MovingWall
 from .fmu_bodies import FmuBeam, FmuSpring
 from .protocol import Body, FmuError
 from .quasi_static import QuasiStaticBeam
@@ -66,6 +66,8 @@ def _body(
         if scene.massless:
             return _massless_beam(scene, spec, start_time, degree, contact_force)
         return _beam(scene, spec, start_time, contact_force)
+    if isinstance(spec, MovingWallElement):
+        return MovingWall(spec.position, [load for load in scene.loads if load.on == "wall"], start_time)
     keys = {name: getattr(spec, name) for name in type(spec).model_fields if name != "element"}
     if scene.static and isinstance(spec, SpringDamperElement):
         upper = spec is scene.upper

@@ -299,14 +299,14 @@ class Pair:
     def _multiplier(self, phase: Phase, time: float, macro_step: float, acting: float, *, changed: bool) -> float:
         """Return C = −μ (ü − ÿ) of joined ends [N], ü and ÿ without it; ``acting`` [N] where a body cannot tell.
 
-        1/μ = 1/m_tip + 1/m; an end that does not move has an infinite mass. Both accelerations are those at the common
+        1/μ = 1/m_tip + 1/m; an end that moves as given has an infinite mass. Both accelerations are those at the common
         velocity: damping turns the rest of a velocity into a force.
         """
         apart = 0.0
         mobility = 0.0
         common = self._common_velocity(phase, self.ends())
         for body, sign in ((self.upper, 1.0), (self.lower, -1.0)):
-            if body.mass == inf or (phase.seated and body is self.lower):
+            if phase.seated and body is self.lower:
                 continue
             acceleration = None if changed else body.acceleration()
             if acceleration is None:

@@ -17,6 +17,8 @@ from .recorded import Reading, Recorded
 from .tables import OneOf, Table, key
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy as np
     from scipy.interpolate import PPoly
 else:
@@ -29,17 +31,18 @@ MOST_POINTS = 4
 
 
 class Load(Table):
-    """A load that acts on the beam, on its tip, on the spring, or on all by the acceleration of the base."""
+    """A load on the beam, its tip or the spring, an acceleration of the base, or the motion of a moving wall."""
 
-    on: Literal["beam", "tip", "spring", "base"] = key(
+    on: Literal["beam", "tip", "spring", "base", "wall"] = key(
         "–",
-        "target: beam (force in N/m, or N at a point), tip or spring (force in N), base (acceleration in m/s²)",
+        "target: beam (force in N/m, or N at a point), tip or spring (force in N), base (acceleration in m/s²), wall "
+        "(height of a moving_wall in m)",
     )
     shape: Annotated[tuple[float, ...] | None, Field(strict=False, min_length=1, max_length=4)] = key(
         "–", "on the beam: f_b is the signal times Σ s_i (x/L)^i", None, otherwise="uniform, without at"
     )
     at: float | None = key("–", "on the beam: a point force at this fraction of L", None, gt=0.0, le=1.0)
-    amplitude: float = key("N/m, N or m/s²", "amplitude of the signal; upward is positive", 1.0)
+    amplitude: float = key("N/m, N, m/s² or m", "amplitude of the signal; upward is positive", 1.0)
     signal: str
 
     @model_validator(mode="after")
@@ -55,10 +58,14 @@ class Load(Table):
         """Return the value over the amplitude at t [s] after `start`; before it begins and after its end, anything."""
         raise NotImplementedError
 
+    def slope(self, t: "np.ndarray") -> Any:
+        """Return the derivative of `curve` [1/s]; at a kink, that after it."""
+        return 0.0
+
     @property
     def unit(self) -> str:
         """Unit of `value`."""
-        return {"beam": "N" if self.at is not None else "N/m", "base": "m/s²"}.get(self.on, "N")
+        return {"beam": "N" if self.at is not None else "N/m", "base": "m/s²", "wall": "m"}.get(self.on, "N")
 
     @property
     def since(self) -> float:
@@ -121,9 +128,16 @@ class Load(Table):
 
     def value(self, times: Any) -> "np.ndarray":
         """Return the signal at ``times`` [s], any shape, in `unit`; where it jumps, the value after the jump."""
+        return self._within(times, self.curve)
+
+    def change(self, times: Any) -> "np.ndarray":
+        """Return the time derivative of `value` at ``times`` [s]; at a kink, that after it."""
+        return self._within(times, self.slope)
+
+    def _within(self, times: Any, curve: "Callable[[np.ndarray], Any]") -> "np.ndarray":
         t = np.asarray(times, dtype=float) - self.since
         first, last = self._extent
-        return np.where((t >= first) & (t < last), self.amplitude * self.curve(t), 0.0)
+        return np.where((t >= first) & (t < last), self.amplitude * curve(t), 0.0)
 
 
 class ConstantLoad(Load):
@@ -191,6 +205,9 @@ class HarmonicLoad(_Lasting):
     def curve(self, t: "np.ndarray") -> Any:
         return np.sin(self.rate * t + self.phase)
 
+    def slope(self, t: "np.ndarray") -> Any:
+        return self.rate * np.cos(self.rate * t + self.phase)
+
 
 class ChirpLoad(_Pulse):
     """A sine whose frequency changes evenly in time."""
@@ -205,8 +222,15 @@ class ChirpLoad(_Pulse):
         return 2.0 * np.pi * max(self.frequency, self.frequency_end)
 
     def curve(self, t: "np.ndarray") -> Any:
+        return np.sin(self._angle(t))
+
+    def slope(self, t: "np.ndarray") -> Any:
+        frequency = self.frequency + (self.frequency_end - self.frequency) * t / self.duration
+        return 2.0 * np.pi * frequency * np.cos(self._angle(t))
+
+    def _angle(self, t: "np.ndarray") -> Any:
         mean = self.frequency + 0.5 * (self.frequency_end - self.frequency) * t / self.duration
-        return np.sin(2.0 * np.pi * mean * t + self.phase)
+        return 2.0 * np.pi * mean * t + self.phase
 
 
 class HalfSineLoad(_Pulse):
@@ -221,6 +245,9 @@ class HalfSineLoad(_Pulse):
     def curve(self, t: "np.ndarray") -> Any:
         return np.sin(np.pi / self.duration * t)
 
+    def slope(self, t: "np.ndarray") -> Any:
+        return np.pi / self.duration * np.cos(np.pi / self.duration * t)
+
 
 class SawtoothLoad(_Pulse):
     """A pulse that grows evenly and has its peak at the end."""
@@ -229,6 +256,9 @@ class SawtoothLoad(_Pulse):
 
     def curve(self, t: "np.ndarray") -> Any:
         return t / self.duration
+
+    def slope(self, t: "np.ndarray") -> Any:
+        return 1.0 / self.duration
 
 
 class TrapezoidLoad(_Pulse):
@@ -249,6 +279,9 @@ class TrapezoidLoad(_Pulse):
 
     def curve(self, t: "np.ndarray") -> Any:
         return np.clip(np.minimum(t, self.duration - t) / self.rise, 0.0, 1.0)
+
+    def slope(self, t: "np.ndarray") -> Any:
+        return np.where(t < self.rise, 1.0, np.where(t < self.duration - self.rise, 0.0, -1.0)) / self.rise
 
 
 class StepLoad(_Lasting):
@@ -271,6 +304,9 @@ class RampLoad(_Pulse):
 
     def curve(self, t: "np.ndarray") -> Any:
         return np.clip(t / self.duration, 0.0, 1.0)
+
+    def slope(self, t: "np.ndarray") -> Any:
+        return np.where(t < self.duration, 1.0 / self.duration, 0.0)
 
 
 class TableLoad(Reading, _Started):
@@ -335,6 +371,9 @@ class TableLoad(Reading, _Started):
 
     def curve(self, t: "np.ndarray") -> Any:
         return self.record(t)
+
+    def slope(self, t: "np.ndarray") -> Any:
+        return self.record(t, 1)
 
 
 #: By their names in a scene.

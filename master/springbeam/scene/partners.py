@@ -79,20 +79,30 @@ class SpringDamperElement(PointMassElement):
 class RigidWallElement(Table):
     """An end that is held at rest under any force."""
 
-    START = "position"
+    START: ClassVar[str | None] = "position"
     AT_GAP = ("position",)
 
     element: Literal["rigid_wall"] = key("–", "an end at rest under any force")
     position: float = key("m", "where it is", 0.0)
 
 
-Partner = ForeignFmu | PointMassElement | SpringDamperElement | RigidWallElement
+class MovingWallElement(RigidWallElement):
+    """An end that moves as given under any force, by the loads with ``on = "wall"``."""
+
+    START = None
+
+    element: Literal["moving_wall"] = key("–", "an end that moves as given")  # type: ignore[assignment]
+    position: float = key("m", "where it is while those loads are 0", 0.0)
+
+
+Partner = ForeignFmu | PointMassElement | SpringDamperElement | RigidWallElement | MovingWallElement
 #: The tables of partners by what names them: the key ``fmu``, or the value of ``element``.
 PARTNERS: dict[str, type[Table]] = {
     "fmu": ForeignFmu,
     "point_mass": PointMassElement,
     "spring_damper": SpringDamperElement,
     "rigid_wall": RigidWallElement,
+    "moving_wall": MovingWallElement,
 }
 OWN = "own"
 

@@ -13,7 +13,7 @@ from .laws import LAWS
 from .linearised import hilltop, largest_load, spring_energy, well_depth
 from .loads import MOST_POINTS, Load
 from .messages import at, either, filled
-from .partners import RigidWallElement, SpringDamperElement
+from .partners import MovingWallElement, RigidWallElement, SpringDamperElement
 from .scene import Scene
 from .schemes import DEFAULT_STEP
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
@@ -64,6 +64,9 @@ def _bodies(scene: Scene) -> Iterator[str]:
         yield "[spring.element]: nothing moves in this scene; give it a body in [beam]"
     if wall_below and upper is not None and scene.stop is not None:
         yield "[spring.element]: leave [stop] out"
+    for name, body in scene.partners.items():
+        if isinstance(body, MovingWallElement) and not any(load.on == "wall" for load in scene.loads):
+            yield f'[{name}.element]: [[loads]] with on = "wall" give its motion; without, use "rigid_wall"'
 
 
 def _start_at_rest(scene: Scene) -> Iterator[str]:
@@ -93,7 +96,7 @@ def _start_at_rest(scene: Scene) -> Iterator[str]:
 
 def _rests(body: Table | None) -> bool:
     """Return whether the package can compute the equilibrium of a body under loads; true if there is none."""
-    own = isinstance(body, Beam | Spring | RigidWallElement | None)
+    own = isinstance(body, Beam | Spring | RigidWallElement | None) and not isinstance(body, MovingWallElement)
     return own or (isinstance(body, SpringDamperElement) and body.stiffness > 0.0)
 
 
@@ -307,6 +310,9 @@ def _load(scene: Scene, load: Load) -> Iterator[str]:
     """Yield the errors of one ``load``; ``[load.key]`` in a text is a key of it."""
     table = "spring" if load.on == "spring" else "beam"
     body = scene.under(table)
+    if load.on == "wall":
+        yield from _wall(scene, load)
+        return
     if load.on != "base" and body is None:
         yield f"[load.on]: acts on a [{table}], and this scene has none"
     if scene.massless and load.on != "spring":
@@ -328,3 +334,26 @@ def _load(scene: Scene, load: Load) -> Iterator[str]:
             yield f'[load.on]: which masses are in the FMU of [{name}] is not known; give a force, on = "{end}"'
     if load.on in ("tip", "spring") and isinstance(body, RigidWallElement):
         yield f"[load.on]: [{table}.element] does not move under any load; leave the load out"
+
+
+def _wall(scene: Scene, load: Load) -> Iterator[str]:
+    """Yield why the motion of a wall by ``load`` is none: it jumps, or does so in its speed under a rigid law."""
+    if not any(isinstance(body, MovingWallElement) for body in scene.partners.values()):
+        yield '[load.on]: moves a body with element = "moving_wall", and this scene has none'
+    end = scene.time.t_end
+    before = [math.nextafter(kink, -math.inf) for kink in load.kinks if 0.0 < kink < end]
+    after = [kink for kink in load.kinks if 0.0 < kink < end]
+    heights = abs(load.value(after) - load.value(before))
+    speeds = abs(load.change(after) - load.change(before))
+    high = 1e-9 * load.peak
+    for when, height, speed in zip(after, heights, speeds, strict=True):
+        if height > high:
+            yield f"[load.signal]: its height would jump by {height:.4g} m at {when:g} s; use another signal"
+            return
+        if speed * end > high and not scene.contact.soft:
+            yield (
+                f"[load.signal]: under [contact.law] the speed of the wall must not jump, as by {speed:.4g} m/s "
+                f'at {when:g} s; use a harmonic, or a table with interpolation = "cubic" that begins and ends with the '
+                "run, or a soft law"
+            )
+            return
