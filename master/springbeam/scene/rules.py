@@ -339,7 +339,7 @@ def _load(scene: Scene, load: Load) -> Iterator[str]:
 def _wall(scene: Scene, load: Load) -> Iterator[str]:
     """Yield why the motion of a wall by ``load`` is none: it jumps, or does so in its speed under a rigid law."""
     if not any(isinstance(body, MovingWallElement) for body in scene.partners.values()):
-        yield '[load.on]: moves a body with element = "moving_wall", and this scene has none'
+        yield '[load.on]: needs a body with element = "moving_wall", and this scene has none'
     end = scene.time.t_end
     before = [math.nextafter(kink, -math.inf) for kink in load.kinks if 0.0 < kink < end]
     after = [kink for kink in load.kinks if 0.0 < kink < end]
