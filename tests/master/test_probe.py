@@ -8,8 +8,8 @@ from bodies import DuffingBody, Upper
 from scenes import table
 
 from springbeam import SceneError, load_scene, with_changes
-from springbeam.bodies.protocol import Abilities, Body
-from springbeam.run.gate import admit, refusals
+from springbeam.bodies.protocol import NO_FORCE, Abilities, Body, Motion
+from springbeam.run.gate import admit, refusals, tried
 from springbeam.run.setup import set_up
 
 # -- what a scene needs of its bodies -------------------------------------------------------------------------------
@@ -34,6 +34,32 @@ def test_an_elastic_stop_asks_a_body_for_no_impulses(law, refused):
     setup = set_up(with_changes(load_scene("beam-on-stop"), contact=contact, stop={"restitution": 1.0}))
     lines = refusals(setup, {"beam": replace(Abilities(), impulse=False, velocity=False)})
     assert [line.partition(":")[0] for line in lines] == refused * ["[stop]"]
+
+
+class Euler(Body):
+    """1 kg by Euler's method, explicit where ``share`` is 0 and semi-implicit where it is 1; 1/2 is of order 2."""
+
+    def __init__(self, share):
+        self.mass = 1.0
+        self.share = share
+        self.state = Motion(0.0, 0.0, 0.0, 0.0)
+
+    def motion(self):
+        return self.state
+
+    def advance(self, time, size, contact, foundation=NO_FORCE):
+        w, v, *_ = self.state
+        after = v - size * contact[0] / self.mass
+        self.state = Motion(w + size * (v + self.share * (after - v)), after, 0.0, 0.0)
+        return self.state
+
+
+@pytest.mark.parametrize(("share", "order"), [(0.0, 1), (0.4, 1), (0.5, 2), (1.0, 1)])
+def test_a_body_of_order_1_is_found_and_refused(share, order):
+    found = tried(Euler(share), 0.0, 1e-3)
+    assert found.order == order
+    lines = refusals(set_up(with_changes(load_scene("soft"), coupling={"degree": 0})), {"spring": found})
+    assert sum("a solver of order 1" in line for line in lines) == (order == 1)
 
 
 class Unstruck(DuffingBody):

@@ -30,6 +30,12 @@ _ROUNDING = 1e-9
 _RESPONSE = 0.1
 #: Largest relative difference of two measurements of a response.
 _AGREE = 0.01
+#: Largest relative difference of the responses to a step and to a half of it: of a free mass they are in proportion.
+_ALIKE = 0.2
+#: Steps whose gains of velocity under one force vary smoothly, unless internal steps end beside them.
+_GRADUAL = 16
+#: Largest relative difference of the displacement by a force from that of a mass of order 2: of order 1 it is 1/K.
+_SECOND_ORDER = 0.05
 #: Forces tried [N].
 _FORCES = (1.0, 1e3, 1e6, 1e9, 1e12, 1e15)
 #: Smallest relative change of a value that counts.
@@ -60,6 +66,7 @@ class Bench:
         self.spec = spec
         self._start = start
         self.faults = list[str]()
+        self.warnings = list[str]()
         self._made = partial(_TriedBody, spec, upper, (start, max(end, start + _RECORD * H)))
         #: The present instance; its ``abilities`` are the known ones.
         self.body = self._made(None)
@@ -88,11 +95,21 @@ class Bench:
             rows.append([*body.motion(), sum(body.energies()), body.received])
         return np.array(rows)
 
-    def change(self, size: float, force: Force, impulse: float = 0.0) -> float:
-        """Return the change of the velocity, or without one of the displacement, by ``force`` or ``impulse``."""
-        column = 1 if self.spec.velocity else 0
-        moved, free = (self.run(size, [given], kick)[1, column] for given, kick in ((force, impulse), (NO_FORCE, 0.0)))
-        return float(moved - free) if abs(moved - free) > _SEEN * abs(free) else 0.0
+    def response(self, size: float, force: Force, impulse: float = 0.0) -> tuple[float, float]:
+        """Return the changes of displacement and velocity by ``force`` over a step, or ``impulse``; 0 if not seen.
+
+        Without a velocity, its change shows in the displacement of a second step.
+        """
+        after = [] if self.spec.velocity else [NO_FORCE]
+        moved, free = (
+            self.run(size, [given, *after], kick)[:, :2] for given, kick in ((force, impulse), (NO_FORCE, 0.0))
+        )
+        by = moved - free
+        if self.spec.velocity:
+            faster, scale = by[1, 1], abs(free[1, 1])
+        else:
+            faster, scale = (by[2, 0] - by[1, 0]) / size, abs(free[2, 0]) / size
+        return float(by[1, 0]), float(faster) if abs(faster) > _SEEN * scale else 0.0
 
     def extrapolated(self, inertia: Callable[[float], float | None]) -> float | None:
         """Return the limit of ``inertia`` as the step's size [s] goes to 0, from the shortest steps that show it."""
@@ -174,6 +191,12 @@ def _examine(bench: Bench, upward: float) -> Findings:
     bench.renew(slopes=0)
     if bench.body.abilities.state:
         _check_state(bench)
+    if bench.body.abilities.any_size and (size := _internal_steps(bench)) is not None:
+        bench.renew(any_size=False)
+        bench.sizes = [H]
+        _check_grid(bench, size)
+        if bench.faults:  # what follows would be others
+            return _findings(bench)
     mass = bench.extrapolated(partial(_inertia, bench))
     if mass is None:
         raise FmuError(f"{spec.fmu}: a force of up to {_FORCES[-1]:g} N in {spec.force!r} does not move its end")
@@ -184,6 +207,7 @@ def _examine(bench: Bench, upward: float) -> Findings:
     x, v = bench.run(H, [])[0, :2].tolist()
     #: Steps move its end by this much, against how far it is from 0 and comes by itself [m].
     length = max(1e-3 * abs(x), abs(v) * H, 1e-6)
+    lag = _lag(bench, mass * length)
     bench.faults += sorted(bench.wrong(partial(_wrong_outputs, bench, mass * length)))
     if promised:
         _try_slopes(bench, mass * length)
@@ -191,8 +215,15 @@ def _examine(bench: Bench, upward: float) -> Findings:
         mass = _struck_mass(bench, spec.mass or mass, length / H)
     if not bench.body.abilities.velocity:
         v = next(bench.taken(partial(_velocity, bench), [*bench.sizes[2:], *bench.sizes[1::-1]]))
-    faults = tuple(f"{spec.fmu}: {fault}" for fault in bench.faults)
-    return Findings(bench.body.abilities, mass, v, H, faults, bench.body.found.units)
+    return _findings(bench, mass, v, lag)
+
+
+def _findings(bench: Bench, mass: float = 1.0, velocity: float = 0.0, lag: float = 0.0) -> Findings:
+    """Return the findings so far."""
+    faults, warnings = (
+        tuple(f"{bench.spec.fmu}: {text}" for text in texts) for texts in (bench.faults, bench.warnings)
+    )
+    return Findings(bench.body.abilities, mass, velocity, bench.sizes[0], faults, warnings, lag, bench.body.found.units)
 
 
 def _velocity(bench: Bench, size: float) -> float:
@@ -214,9 +245,70 @@ def _check_state(bench: Bench) -> None:
 def _inertia(bench: Bench, size: float) -> float | None:
     """Return the mass [kg] that a force C moves over a step of ``size``, negative if downward; ``None`` if it stays."""
     for force in _FORCES:
-        if change := bench.change(size, (force, 0.0, 0.0)):
-            return force * size / change * (1.0 if bench.spec.velocity else 0.5 * size)
+        _, faster = bench.response(size, (force, 0.0, 0.0))
+        if faster:
+            return force * size / faster
     return None
+
+
+def _internal_steps(bench: Bench) -> float | None:
+    """Return the size [s] of a step that moves the end unlike two halves; ``None`` where they move alike."""
+
+    def unlike(size: float) -> float | None:
+        whole = _inertia(bench, size)
+        half = _inertia(bench, 0.5 * size)
+        alike = whole is not None and half is not None and abs(whole - half) <= _ALIKE * abs(whole)
+        return None if alike else size
+
+    return next(bench.taken(unlike, reversed(bench.sizes)))
+
+
+def _check_grid(bench: Bench, size: float) -> None:
+    """Say that the steps of the FMU have one size; it is a fault if internal steps do not end where they do."""
+    H = bench.sizes[0]
+    said = (
+        f"it moves in internal steps: a step of {size:.3g} s and half of it do not move its end in proportion, and "
+        "canHandleVariableCommunicationStepSize = true is false"
+    )
+    remedy = "[coupling] macro_step is to be a multiple of its internal step"
+    force = (1.0, 0.0, 0.0)
+    column = 1 if bench.spec.velocity else 0
+    moved, free = (bench.run(H, [given] * _GRADUAL)[:, column] for given in (force, NO_FORCE))
+    gained = np.diff(moved - free, n=1 if bench.spec.velocity else 2)
+    # Of an end that swings, differences become smaller by ω H each; of one that is a step ahead in some, larger by 2.
+    if np.abs(np.diff(gained, n=6)).max() > _ALIKE * np.abs(gained).max():
+        bench.faults.append(f"{said}, nor do steps of {H:.6g} s; {remedy}")
+    else:
+        bench.warnings.append(f"{said}; its steps have one size: {remedy}")
+
+
+def _lag(bench: Bench, impetus: float) -> float:
+    """Return ε of a macro step [s] of an FMU whose displacement answers a force as by a solver of order 1, else 0.
+
+    One without a velocity cannot be corrected, and has order 1. ``impetus`` as of `_wrong_outputs`.
+    """
+
+    def behind(size: float) -> float | None:
+        moved, faster = bench.response(size, (impetus / size**2, 0.0, 0.0))
+        return 0.5 * size - moved / faster if faster else None
+
+    def error(size: float) -> float | None:
+        lag = behind(size)
+        return None if lag is None else 2.0 * abs(lag) / size
+
+    shortest = next((value for value in bench.taken(error, reversed(bench.sizes)) if value is not None), 0.0)
+    if shortest <= _SECOND_ORDER:
+        return 0.0
+    able = bench.body.abilities
+    corrected = able.velocity and able.state
+    lag = behind(bench.sizes[0]) or 0.0
+    bench.renew(order=2 if corrected else 1, integrals=0)
+    bench.warnings.append(
+        f"its solver is of order 1 (as Euler's): over a step of {bench.sizes[0]:.6g} s a force moves its end by "
+        f"{1.0 - 2.0 * lag / bench.sizes[0]:.3g} of what the velocity says; errors of order 1 in its internal step "
+        "remain at any macro step, and are in no estimate: make that step shorter, or export it with another solver"
+    )
+    return lag if corrected else 0.0
 
 
 def _wrong_outputs(bench: Bench, impetus: float, h: float) -> set[str]:
@@ -256,18 +348,16 @@ def _wrong_outputs(bench: Bench, impetus: float, h: float) -> set[str]:
 
 def _try_slopes(bench: Bench, impetus: float) -> None:
     """Find the highest derivative of the force over a step that the motion follows; ``impetus`` as above."""
-    #: Responses to F τ/h and F τ²/h² over that to F: of the velocity, of the displacement.
-    due = (0.5, 1.0 / 3.0) if bench.spec.velocity else (1.0 / 3.0, 1.0 / 6.0)
     for order in (1, 2):
+        due = 1.0 / (order + 1.0)  # of the velocity, by F τ/h or F τ²/h² over that by F
 
-        def unfollowed(size: float, order: int = order) -> set[str]:
+        def unfollowed(size: float, order: int = order, due: float = due) -> set[str]:
             force = impetus / size**2
             slopes = (force / size, 0.0) if order == 1 else (0.0, 2.0 * force / size**2)
-            held = bench.change(size, (force, 0.0, 0.0))
-            grown = bench.change(size, (0.0, *slopes))
-            follows = abs(grown - due[order - 1] * held) <= _RESPONSE * due[order - 1] * abs(held)
-            said = "canInterpolateInputs = true, but a force that grows over a step is not followed"
-            return set() if follows and held else {said}
+            _, held = bench.response(size, (force, 0.0, 0.0))
+            _, grown = bench.response(size, (0.0, *slopes))
+            follows = abs(grown - due * held) <= _AGREE * due * abs(held)
+            return set() if follows and held else {"unfollowed"}
 
         bench.renew(slopes=order)
         try:
@@ -275,10 +365,14 @@ def _try_slopes(bench: Bench, impetus: float) -> None:
         except (FmuError, StepRefused):
             if order == 1:
                 raise
-            wrong = {""}  # FMI does not say how many derivatives there must be
+            wrong = {"refused"}  # FMI does not say how many derivatives there must be
         if wrong:
             bench.renew(slopes=order - 1)
-            bench.faults += wrong if order == 1 else ()
+            if order == 1:
+                bench.warnings.append(
+                    "canInterpolateInputs = true, but a force that grows over a step is not followed: the force has "
+                    "degree 0"
+                )
             break
 
 
@@ -287,8 +381,8 @@ def _struck_mass(bench: Bench, mass: float, speed: float) -> float:
     impulse = mass * speed
 
     def inertia(size: float) -> float | None:
-        change = bench.change(size, NO_FORCE, impulse)
-        return impulse / change if change else None
+        _, faster = bench.response(size, NO_FORCE, impulse)
+        return impulse / faster if faster else None
 
     found = bench.extrapolated(inertia)
     if found is not None and abs(found / mass - 1.0) <= _RESPONSE:

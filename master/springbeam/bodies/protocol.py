@@ -83,6 +83,7 @@ class Abilities:
     slopes: int = 2  #: highest derivative of a force over a step that it follows
     impulse: bool = True  #: it takes impulses
     energies: bool = True  #: it returns its energies
+    order: int = 2  #: its displacement answers a force to this order of its solver: 1, or 2 and more
 
 
 #: Abilities that a body has by a method, which it may leave out.
@@ -103,6 +104,8 @@ class Body:
     #: Whether columns have its acceleration and inner forces: true of our own beam and spring.
     reports = False
 
+    #: What a run has to say of the body.
+    warnings: tuple[str, ...] = ()
     #: Damping of the velocity of the end [N·s/m]; ``None`` if unknown.
     damping: float | None = None
     #: Expected displacement of the end [m]; 0 if unknown.
@@ -228,15 +231,17 @@ class Body:
     def trial_acceleration(self, time: float, size: float) -> float | None:
         """Return ẅ of the end [m/s²] in its present state at ``time`` [s], with the loads but no other force on it.
 
-        It follows, to second order, from a trial step of a small share of ``size`` [s], which is undone. ``None`` if
-        the body makes no such step.
+        It follows, to second order, from the velocities after two trial steps of a small share of ``size`` [s] and of
+        half of it, which are undone: those after one step follow a force whatever the order of the body's solver, and
+        displacements do not. ``None`` if the body makes no such steps.
         """
         if not (self.abilities.state and self.abilities.any_size and self.abilities.velocity):
             return None
         h = _TRIAL * size
-        w, v, _, _ = self.motion()
+        v = self.motion().velocity
+        half = self._trial(time, 0.5 * h)
         end = self._trial(time, h)
-        return None if end is None else 6.0 * (end.displacement - w - h * v) / (h * h) - 2.0 * (end.velocity - v) / h
+        return None if half is None or end is None else (4.0 * half.velocity - end.velocity - 3.0 * v) / h
 
     def decay(self, time: float, size: float, speed: float) -> float | None:
         """Return the decrease of ẅ of the end per unit of velocity that an impulse adds [1/s].

@@ -130,9 +130,16 @@ def _examine(scene: Scene) -> Findings:
             for key, shown_by, having, lacking in _OFFERED
         ]
         shown.append(table(names, rows))
+        shown += [f"warning: {text}" for text in finding.warnings]
     able = {table: finding.abilities for table, finding in found.items()}
     refused = refusals(set_up(scene, *able.values()), able)
     document = {"bodies": {name: asdict(finding) for name, finding in found.items()}, "refused": refused}
     if faults := [*(fault for finding in found.values() for fault in finding.faults), *refused]:
         return Findings(document, shown, code=BAD_INPUT, error="\n".join(faults))
-    return Findings(document, [*shown, "The checks found nothing wrong, and the scene can be run."])
+    warned = any(finding.warnings for finding in found.values())
+    passed = (
+        "The scene can be run, with these warnings."
+        if warned
+        else "The checks found nothing wrong, and the scene can be run."
+    )
+    return Findings(document, [*shown, passed])

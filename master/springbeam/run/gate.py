@@ -21,7 +21,7 @@ from .setup import SAME, SceneError, Setup
 #: Texts about missing abilities.
 _LACKS = {
     "state": "its state cannot be saved (canGetAndSetFMUstate = false)",
-    "any_size": "its steps have one size (canHandleVariableCommunicationStepSize = false)",
+    "any_size": "its steps have one size (canHandleVariableCommunicationStepSize = false, or steps inside)",
     "velocity": "it has no velocity",
     "integrals": "its Motion has wrong integrals, or it has not integral and integral_2",
     "impulse": "it has no impulse, or of a body of your own no apply_impulse",
@@ -80,6 +80,12 @@ def _lacking(setup: Setup, needs: Iterable[Need], table: str, body: Abilities) -
         for name in names:
             if getattr(body, name) < getattr(_ALL, name):
                 yield f"{key}: the body in [{table}] cannot do that, {_LACKS[name]}; {instead}"
+    if body.order < _ALL.order and not setup.exchanges:
+        yield (
+            f'[coupling] scheme = "{setup.scheme}": the body in [{table}] cannot do that, a force moves its end by '
+            "less or more than its velocity says, as by a solver of order 1 (Euler's), and a contact would create or "
+            "lose energy in each step; name the velocity of an FMU, or give a body of your own a method of order 2"
+        )
     degree = f"[coupling] degree = {setup.degree}: the body in [{table}] cannot do that"
     # The scheme sets as many integrals of the gap to 0; an exchange needs none.
     followed = body.slopes if setup.exchanges else min(body.integrals, body.slopes)
@@ -94,32 +100,45 @@ def _lacking(setup: Setup, needs: Iterable[Need], table: str, body: Abilities) -
 
 #: Length of a trial step over a macro step; displacement by a force in it, over that of the body or 1 m.
 _TRIAL, _MOVED = 2.0**-8, 1e-6
+#: Length of a trial step that shows the order of a solver, over a macro step: also the fastest waves are slow in it.
+_SHORT = 2.0**-14
+#: Largest relative difference of a displacement by a force from that of a free mass.
+_AS_FREE = 0.05
 
 
 def tried(body: Body, time: float, macro_step: float) -> Abilities:
-    """Return the abilities of a ``body`` of the caller, by four short steps from ``time`` [s] that are undone.
+    """Return the abilities of a ``body`` of the caller, by short steps from ``time`` [s] that are undone.
 
-    They show whether it follows a force that grows over a step, and returns the integrals of its motion. If it refuses
-    them, its declared abilities count.
+    They show whether it follows a force that grows over a step, returns the integrals of its motion, and by a force
+    moves as far as its velocity says. If it refuses them, its declared abilities count.
     """
     able = body.can()
     if not able.state or not 0.0 < body.mass < inf:
         return able
     h = _TRIAL * macro_step if able.any_size else macro_step
     w, v, _, _ = body.motion()
+    short = _SHORT * macro_step if able.any_size else macro_step
     moved = _MOVED * (max(abs(w), h * abs(v)) or 1.0)
-    push = 2.0 * body.mass * moved / (h * h)  # constant, it moves a free mass as far
-    forces: list[Force] = [NO_FORCE, (push, 0.0, 0.0), (0.0, push / h, 0.0), (0.0, 0.0, 2.0 * push / h**2)]
+    push, hard = (2.0 * body.mass * moved / (size * size) for size in (h, short))  # they move a free mass as far
+    tries: list[tuple[float, Force]] = [
+        (h, NO_FORCE),
+        *((h, force) for force in ((push, 0.0, 0.0), (0.0, push / h, 0.0), (0.0, 0.0, 2.0 * push / h**2))),
+        (short, NO_FORCE),
+        (short, (hard, 0.0, 0.0)),
+    ]
     body.mark()
     ends = []
     try:
-        for force in forces:
-            ends.append(body.advance(time, h, force))
+        for size, force in tries:
+            ends.append(body.advance(time, size, force))
             body.rewind()
     except (BodyFailed, StepRefused, OverflowError):
         body.rewind()
         return able
-    alone, *others = np.array(ends)
+    alone, *others, at_once, pushed = np.array(ends)
+    displaced, faster, *_ = pushed - at_once
+    if able.any_size and able.velocity and abs(displaced - 0.5 * short * faster) > _AS_FREE * abs(0.5 * short * faster):
+        able = replace(able, order=1)
     held, grown, bent = (np.abs(end - alone) for end in others)
     if held[0] == 0.0:
         return able

@@ -38,6 +38,7 @@ def summary(master: Master, recorder: Recorder) -> dict[str, Any]:
         of_window = (amounts[f"contact_force_{name}"] for name in ("max", "window", "max_time"))
         amounts["contact_force_max_error"] = peak_beside_law(pair.law, steps, *of_window)
     doubt = peak_force_doubt(pair, window, amounts.get("contact_force_max_error", 0.0))
+    warnings += [said for body in pair.bodies for said in body.warnings]
     warnings += filter(None, [unresolved or doubt, not_shown(scene, steps), unknown(pair), coarse_force(pair)])
     ruled_out = contradictions(pair.setup, steps, events, amounts.get("contact_duration_total", 0.0), places)
     warnings += [f"not resolved: {what}: an event was missed; {_SHORTER}" for what in ruled_out]
