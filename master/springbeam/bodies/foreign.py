@@ -38,7 +38,7 @@ _STAYS = 1e-6
 _NUDGE = 1e-6
 _NUDGE_AT_REST = 1e-9
 #: After how many macro steps of free flight exp(−1/2) is left of the jumps of ε v by impulses. An end does not jump;
-#: that it does not drift away from the FMU's own displacement either, they are made up for where no force answers that,
+#: that it does not drift away from the FMU's own displacement either, they are reduced where no force answers that,
 #: and slowly at first: ends that have parted do not meet again by it.
 _FORGOTTEN = 256.0
 
