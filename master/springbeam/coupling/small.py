@@ -14,15 +14,7 @@ Matrix = list[list[float]]
 
 def times(A: Matrix, x: Vector) -> Vector:
     """Return A x."""
-    if len(x) == 1:
-        return [A[0][0] * x[0]]
-    if len(x) == 2:
-        (a, b), (c, d) = A
-        x0, x1 = x
-        return [a * x0 + b * x1, c * x0 + d * x1]
-    (a, b, c), (d, e, f), (g, h, i) = A
-    x0, x1, x2 = x
-    return [a * x0 + b * x1 + c * x2, d * x0 + e * x1 + f * x2, g * x0 + h * x1 + i * x2]
+    return [sum(map(mul, row, x)) for row in A]
 
 
 def transposed(rows: Iterable[Iterable[float]]) -> Matrix:
@@ -31,8 +23,6 @@ def transposed(rows: Iterable[Iterable[float]]) -> Matrix:
 
 def less(A: Matrix, B: Matrix) -> Matrix:
     """Return A − B."""
-    if len(A) == 1:
-        return [[A[0][0] - B[0][0]]]
     return [list(map(sub, *rows)) for rows in zip(A, B, strict=True)]
 
 
