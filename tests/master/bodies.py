@@ -280,7 +280,7 @@ def interface_of(scene, tip_mass=0.01, mass=1.0, equilibrium=0.0):
 @contextmanager
 def pair_of(scene):
     """The FMUs of a scene, as its run has them at the start."""
-    made = load_bodies(scene, scene.contact_time or 0.0, scene.degree)
+    made = load_bodies(scene, scene.contact_time or 0.0, scene.degree)[:2]
     try:
         yield Pair(set_up(scene), *made)
     finally:
@@ -293,7 +293,7 @@ def bodies(scene):
     """The scene's bodies at `first_contact`; a beam without inertia is that of the package, which is exact."""
     beam = spring = None
     if scene.massless:
-        beam, _ = load_bodies(scene.model_copy(update={"lower": None}), scene.contact_time or 0.0, scene.degree)
+        beam, *_ = load_bodies(scene.model_copy(update={"lower": None}), scene.contact_time or 0.0, scene.degree)
     elif scene.beam is not None:
         target = scene.tip_target
         kinematic = scene.beam.approach == "undeformed" and target is not None

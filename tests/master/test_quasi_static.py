@@ -50,9 +50,11 @@ def test_statics_are_those_of_a_mesh_that_holds_them():
     assert statics.tip_inertia(BEAM) == pytest.approx(shape @ d.M @ shape, rel=1e-12)
 
 
-@pytest.mark.parametrize("degree", [1, 2])
-def test_locking_is_the_stiffness_of_the_mesh_over_that_of_the_beam(degree):
+@pytest.mark.parametrize("reduced", [False, True])
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_locking_is_the_stiffness_of_the_mesh_over_that_of_the_beam(degree, reduced):
     mesh = {"element_degree": degree, "n_elements": 2, "shear_modulus": 4e3, "fidelity": "dynamic"}
+    mesh["reduced_integration"] = reduced
     beam = BEAM.model_copy(update=mesh)
     d = assemble(beam)
     ratio = statics.tip_compliance(beam) / np.linalg.solve(d.K, d.tip_vector)[d.tip]

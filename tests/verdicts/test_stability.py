@@ -316,7 +316,7 @@ def linear_scene(law, stiffness, scheme, degree, H=4e-3):
 
 def growth(scene, steps=2000):
     """The factor by which amplitudes grow per macro step, of the second half of the steps."""
-    beam, top = load_bodies(scene, 0.0, scene.degree)
+    beam, top, _ = load_bodies(scene, 0.0, scene.degree)
     reduced = 1.0 / (1.0 / beam.mass + 1.0 / top.mass)
     beam.apply_impulse(-reduced)
     top.apply_impulse(reduced)

@@ -9,7 +9,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from ..bodies.equilibrium import contact_at_rest
 from ..bodies.factory import findings, load_bodies
 from ..bodies.protocol import Body
 from ..results.recording import MemoryRecorder, Recorder
@@ -62,14 +61,15 @@ class Simulation(AbstractContextManager["Simulation"]):
             scene = scene.model_copy(update={"upper": scene.beam.model_copy(update={"approach": "elastic"})})
         self.scene = scene
         self.recorder = recorder or MemoryRecorder(scene)
-        able = {table: finding.abilities for table, finding in findings(of_scene).items()}
+        found = findings(of_scene)
+        able = {table: finding.abilities for table, finding in found.items()}
         H = scene.coupling.macro_step or 1e-3 * scene.time.t_end
         for table, body in (("beam", upper), ("spring", lower)):
             if body is not None:
                 able[table] = tried(body, scene.contact_time or 0.0, H)
         setup = set_up(scene, *able.values())
-        contact_force = contact_at_rest(of_scene, setup.degree, setup.soft)
-        self._bodies = beam, spring = load_bodies(of_scene, setup.start, setup.degree, contact_force)
+        beam, spring, contact_force = load_bodies(of_scene, setup.start, setup.degree, found)
+        self._bodies = beam, spring
         try:
             admit(setup, upper or beam, lower or spring, able)
             self._master = Master(setup, upper or beam, lower or spring, self.recorder, contact_force)

@@ -154,15 +154,20 @@ def resting_height(spring: Spring, force: float) -> float | None:
     return min(stable, key=lambda y: abs(y - spring.equilibrium), default=None)
 
 
-def locking(beam: Beam) -> float:
-    """Return the static tip stiffness of a fully integrated mesh over that of the beam (model.md, "Locking")."""
-    if beam.fidelity == "quasi_static" or beam.reduced_integration or beam.element_degree > 2:
-        return 1.0
-    bending = bending_stiffness(beam)
-    shear = shear_stiffness(beam)
-    h = beam.length / beam.n_elements
-    if beam.element_degree == 1:
-        return 1.0 + shear * h**2 / (12.0 * bending)
+def mesh_compliance(beam: Beam) -> float:
+    """Return the tip deflection under a tip force of the mesh, or of the beam without inertia, which has none [m/N]."""
     compliance = tip_compliance(beam)
-    missing = beam.length * h**2 / (12.0 * bending) / (1.0 + 60.0 * bending / (shear * h**2))
-    return compliance / (compliance - missing)
+    if beam.fidelity == "quasi_static" or beam.element_degree > 2:
+        return compliance
+    h = beam.length / beam.n_elements
+    bending = bending_stiffness(beam)
+    ratio = shear_stiffness(beam) * h**2 / bending
+    missing = beam.length * h**2 / (12.0 * bending)
+    if beam.element_degree == 2:
+        return compliance if beam.reduced_integration else compliance - missing / (1.0 + 60.0 / ratio)
+    return compliance - missing if beam.reduced_integration else compliance / (1.0 + ratio / 12.0)
+
+
+def locking(beam: Beam) -> float:
+    """Return the static tip stiffness of the mesh over that of the beam (model.md, "Locking")."""
+    return tip_compliance(beam) / mesh_compliance(beam)
