@@ -1,55 +1,17 @@
-"""FMUs of both versions give the same bits; bodies that are kept for the next run step as new ones, are few, and are
-freed."""
+"""Bodies of our FMUs: few are kept for the next run, and what a force and a load do to one."""
 
 from math import nan
 
-import numpy as np
 import pytest
-import scenes
 from scenes import load_of
 
-from springbeam import PointMass, RunStopped, SceneError, load_scene, simulate, with_changes
-from springbeam.bodies import fmu, fmu_bodies
+from springbeam import load_scene, simulate, with_changes
+from springbeam.bodies import fmu
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.fmu import MOST_KEPT, release
 from springbeam.bodies.protocol import NO_FORCE, StepRefused
 
-SCENES = scenes.group("kept")
-SOFT = SCENES["transmission"]
-
-
 pytestmark = pytest.mark.usefixtures("none_kept")
-
-
-@pytest.fixture
-def made(monkeypatch):
-    """The names of the instances that are made from now on."""
-    names = []
-    make = fmu.Fmu.__init__
-
-    def noted(self, name, *rest):
-        names.append(name)
-        make(self, name, *rest)
-
-    monkeypatch.setattr(fmu.Fmu, "__init__", noted)
-    return names
-
-
-def numbers(scene):
-    """Return all that a run leaves and that is no time of the clock."""
-    run = simulate(scene)
-    assert run.steps is not None
-    counts = {name: value for name, value in run.summary.items() if name not in ("wall_time", "setup_time")}
-    shapes = [np.asarray(part).tobytes() for part in run.shapes or ()]
-    return {**{name: np.asarray(column).tobytes() for name, column in run.columns.items()}, "": shapes, **counts}
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_a_kept_body_steps_to_the_bits_of_a_new_one(name, made):
-    first = numbers(SCENES[name])
-    new = len(made)
-    assert numbers(SCENES[name]) == first
-    assert (new, len(made)) == (len(SCENES[name].fmus), new)
 
 
 @pytest.mark.parametrize("force", [(nan, 0.0, 0.0), (0.0, 0.0, nan)])
@@ -95,50 +57,4 @@ def test_few_are_kept_and_the_oldest_is_freed(monkeypatch):
     assert not any(one.faultless for one in closed)
 
 
-def test_a_simulation_that_is_refused_gives_its_bodies_back(made):
-    for _ in range(2):
-        with pytest.raises(SceneError, match="must start there or above"):
-            simulate(SOFT, lower=PointMass(1.0, displacement=1.0))
-    assert made == ["beam"]
-
-
-def test_a_body_whose_calls_fail_is_not_kept(made, monkeypatch):
-    def failing(self):
-        raise self.fmu.failed(3, "cannot save the state")
-
-    with monkeypatch.context() as during:
-        during.setattr(fmu_bodies.FmuBody, "mark", failing)
-        with pytest.raises(RunStopped, match=r"beam\.fmu: cannot save the state"):
-            simulate(SOFT)
-    simulate(SOFT)
-    assert made == ["beam", "spring", "beam"]  # the spring had not been called
-
-
 # -- either version of FMI
-
-LOADS = [
-    {"on": "beam", "at": 0.5, "signal": "harmonic", "amplitude": 0.3, "frequency": 4.0},
-    {"on": "spring", "signal": "harmonic", "amplitude": 0.2, "frequency": 7.0},
-]
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        {"contact": {"law": "compliance"}},
-        {"coupling": {"degree": 1}, "loads": LOADS},
-    ],
-)
-def test_either_version_of_fmi_gives_the_same_bits(changes, monkeypatch):
-    scene = with_changes(load_scene("soft"), time={"t_end": 0.3}, **changes)
-    runs = []
-    for version in ("2.0", "3.0"):
-        monkeypatch.setenv("SPRINGBEAM_FMI", version)
-        runs.append(simulate(scene))
-    old, new = runs
-    assert len(old.events) > 1
-    assert old.events == new.events
-    pairs = [(old[name], new[name]) for name in old.columns]
-    for one, other in (*pairs, (old.steps, new.steps), *zip(old.shapes, new.shapes, strict=True)):
-        assert one.tobytes() == other.tobytes()
