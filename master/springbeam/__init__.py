@@ -9,35 +9,46 @@ from .lazily import attached
 if TYPE_CHECKING:
     __version__: str
     from .api import RunStopped, Simulation, Trajectory, load, simulate
-    from .bodies.elements import PointMass, RigidWall, SpringDamper
+    from .bodies.elements import MovingWall, PointMass, RigidWall, SpringDamper
     from .bodies.protocol import Body, Energies, Motion
     from .motion.events import Event
-    from .scene import Scene, SceneError, load_scene, with_changes
+    from .scene import Beam, Contact, Scene, SceneError, Spring, Stop, load_scene, with_changes
+    from .scene.laws import SoftLaw
+    from .scene.loads import FunctionLoad
 else:
     __getattr__ = attached(
         __name__,
         {
             "api": ("RunStopped", "Simulation", "Trajectory", "load", "simulate"),
-            "bodies.elements": ("PointMass", "RigidWall", "SpringDamper"),
+            "bodies.elements": ("MovingWall", "PointMass", "RigidWall", "SpringDamper"),
             "bodies.protocol": ("Body", "Energies", "Motion"),
             "motion.events": ("Event",),
-            "scene": ("Scene", "SceneError", "load_scene", "with_changes"),
+            "scene": ("Beam", "Contact", "Scene", "SceneError", "Spring", "Stop", "load_scene", "with_changes"),
+            "scene.laws": ("SoftLaw",),
+            "scene.loads": ("FunctionLoad",),
             "version": ("__version__",),
         },
     )
 
 __all__ = [
+    "Beam",
     "Body",
+    "Contact",
     "Energies",
     "Event",
+    "FunctionLoad",
     "Motion",
+    "MovingWall",
     "PointMass",
     "RigidWall",
     "RunStopped",
     "Scene",
     "SceneError",
     "Simulation",
+    "SoftLaw",
+    "Spring",
     "SpringDamper",
+    "Stop",
     "Trajectory",
     "__version__",
     "load",

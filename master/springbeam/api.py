@@ -17,20 +17,23 @@ from .run.runner import Simulation
 from .studies.accuracy import simulate
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["RunStopped", "Simulation", "Trajectory", "load", "simulate"]
 
 
-def _plot(run: Trajectory, picture: str = "positions") -> Figure:
+def _plot(run: Trajectory, picture: str = "positions", ax: Axes | None = None) -> Figure:
     """Return a matplotlib Figure: ``shapes_after_contact``, ``shapes_later``, ``positions``,
     ``velocities_and_forces``, ``gap_and_energy``, ``loads_and_clamp`` or ``moments``.
+
+    In ``ax``, if given, the first panel of a picture over time is drawn.
 
     Raises ValueError for another name, and if the run has no data for it.
     """
     from .pictures.plots import figure_of  # takes a second to load: only for pictures
 
-    return figure_of(run, picture)
+    return figure_of(run, picture, ax)
 
 
 def _save(run: Trajectory, directory: str | Path, *, replace: bool = False) -> Path:

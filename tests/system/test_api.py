@@ -169,3 +169,52 @@ def test_a_simulation_gives_its_fmus_back_once_and_steps_no_more():
         while second.step():
             third.step()
         assert second.run.steps.tobytes() == alone.steps.tobytes()
+
+
+# -- in a notebook --------------------------------------------------------------------------------------------------
+
+
+def test_keys_have_dotted_names_wherever_a_scene_is_changed(here):
+    changes = {"spring.mass": 2.0, "time.t_end": 0.01}
+    loaded = load_scene("soft", changes)
+    assert loaded == with_changes(load_scene("soft"), changes) == with_changes(load_scene("soft"), **changes)
+    assert loaded == load_scene("soft", ["spring.mass=2.0", "time.t_end=0.01"])
+    assert (loaded.spring.mass, loaded.time.t_end) == (2.0, 0.01)
+    again = with_changes(loaded, {"spring.damping": 0.5}, spring={"mass": 3.0}, stop=None)
+    assert (again.spring.mass, again.spring.damping, again.stop) == (3.0, 0.5, None)
+    shaken = with_changes(load_scene("vibro-impact"), {"loads.0.frequency": 7.0})
+    assert shaken.loads[0].frequency == 7.0
+    flat = {"time.t_end": 0.01, "spring.mass": 1.0, "spring.linear_stiffness": 3.0, "spring.equilibrium": 0.1}
+    assert simulate(flat).scene.spring.equilibrium == 0.1
+
+
+def test_tables_are_made_of_their_keys():
+    contact = springbeam.Contact(law="kelvin_voigt", stiffness=1e4, damping=5.0)
+    assert contact.force().force(0.01, 1.0) == 105.0
+    made = with_changes(load_scene("soft"), contact=contact, spring=springbeam.Spring(mass=2.0, linear_stiffness=3.0))
+    assert (made.contact, made.spring.mass) == (contact, 2.0)
+    with pytest.raises(ValueError, match="exponent"):
+        springbeam.Contact(law="tie", exponent=2.0)
+
+
+def test_a_dataset_has_each_time_once_and_both_sides_of_an_impact():
+    run = simulate(with_changes(SOFT, {"time.t_end": 0.16}))
+    dataset = run.to_xarray()
+    assert (np.diff(dataset.time.values) > 0.0).all()
+    assert float(dataset.y.sel(time=0.1, method="nearest")) == run.y[np.abs(run.time - 0.1).argmin()]
+    stop = next(event for event in run.events if event.kind == "stop_impact")
+    struck = dataset.sel(event_time=stop.time, time=stop.time)
+    # Restitution 1; the velocity changes by |ÿ| times the distance of two doubles before it.
+    assert float(struck.z) == -float(struck.z_before) == stop.z
+
+
+def test_a_run_is_drawn_into_axes_of_the_callers():
+    matplotlib = pytest.importorskip("matplotlib")
+    run = simulate(with_changes(SOFT, {"time.t_end": 0.02}))
+    figure = matplotlib.figure.Figure()
+    ax = figure.add_subplot()
+    assert run.plot("positions", ax=ax) is figure
+    lines = {line.get_label(): line for line in ax.lines}
+    assert np.allclose(lines["spring top y"].get_ydata().min() / run.y.min(), 1e3)  # in mm
+    with pytest.raises(ValueError, match="no picture 'moments' for axes"):
+        run.plot("moments", ax=ax)

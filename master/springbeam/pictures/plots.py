@@ -28,9 +28,10 @@ from .drawing import (
     level_side,
     near_levels,
     readable_unit,
+    time_unit,
 )
-from .panels import panels
-from .timeline import COMPRESSION, DPI, REMARK, STYLE, figure_for, line_style, timeline
+from .panels import Panel, panels
+from .timeline import COMPRESSION, DPI, REMARK, STYLE, figure_for, line_style, paint, shade, timeline
 
 _SHAPES_EARLY = 20
 _SHAPES_LATER = 24
@@ -67,11 +68,20 @@ def plot_run(trajectory: Trajectory, directory: str | Path, names: Iterable[str]
 
 
 @matplotlib.rc_context(STYLE)
-def figure_of(trajectory: Trajectory, picture: str) -> Figure:
+def figure_of(trajectory: Trajectory, picture: str, ax: Axes | None = None) -> Figure:
     """Return the picture of that name; see `springbeam.Trajectory.plot`."""
-    if picture not in PICTURES:
-        raise ValueError(f"no picture {picture!r}; there are {', '.join(PICTURES)}")
-    figure = _drawn(trajectory, picture)
+    there = PICTURES if ax is None else _OVER_TIME
+    if picture not in there:
+        raise ValueError(f"no picture {picture!r}{'' if ax is None else ' for axes'}; there are {', '.join(there)}")
+    if ax is None:
+        figure = _drawn(trajectory, picture)
+    else:
+        figure = None
+        for panel in _panels(trajectory, picture)[:1]:
+            paint(ax, panel, time_unit(trajectory))
+            shade(ax, trajectory)
+            ax.legend(loc="best")
+            figure = ax.get_figure(root=True)
     if figure is None:
         raise ValueError(f"the run has no data for {picture!r}")
     return figure
@@ -80,11 +90,16 @@ def figure_of(trajectory: Trajectory, picture: str) -> Figure:
 def _drawn(trajectory: Trajectory, picture: str) -> Figure | None:
     if picture in _ALONG:
         return _ALONG[picture](trajectory) if drawable(trajectory) else None
-    title, names = _OVER_TIME[picture]
-    shown = [panel for panel in panels(trajectory) if panel.name.startswith(names)]
+    title, _ = _OVER_TIME[picture]
+    shown = _panels(trajectory, picture)
     if picture == OVERVIEW:  # on one page
         shown = [replace(panel, height=_ON_ONE_PAGE * panel.height) for panel in shown]
     return timeline(trajectory, title, shown) if shown else None
+
+
+def _panels(trajectory: Trajectory, picture: str) -> list[Panel]:
+    _, names = _OVER_TIME[picture]
+    return [panel for panel in panels(trajectory) if panel.name.startswith(names)]
 
 
 def _since_contact(trajectory: Trajectory) -> tuple[np.ndarray, slice]:

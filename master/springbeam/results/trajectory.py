@@ -17,6 +17,7 @@ from ..scene.messages import nearest
 from ..scene.statics import SHAPE_POINTS
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from pandas import DataFrame
     from xarray import Dataset
@@ -131,7 +132,7 @@ class Trajectory:
     if TYPE_CHECKING:
 
         def at(self, times: Any) -> Trajectory: ...
-        def plot(self, picture: str = "positions") -> Figure: ...
+        def plot(self, picture: str = "positions", ax: Axes | None = None) -> Figure: ...
         def save(self, directory: str | Path, *, replace: bool = False) -> Path: ...
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -160,8 +161,9 @@ class Trajectory:
         span = f"t = {self.time[0]:g} … {self.time[-1]:g} s, " if len(self) else ""
         return f"<Trajectory {self.scene.title!r}: {len(self)} rows, {span}{len(self.events)} events, {status}>"
 
-    def _units(self) -> dict[str, str]:
-        """Return the units of the columns that have one."""
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the columns that have one."""
         return {name: unit for name, unit in columns_of(self.scene).items() if unit and name in self.columns}
 
     @property
@@ -203,20 +205,25 @@ class Trajectory:
         """
         table: DataFrame = _of_extra("pandas").DataFrame(self.columns)
         table.attrs["title"] = self.scene.title
-        table.attrs["units"] = self._units()
+        table.attrs["units"] = self.units
         return table
 
     def to_xarray(self) -> Dataset:
         """Return the columns over ``time`` and the shapes over ``shape_time`` and ``x`` [m] as an xarray Dataset.
 
-        It has units, and needs the extra ``data``.
+        No time repeats: at an event the values are those after it, and ``y_before`` over ``event_time`` those before
+        it, of each column. It has units, and needs the extra ``data``.
         """
-        units = self._units()
-        variables: dict[str, Any] = {
-            name: ("time", values, {"units": units[name]} if name in units else {})
-            for name, values in self.columns.items()
-        }
-        coordinates = {"time": variables.pop("time")}
+        last = np.append(self.time[1:] > self.time[:-1], True)
+        times = np.unique([event.time for event in self.events if self.time[0] < event.time <= self.time[-1]])
+        before = self._before(times)
+        variables: dict[str, Any] = {}
+        for name, values in self.columns.items():
+            attributes = {"units": self.units[name]} if name in self.units else {}
+            variables[name] = ("time", values[last], attributes)
+            variables[f"{name}_before"] = ("event_time", before[name], attributes)
+        coordinates = {"time": variables.pop("time"), "event_time": ("event_time", times, {"units": "s"})}
+        del variables["time_before"]
         if self.shapes is not None and self.scene.beam is not None:
             along = {"deflection": "m", "bending_moment": "N·m", "shear_force": "N"}
             for part, (name, unit) in enumerate(along.items()):
@@ -225,6 +232,13 @@ class Trajectory:
             coordinates["x"] = ("x", SHAPE_POINTS * self.scene.beam.length, {"units": "m"})
         dataset: Dataset = _of_extra("xarray").Dataset(variables, coordinates, {"title": self.scene.title})
         return dataset
+
+    def _before(self, times: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the columns right before events at ``times`` [s]."""
+        if self.steps is None:  # the run has a row before each event
+            rows = np.searchsorted(self.time, times)
+            return {name: values[rows] for name, values in self.columns.items()}
+        return self.at(np.nextafter(times, -np.inf)).columns
 
 
 def _of_extra(package: str) -> Any:

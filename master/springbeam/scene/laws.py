@@ -12,7 +12,7 @@ independently, compare names of laws. ``docs/contributing.md`` shows how to add 
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import model_validator
 from typing_extensions import Self
@@ -192,6 +192,12 @@ def stiffest(law: SoftLaw, energy: float) -> float:
 
 class Contact(Table):
     """The contact force C as a function of the penetration p = y − u_tip (``docs/model.md``, "Interface laws")."""
+
+    def __new__(cls, *args: Any, **keys: Any) -> Self:
+        """Make the table of the law that the key ``law`` names."""
+        kind: type[Any] = LAWS.get(keys.get("law", LAW.default), cls) if cls is Contact else cls
+        made: Self = super().__new__(kind)
+        return made
 
     law: str
     force_window: float | None = key(

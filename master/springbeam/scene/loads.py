@@ -4,6 +4,7 @@
 values is a file of two columns, time and value (``recorded``).
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 from math import inf
 from pathlib import Path
@@ -17,8 +18,6 @@ from .recorded import Reading, Recorded
 from .tables import OneOf, Table, key
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import numpy as np
     from scipy.interpolate import PPoly
 else:
@@ -134,7 +133,7 @@ class Load(Table):
         """Return the time derivative of `value` at ``times`` [s]; at a kink, that after it."""
         return self._within(times, self.slope)
 
-    def _within(self, times: Any, curve: "Callable[[np.ndarray], Any]") -> "np.ndarray":
+    def _within(self, times: Any, curve: Callable[["np.ndarray"], Any]) -> "np.ndarray":
         t = np.asarray(times, dtype=float) - self.since
         first, last = self._extent
         return np.where((t >= first) & (t < last), self.amplitude * curve(t), 0.0)
@@ -374,6 +373,36 @@ class TableLoad(Reading, _Started):
 
     def slope(self, t: "np.ndarray") -> Any:
         return self.record(t, 1)
+
+
+class FunctionLoad(Load):
+    """A load that is a function of time, for programs: no scene file has it, and `springbeam.simulate` takes it.
+
+    ``function`` returns the value at one time [s], in the unit of the load; steps end at the times ``breaks`` [s], at
+    which it jumps or has a kink. ``derivative``, of the function, is for the motion of a wall.
+    """
+
+    signal: str = "function"
+    function: Callable[[float], float]
+    derivative: Callable[[float], float] | None = None
+    breaks: tuple[float, ...] = ()
+
+    @property
+    def _bends(self) -> tuple[float, ...]:
+        return self.breaks
+
+    def curve(self, t: "np.ndarray") -> Any:
+        return _each(self.function, t)
+
+    def slope(self, t: "np.ndarray") -> Any:
+        if self.derivative is None:
+            raise ValueError(f'a FunctionLoad on = "{self.on}" has no derivative, by which a wall moves; give it one')
+        return _each(self.derivative, t)
+
+
+def _each(function: Callable[[float], float], times: "np.ndarray") -> "np.ndarray":
+    values = [function(time) for time in np.ravel(times).tolist()]
+    return np.reshape(np.array(values, dtype=float), np.shape(times))
 
 
 #: By their names in a scene.

@@ -17,15 +17,18 @@ from .schemes import PICKED_BY_ACCURACY
 from .tables import ArgumentError, SceneError
 
 
-def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy: float | None = None) -> Scene:
+def load_scene(
+    path_or_name: str | Path, changes: Mapping[str, Any] | Iterable[str] = (), accuracy: float | None = None
+) -> Scene:
     """Read and validate a scene.
 
     Parameters
     ----------
     path_or_name
         A TOML file, or the name of a shipped scene.
-    overrides
-        ``"table.key=value"`` strings, the value in TOML syntax; a bare word is taken as a string.
+    changes
+        Values as of `with_changes`, ``{"spring.mass": 2.0}``; or ``"table.key=value"`` strings, the value in TOML
+        syntax, a bare word being a string.
     accuracy
         Takes the place of the scene's own ``accuracy``, if any.
 
@@ -35,7 +38,7 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy
         If the file cannot be read or the scene cannot be run.
     """
     path = _scene_file(path_or_name)
-    overrides = list(overrides)
+    overrides = [] if isinstance(changes, Mapping) else list(changes)
     try:
         data = tables_of(path)
     except (OSError, ValueError, RecursionError) as error:
@@ -45,11 +48,10 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy
         ) from error
     if accuracy is not None:
         data["accuracy"] = accuracy
-    changes = _settings(overrides)
+    tables = by_table(changes) if isinstance(changes, Mapping) else _settings(overrides)
     source = " ".join([str(path), *(f"--set {override}" for override in overrides)])
     try:
-        for table, keys in changes.items():
-            _change(data, table, keys)
+        _apply(data, tables)
     except SceneError as error:
         raise SceneError(f"{source}: {error}") from None
     for content, key in ((data.get("beam"), "fmu"), (data.get("spring"), "fmu"), *((q, "file") for q in _loads(data))):
@@ -62,7 +64,7 @@ def as_scene(scene: Scene | Mapping[str, Any] | str | Path) -> Scene:
     """Return a scene: as it is, of nested dictionaries, or what `load_scene` reads. Raises SceneError."""
     if isinstance(scene, Scene):
         return scene
-    return scene_from_dict(dict(scene)) if isinstance(scene, Mapping) else load_scene(scene)
+    return scene_from_dict(by_table(scene)) if isinstance(scene, Mapping) else load_scene(scene)
 
 
 def _scene_file(path_or_name: str | Path) -> Path:
@@ -87,24 +89,43 @@ def _settings(overrides: Iterable[str]) -> dict[str, dict[str, Any]]:
     return settings
 
 
-def with_changes(scene: Scene, **changes: Any) -> Scene:
-    """Return a validated copy with keys changed: ``with_changes(scene, coupling={"macro_step": 1e-3})``.
+def with_changes(scene: Scene, changes: Mapping[str, Any] | None = None, /, **tables: Any) -> Scene:
+    """Return a validated copy with keys changed.
 
-    ``None`` takes a table out, ``with_changes(scene, stop=None)``, or the accuracy. A list ``loads`` takes the place of
-    all loads, ``with_changes(scene, **{"loads.0": {"frequency": 12.0}})`` changes the first of them.
+    ``with_changes(scene, {"spring.mass": 2.0, "loads.0.frequency": 12.0})`` changes keys,
+    ``with_changes(scene, spring={"mass": 2.0}, stop=None)`` keys of tables; ``None`` takes a table out, or the
+    accuracy. A list ``loads`` takes the place of all loads.
 
     Raises
     ------
     SceneError
         If the changed scene cannot be run, or its ``accuracy`` would overrule a change.
     """
-    within = {table: keys for table, keys in changes.items() if isinstance(keys, Mapping)}
-    whole = {name: content for name, content in changes.items() if name not in within}
-    data = scene.model_dump(exclude_none=True, exclude_unset=True) | whole
-    data = {name: content for name, content in data.items() if content is not None}
-    for table, keys in within.items():
-        _change(data, table, keys)
+    data = scene.model_dump(exclude_none=True, exclude_unset=True)
+    _apply(data, by_table({**(changes or {}), **tables}))
     return scene_from_dict(data)
+
+
+def by_table(changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values with dotted names, as ``"spring.mass"``, in dictionaries of their tables."""
+    found: dict[str, Any] = {}
+    for name, value in changes.items():
+        split = None if isinstance(value, Mapping) else split_key(name)
+        table, content = (name, value) if split is None else (split[0], {split[1]: value})
+        there = found.get(table)
+        found[table] = {**there, **content} if isinstance(there, dict) and isinstance(content, Mapping) else content
+    return found
+
+
+def _apply(data: dict[str, Any], changes: Mapping[str, Any]) -> None:
+    """Change tables, given by their keys, and replace everything else; ``None`` takes it out. Raises SceneError."""
+    whole = {name: content for name, content in changes.items() if not isinstance(content, Mapping)}
+    data |= whole
+    for name in [name for name, content in whole.items() if content is None]:
+        del data[name]
+    for table, keys in changes.items():
+        if table not in whole:
+            _change(data, table, keys)
 
 
 def scene_from_dict(data: dict[str, Any], source: str = "scene") -> Scene:
