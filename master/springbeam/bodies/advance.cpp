@@ -26,8 +26,9 @@ struct Advance {
   std::size_t n_inputs, n_derivatives, n_outputs;
   const unsigned *inputs, *derivatives, *outputs;  // value references
   const int* orders;                               // of the derivatives
-  const double* given;                             // time, size, inputs, derivatives
-  double* reported;                                // outputs
+  const double *units_given, *units_reported;      // of the FMU, in SI units
+  double* given;                                   // time, size, inputs, derivatives; in SI units, then in the FMU's
+  double* reported;                                // outputs; in the FMU's units, then in SI units
   int always;                                      // whether derivatives are set that are all 0
 };
 using Advance2 = Advance<fmi2SetRealTYPE, fmi2SetRealInputDerivativesTYPE, fmi2DoStepTYPE, fmi2GetRealTYPE>;
@@ -83,6 +84,7 @@ int step(const Advance3& a) {
 
 template <class A>
 int advance(const A& a) {
+  for (std::size_t i = 0; i < 2 + a.n_inputs + a.n_derivatives; ++i) a.given[i] /= a.units_given[i];
   const double* inputs = a.given + 2;
   const double* derivatives = inputs + a.n_inputs;
   if (!finite(inputs, a.n_inputs) || !finite(derivatives, a.n_derivatives)) return failed(kInputsNotFinite, 0);
@@ -92,6 +94,7 @@ int advance(const A& a) {
   }
   if (const int failure = step(a)) return failure;
   if (const int status = get(a); status > kWarning) return failed(kGet, status);
+  for (std::size_t i = 0; i < a.n_outputs; ++i) a.reported[i] *= a.units_reported[i];
   return finite(a.reported, a.n_outputs) ? 0 : failed(kOutputsNotFinite, 0);
 }
 

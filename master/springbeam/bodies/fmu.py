@@ -255,12 +255,19 @@ class Fmu:
         self._asked(f"cannot set {', '.join(values)}", setter, self._references([*values], kind), [*values.values()])
 
     def advancing(
-        self, inputs: Sequence[str], impulse: Sequence[str], slopes: int, outputs: Sequence[str], always: bool
+        self,
+        inputs: Sequence[str],
+        impulse: Sequence[str],
+        slopes: int,
+        outputs: Sequence[str],
+        always: bool,
+        units: Mapping[str, float],
     ) -> tuple[Call, Any, Any]:
         """Return a function that makes an advance, and the C arrays of its arguments and of its results.
 
         Arguments are time, size, the inputs, the ``impulse`` if it has one, and derivatives 1 … ``slopes`` of each
-        input, one input after another. An advance returns 0 or a `Failure`.
+        input, one input after another, all in SI units; ``units`` are those of variables that have others. An advance
+        returns 0 or a `Failure`.
         """
         slave = self._slave
         each = [(name, order) for name in inputs for order in range(1, slopes + 1)]
@@ -271,12 +278,16 @@ class Fmu:
         of_inputs, of_derivatives, of_outputs = (
             self._references(names, slave.REAL) for names in ((*inputs, *impulse), derivatives, outputs)
         )
-        given = (c_double * (2 + len(of_inputs) + len(each)))()
+        second = self.time_unit.factor
+        of_given = [second, second, *(units.get(name, 1.0) for name in (*inputs, *impulse))]
+        of_given += [units.get(name, 1.0) / second**order for name, order in each]
+        given = (c_double * len(of_given))()
         reported = (c_double * len(outputs))()
         advance = Advance(
             slave.component, n_inputs=len(of_inputs), n_derivatives=len(each), n_outputs=len(outputs), inputs=of_inputs,
             derivatives=of_derivatives, outputs=of_outputs, orders=(c_int * len(each))(*[order for _, order in each]),
-            given=given, reported=reported, always=always,
+            units_given=(c_double * len(given))(*of_given), given=given, reported=reported, always=always,
+            units_reported=(c_double * len(outputs))(*[units.get(name, 1.0) for name in outputs]),
             **{key: cast(self._function(name), c_void_p) for key, name in named.items()},
         )  # fmt: skip
         library = self._asked("cannot be used", advances)

@@ -1,12 +1,11 @@
-"""The port through which a run uses an FMU, and our two FMUs as bodies: all that each step of a run calls."""
+"""An FMU as a body by a table of its variables, and our two FMUs: such a table each, and what only they have."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from math import isfinite
-from struct import Struct
-from typing import Any, ClassVar, NamedTuple, NoReturn
+from types import MappingProxyType
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -19,16 +18,17 @@ from ..scene.frequencies import (
     slowest_frequency,
 )
 from ..scene.modes import tip_modes
+from ..scene.partners import ForeignFmu
 from ..scene.statics import SHAPE_POINTS, tip_compliance, tip_inertia, tip_reach
 from .elements import EndLoaded
 from .fmu import Fmu, Value
 from .force import combined
-from .functions import DISCARD, OK, WARNING, Failure
+from .functions import WARNING
+from .port import CANNOT, Port, Reading
 from .protocol import (
     NO_FORCE,
     Abilities,
     Body,
-    BodyFailed,
     Energies,
     FmuError,
     Force,
@@ -57,127 +57,6 @@ _SHAPE_3 = (_ALONG, _POINTS)
 _SHAPE_2 = (tuple(f"{name}[{i}]" for name in _ALONG for i in range(1, _POINTS + 1)), 1)
 
 
-#: Requests of an FMU for FMI 3.0 after a step that are not supported.
-_ASKED = {
-    Failure.ENDS: "fmi3DoStep requests the end of the simulation (terminateSimulation)",
-    Failure.EARLY: "fmi3DoStep returned early, which it was not allowed to (earlyReturn)",
-    Failure.EVENT: "fmi3DoStep requests event mode, which is not used (eventHandlingNeeded)",
-}
-
-
-#: Reads variables of an FMU.
-Reading = Callable[[], tuple[float, ...]]
-#: What it means that a call for the state fails.
-CANNOT = {"get_state": "cannot save the state", "set_state": "cannot restore the state"}
-
-
-class Port:
-    """The calls of a run to an FMU, without their meaning.
-
-    Parameters
-    ----------
-    inputs, impulse, outputs
-        Names of variables. A step sets the inputs and the impulse, if the FMU takes one, which acts at its start; it
-        returns the outputs.
-    slopes
-        Highest derivative of the inputs that a step sets; those that are all 0 only ``always``.
-    repeats
-        Whether the state can be saved and restored.
-    """
-
-    def __init__(
-        self,
-        fmu: Fmu,
-        inputs: tuple[str, ...],
-        impulse: tuple[str, ...],
-        outputs: tuple[str, ...],
-        slopes: int = 2,
-        always: bool = False,
-        repeats: bool = True,
-    ) -> None:
-        self.path = fmu.path
-        self._fmu = fmu
-        self._inputs = (*inputs, *impulse)
-        self._outputs = outputs
-        fmu.reading(self._inputs)  # a wrong reference is found before the run
-        self._read = fmu.reading(outputs)
-        self._advance, self._given, reported = fmu.advancing(inputs, impulse, slopes, outputs, always)
-        self._write = partial(Struct(f"{len(self._given)}d").pack_into, self._given, 0)
-        self._reported = partial(Struct(f"{len(reported)}d").unpack, reported)
-        #: Save the state, and return to it; both return their status.
-        self.get_state, self.set_state = fmu.of_state() if repeats else (lambda: OK, self._refuse_to_repeat)
-        if repeats:
-            self._before_trial, self._after_trial = fmu.of_state(of_trial=True)
-
-    def read(self) -> tuple[float, ...]:
-        """Return the outputs. Raises StepRefused if one is not finite."""
-        return self._finite(self._read())
-
-    def _finite(self, reported: tuple[float, ...]) -> tuple[float, ...]:
-        if not all(map(isfinite, reported)):
-            values = ", ".join(f"{name} = {value}" for name, value in zip(self._outputs, reported, strict=True))
-            raise StepRefused(f"not finite: {values} of {self.path.name}")
-        return reported
-
-    def step(self, *given: float) -> tuple[float, ...]:
-        """Step under ``given``: time [s], size [s], inputs, impulse, derivatives; return the outputs."""
-        self._write(*given)
-        if code := self._advance():
-            self._stop(*divmod(code, 16))
-        return self._reported()
-
-    def trial(self, given: Sequence[float], read: Reading | None = None) -> tuple[float, ...]:
-        """Step under ``given``, return the outputs or the result of ``read``, and undo the step."""
-        if (status := self._before_trial()) > WARNING:
-            raise self.failed(status, CANNOT["get_state"])
-        try:
-            reported = self.step(*given)
-            return reported if read is None else read()
-        finally:
-            if (status := self._after_trial()) > WARNING:
-                raise self.failed(status, CANNOT["set_state"])
-
-    def _stop(self, failure: int, status: int) -> NoReturn:
-        """Raise the error of a step that was not made."""
-        time, _, *inputs = self._given
-        failed = {
-            Failure.SET: f"cannot set {', '.join(self._inputs)}",
-            Failure.SET_DERIVATIVES: "cannot set input derivatives",
-            Failure.GET: f"cannot read {', '.join(self._outputs)}",
-        }
-        if failure in failed:
-            raise self._fmu.failed(status, failed[Failure(failure)])
-        if failure == Failure.INPUTS_NOT_FINITE:
-            raise StepRefused(f"{self.path.name}: the force it should step under is not finite: {inputs}")
-        if failure == Failure.OUTPUTS_NOT_FINITE:
-            self._finite(self._reported())
-        self._fmu.refuse(max(status, DISCARD), time, _ASKED.get(Failure(failure), ""))
-
-    def failed(self, status: int, what: str) -> FmuError:
-        """Return the error of a call that returned ``status``."""
-        return self._fmu.failed(status, what)
-
-    def _refuse_to_repeat(self) -> NoReturn:
-        raise BodyFailed(f"{self.path}: a step had to be repeated, and its state cannot be restored")
-
-    def close(self) -> bool:
-        """Free the FMU; return whether this process may instantiate it again."""
-        self._fmu.close()
-        return not self._fmu.says.canBeInstantiatedOnlyOncePerProcess
-
-
-class Names(NamedTuple):
-    """Names of the variables of our FMUs."""
-
-    fmu: str
-    mass: str
-    motion: tuple[str, str, str, str]
-    acceleration: str
-    energies: tuple[str, ...]
-    impulse: str
-    forces: tuple[str, ...]
-
-
 class FmuState(NamedTuple):
     """State of a body outside of the FMU."""
 
@@ -187,8 +66,17 @@ class FmuState(NamedTuple):
     pending: float = 0.0  #: upward impulse that the FMU applies at the start of its next step [N·s]
 
 
+#: Roles of variables in a body, as the keys of a scene name them.
+MOTION = ForeignFmu.MOTION
+ENERGIES = ForeignFmu.ENERGIES
+
+
 class FmuBody(Body):
-    """A body of an FMU: the meaning of the numbers of its port."""
+    """A body of an FMU: what the numbers of its port mean.
+
+    Its table says which variable has which role: ``force``, ``impulse``, those of `MOTION` and `ENERGIES`,
+    ``acceleration``.
+    """
 
     state: Any
     _port: Port
@@ -242,8 +130,23 @@ class FmuBody(Body):
             motion=motion._replace(velocity=velocity), reported=reported, pending=pending + impulse
         )
 
-    def _take(self, reported: tuple[float, ...]) -> Motion:
-        """Set motion and energies to the outputs of the FMU, with no impulse pending; return the motion."""
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        self.steps_made += 1
+        self._moved = True
+        return self._take(self._port.step(self._given(time, size, contact, foundation)), size)
+
+    def _given(self, time: float, size: float, contact: Force, foundation: Force) -> tuple[float, ...]:
+        """Return what the port takes for a step under these forces and the loads."""
+        raise NotImplementedError
+
+    def _tried(self, time: float, size: float, foundation: Force = NO_FORCE, read: Reading | None = None) -> Any:
+        """Return the outputs, or what ``read`` does, after a step under the loads, which is undone."""
+        self.steps_made += 1
+        self.rewinds += 1
+        return self._port.trial(self._given(time, size, NO_FORCE, foundation), read)
+
+    def _take(self, reported: tuple[float, ...], size: float = 0.0) -> Motion:
+        """Set motion and energies to the outputs after a step of ``size`` [s]; no impulse is pending any more."""
         raise NotImplementedError
 
     def close(self) -> None:
@@ -253,7 +156,9 @@ class FmuBody(Body):
 class OwnBody(FmuBody):
     """A body of an FMU of this project, whose instance may have been another's: see `Fmu.of`."""
 
-    NAMES: ClassVar[Names]
+    FMU: ClassVar[str]  #: its name
+    ROLES: ClassVar[Mapping[str, str]]  #: the variable of each role
+    FORCES: ClassVar[tuple[str, ...]] = ("force",)  #: roles of the forces on its end
     reports = True
     _constants: dict[str, float]  #: of the scene, by the inputs that hold them from the start
     #: By input of the FMU: what is added to it by a unit of which load.
@@ -262,24 +167,26 @@ class OwnBody(FmuBody):
     _loads: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
 
     def __init__(self, parameters: dict[str, Value], start_time: float) -> None:
-        self.fmu = Fmu.of(self.NAMES.fmu, parameters, start_time)
+        self.fmu = Fmu.of(self.FMU, parameters, start_time)
         self._leased: Fmu | None = self.fmu  #: until it is given back, once
         self.state = FmuState()
         self._shares = {}
         try:
             self._connect()
-            self._begin(*self.fmu.once(Fmu.reading, (self.NAMES.mass,))())
+            self._begin(*self.fmu.once(Fmu.reading, (self.ROLES["mass"],))())
         except BaseException:
             self.fmu.close()
             raise
 
     def _connect(self) -> None:
         """Prepare inputs and outputs of a step; with loads, also these and their work."""
-        names = self.NAMES
+        roles = self.ROLES
         loads = self._shares
-        energies = (*names.energies[:3], "load_work") if loads else names.energies
-        self._port = self.fmu.once(Port, (*names.forces, *loads), (names.impulse,), (*names.motion, *energies))
-        self._acceleration: Reading = self.fmu.once(Fmu.reading, (names.acceleration,))
+        energies = (*ENERGIES[:3], "load_work") if loads else ENERGIES
+        outputs = tuple(roles[role] for role in (*MOTION, *energies) if role in roles)
+        inputs = (*(roles[role] for role in self.FORCES), *loads)
+        self._port = self.fmu.once(Port, inputs, (roles["impulse"],), outputs)
+        self._acceleration: Reading = self.fmu.once(Fmu.reading, (roles["acceleration"],))
 
     def expect_loads(self, loads: Sequence[Load]) -> None:
         for number, load in enumerate(loads):
@@ -307,25 +214,19 @@ class OwnBody(FmuBody):
         return self._acceleration()[0] if self.state.pending == 0.0 else None
 
     def trial_acceleration(self, time: float, size: float) -> float:
-        values, slopes = self._loads
-        forces = (0.0,) * len(self.NAMES.forces)
-        given = (time, _INSTANT * size, *forces, *values, self.state.pending, *(2 * forces), *slopes)
-        self.steps_made += 1
-        self.rewinds += 1
-        return self._port.trial(given, self._acceleration)[0]
+        acceleration: float = self._tried(time, _INSTANT * size, read=self._acceleration)[0]
+        return acceleration
 
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+    def _given(self, time: float, size: float, contact: Force, foundation: Force) -> tuple[float, ...]:
         c, dc, ddc = contact
-        n, dn, ddn = foundation
         values, slopes = self._loads
         impulse = self.state.pending
-        self.steps_made += 1
-        self._moved = True
-        if len(self.NAMES.forces) == 1:  # nothing but the other body presses its end
-            return self._take(self._port.step(time, size, c, *values, impulse, dc, ddc, *slopes))
-        return self._take(self._port.step(time, size, c, n, *values, impulse, dc, ddc, dn, ddn, *slopes))
+        if len(self.FORCES) == 1:  # nothing but the other body presses its end
+            return (time, size, c, *values, impulse, dc, ddc, *slopes)
+        n, dn, ddn = foundation
+        return (time, size, c, n, *values, impulse, dc, ddc, dn, ddn, *slopes)
 
-    def _take(self, reported: tuple[float, ...]) -> Motion:
+    def _take(self, reported: tuple[float, ...], size: float = 0.0) -> Motion:
         motion = made_of(Motion, reported[:4])
         self.state = made_of(FmuState, (motion, reported, 0.0))
         return motion
@@ -349,14 +250,20 @@ class OwnBody(FmuBody):
 class FmuBeam(OwnBody):
     """``beam.fmu`` as a body."""
 
-    NAMES = Names(
-        "beam",
-        "tip_mass",
-        ("tip_displacement", "tip_velocity", "tip_displacement_integral", "tip_displacement_integral_2"),
-        "tip_acceleration",
-        ("kinetic_energy", "strain_energy", "dissipated_energy", "load_potential"),
-        "tip_impulse",
-        ("tip_force",),
+    FMU = "beam"
+    ROLES = MappingProxyType(
+        {
+            "force": "tip_force",
+            "impulse": "tip_impulse",
+            "mass": "tip_mass",
+            "displacement": "tip_displacement",
+            "velocity": "tip_velocity",
+            "integral": "tip_displacement_integral",
+            "integral_2": "tip_displacement_integral_2",
+            "acceleration": "tip_acceleration",
+            "potential_energy": "strain_energy",
+            **{name: name for name in ("kinetic_energy", "dissipated_energy", "load_potential", "load_work")},
+        }
     )
 
     def __init__(
@@ -454,15 +361,18 @@ class FmuBeam(OwnBody):
 class FmuSpring(OwnBody, EndLoaded):
     """``spring.fmu`` as a body; contact law and foundation are the master's."""
 
-    NAMES = Names(
-        "spring",
-        "mass",
-        ("displacement", "velocity", "displacement_integral", "displacement_integral_2"),
-        "acceleration",
-        ("kinetic_energy", "potential_energy", "dissipated_energy"),
-        "impulse",
-        ("contact_force", "foundation_force"),
+    FMU = "spring"
+    ROLES = MappingProxyType(
+        {
+            "force": "contact_force",
+            "integral": "displacement_integral",
+            "integral_2": "displacement_integral_2",
+            **{name: name for name in ("foundation_force", "impulse", "mass", "displacement", "velocity")},
+            **{name: name for name in ("acceleration", "kinetic_energy", "potential_energy")},
+            **{name: name for name in ("dissipated_energy", "load_work")},
+        }
     )
+    FORCES = ("force", "foundation_force")
 
     def __init__(self, spring: Spring, start_time: float, displacement: float | None = None) -> None:
         """Start at ``start_time`` [s] with y = ``displacement`` [m], which is Ψ if left out."""

@@ -17,7 +17,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import exp
-from operator import mul, truediv
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,8 +24,9 @@ from ..scene.partners import ForeignFmu
 from . import force
 from .elements import EndLoaded
 from .fmu import Fmu
-from .fmu_bodies import FmuBody, Port
+from .fmu_bodies import FmuBody
 from .isolated import RemotePort
+from .port import Port
 from .protocol import NO_FORCE, SIZES_REMEMBERED, Abilities, Body, BodyFailed, Energies, FmuError, Force, Motion
 from .units import Unit
 
@@ -84,38 +84,21 @@ def opened(spec: ForeignFmu, times: tuple[float, float], found: Findings | None)
             _check(fmu, name, key, "input" if key in spec.INPUTS else "output")
         units = {"time": fmu.time_unit, **{key: fmu.unit(name, key) for key, name in spec.named.items()}}
         found = replace(found, units=units, **_acceleration(spec, fmu, units))
-        return ForeignPort(fmu, spec, found), found
+        outputs = _outputs(spec, found)
+        port = Port(
+            fmu,
+            (spec.force,),
+            () if spec.impulse is None else (spec.impulse,),
+            tuple(outputs.values()),
+            found.abilities.slopes,
+            always=True,  # derivatives of one step may act in the next if they are not set again
+            repeats=found.abilities.state,
+            units={name: units[key].factor for key, name in {**spec.named, **outputs}.items()},
+        )
+        return port, found
     except BaseException:
         fmu.close()
         raise
-
-
-class ForeignPort(Port):
-    """A `Port` of a foreign FMU that converts to SI units."""
-
-    def __init__(self, fmu: Fmu, spec: ForeignFmu, found: Findings) -> None:
-        reported = _outputs(spec, found)
-        abilities = found.abilities
-        impulse = () if spec.impulse is None else (spec.impulse,)
-        # Derivatives of one step may act in the next if they are not set again.
-        always = {"always": True, "repeats": abilities.state}
-        factors = {key: unit.factor for key, unit in found.units.items()}
-        second = factors["time"]
-        force = factors["force"]
-        slopes = [force / second**order for order in range(1, abilities.slopes + 1)]
-        #: SI units by which what a step is given is divided, and those of its outputs.
-        self._of_given = (second, second, force, *(factors["impulse"] for _ in impulse), *slopes)
-        self._of_reported = tuple(factors[key] for key in reported)
-        super().__init__(fmu, (spec.force,), impulse, tuple(reported.values()), abilities.slopes, **always)
-
-    def read(self) -> tuple[float, ...]:
-        return self._in_si(super().read())
-
-    def step(self, *given: float) -> tuple[float, ...]:
-        return self._in_si(super().step(*map(truediv, given, self._of_given)))
-
-    def _in_si(self, reported: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple(map(mul, reported, self._of_reported))
 
 
 def _check(fmu: Fmu, name: str, key: str, wanted: str) -> None:
@@ -212,23 +195,28 @@ class ForeignBody(FmuBody, EndLoaded):
             self.state = self.state._replace(motion=self.state.motion._replace(velocity=velocity))
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        up = self._upward
-        sign = self._spec.force_sign
         start = self.state.motion
         load = self._followed(self._on_end, size)
-        lag = self._lag(time, size)
-        exchanged = force.combined((up, 1.0), (contact, foundation))
-        inputs = self._followed(force.combined((sign * up, sign * up), (exchanged, load)), size)
-        self.steps_made += 1
-        self._moved = True
-        impulse = () if self._spec.impulse is None else (self.state.pending,)
-        reported = self._port.step(time, size, inputs[0], *impulse, *inputs[1 : 1 + self.abilities.slopes])
-        end = self._take(reported, size, lag)
-        received = self.state.received + force.work_on(exchanged, start, end, size)
-        load_work = self.state.load_work + force.work_on(load, start, end, size)
-        free = 0.0 if any(exchanged) else self.state.free + size
-        self.state = self.state._replace(received=received, load_work=load_work, time=time + size, size=size, free=free)
+        self._measure_lag(time, size)
+        end = super().advance(time, size, contact, foundation)
+        exchanged = force.combined((self._upward, 1.0), (contact, foundation))
+        self.state = self.state._replace(
+            received=self.state.received + force.work_on(exchanged, start, end, size),
+            load_work=self.state.load_work + force.work_on(load, start, end, size),
+            time=time + size,
+            size=size,
+            free=0.0 if any(exchanged) else self.state.free + size,
+        )
         return end
+
+    def _given(self, time: float, size: float, contact: Force, foundation: Force) -> tuple[float, ...]:
+        sign = self._spec.force_sign
+        exchanged = force.combined((self._upward, 1.0), (contact, foundation))
+        load = self._followed(self._on_end, size)
+        up = sign * self._upward
+        value, *slopes = self._followed(force.combined((up, up), (exchanged, load)), size)
+        impulse = () if self._spec.impulse is None else (self.state.pending,)
+        return (time, size, value, *impulse, *slopes[: self.abilities.slopes])
 
     def acceleration(self) -> float | None:
         reported = dict(zip(self._keys, self.state.reported, strict=True))
@@ -236,33 +224,24 @@ class ForeignBody(FmuBody, EndLoaded):
 
     def _trial(self, time: float, size: float, upward: float = 0.0) -> Motion:
         """See `Body._trial`; an ``upward`` force may act [N]."""
-        constant, slope, bend = self._on_end
-        load = self._followed((constant + upward, slope, bend), size)
-        sign = self._spec.force_sign * self._upward
-        impulse = () if self._spec.impulse is None else (self.state.pending,)
-        self.steps_made += 1
-        self.rewinds += 1
-        inputs = (time, size, sign * load[0], *impulse, *(sign * rate for rate in load[1 : 1 + self.abilities.slopes]))
         before = self.state
-        end = self._take(self._port.trial(inputs), size)
+        end = self._take(self._tried(time, size, (upward, 0.0, 0.0)), size)
         self.state = before
         return end
 
-    def _lag(self, time: float, size: float) -> float:
-        """Return ε [s] of a step of ``size`` [s]: 0, or measured once by two trial steps."""
-        if self.found.lag == 0.0:
-            return 0.0
-        if size not in self._lags:
-            if len(self._lags) == SIZES_REMEMBERED:
-                del self._lags[next(iter(self._lags))]
-            w, v, *_ = self.state.motion
-            length = _NUDGE * max(abs(w), size * abs(v)) or _NUDGE_AT_REST
-            free = self._trial(time, size)
-            moved = self._trial(time, size, 2.0 * self.mass * length / size**2)
-            faster = moved.velocity - free.velocity
-            lag = 0.5 * size - (moved.displacement - free.displacement) / faster if faster != 0.0 else 0.0
-            self._lags[size] = max(-0.5 * size, min(lag, 0.5 * size))
-        return self._lags[size]
+    def _measure_lag(self, time: float, size: float) -> None:
+        """Measure ε of steps of ``size`` [s] once, by two trial steps."""
+        if self.found.lag == 0.0 or size in self._lags:
+            return
+        if len(self._lags) == SIZES_REMEMBERED:
+            del self._lags[next(iter(self._lags))]
+        w, v, *_ = self.state.motion
+        length = _NUDGE * max(abs(w), size * abs(v)) or _NUDGE_AT_REST
+        free = self._trial(time, size)
+        moved = self._trial(time, size, 2.0 * self.mass * length / size**2)
+        faster = moved.velocity - free.velocity
+        lag = 0.5 * size - (moved.displacement - free.displacement) / faster if faster != 0.0 else 0.0
+        self._lags[size] = max(-0.5 * size, min(lag, 0.5 * size))
 
     def _followed(self, given: Force, size: float) -> Force:
         """Return the part of a force over a step that the FMU can follow: its mean, or also its slope."""
@@ -280,15 +259,15 @@ class ForeignBody(FmuBody, EndLoaded):
         received = self.state.received + 0.5 * impulse * (before + self.state.motion.velocity)
         self.state = self.state._replace(received=received, free=0.0)
 
-    def _take(self, reported: tuple[float, ...], size: float = 0.0, lag: float = 0.0) -> Motion:
-        """See `FmuBody._take`; missing outputs of the motion over ``size`` [s] are replaced, ``lag`` is ε [s]."""
+    def _take(self, reported: tuple[float, ...], size: float = 0.0) -> Motion:
+        """See `FmuBody._take`; missing outputs of the motion are replaced."""
         by_key = dict(zip(self._keys, reported, strict=True))
         w0, v0, *_ = self.state.motion
         w = by_key["displacement"]
         if "velocity" not in by_key:
             v0 = by_key["velocity"] = (w - w0) / size if size > 0.0 else self.found.velocity
         v = by_key["velocity"]
-        if lag != 0.0:
+        if lag := self._lags.get(size, 0.0):
             x0 = self.state.reported[self._keys.index("displacement")]
             free = self.state.free
             kept = exp(-0.5 * size * (2.0 * free + size) / (_FORGOTTEN * self.found.H) ** 2) if free > 0.0 else 1.0

@@ -47,7 +47,7 @@ class Advance(Structure):
         *((name, c_size_t) for name in ("n_inputs", "n_derivatives", "n_outputs")),
         *((name, POINTER(c_uint)) for name in ("inputs", "derivatives", "outputs")),
         ("orders", POINTER(c_int)),
-        *((name, POINTER(c_double)) for name in ("given", "reported")),
+        *((name, POINTER(c_double)) for name in ("units_given", "units_reported", "given", "reported")),
         ("always", c_int),
     )
 

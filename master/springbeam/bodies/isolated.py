@@ -21,8 +21,8 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, ClassVar
 
-from .fmu_bodies import CANNOT, Port
 from .functions import OK, WARNING
+from .port import CANNOT, Port
 from .protocol import BodyFailed, FmuError, StepRefused
 
 #: Time after which Ctrl-C names the FMU as the cause [s].
@@ -204,8 +204,8 @@ class RemotePort(Port):
     def read(self) -> Any:
         return self._ask("initialisation", "read")
 
-    def step(self, *given: float) -> Any:
-        return self._ask(f"its step at t = {given[0]:.9g} s", "step", *given)
+    def step(self, given: Sequence[float]) -> Any:
+        return self._ask(f"its step at t = {given[0]:.9g} s", "step", given)
 
     def trial(self, given: Sequence[float], read: Any = None) -> Any:
         return self._ask(f"a trial step at t = {given[0]:.9g} s", "trial", given)

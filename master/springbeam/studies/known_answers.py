@@ -18,7 +18,7 @@ from sys import float_info
 
 from ..bodies.archive import own_fmu
 from ..bodies.fmu import Fmu, Value
-from ..bodies.fmu_bodies import Port
+from ..bodies.port import Port
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Question:
         """Return the error [m] of our FMU ``name``. Raises FmuError, or StepRefused."""
         with closing(Fmu(name, own_fmu(name, version), self.parameters, 0.0)) as fmu:
             port = Port(fmu, (self.input,), (), (self.output,), repeats=False)
-            (found,) = port.step(0.0, self.size, self.given, 0.0, 0.0)
+            (found,) = port.step((0.0, self.size, self.given, 0.0, 0.0))
         return found - self.exact
 
 
