@@ -7,8 +7,10 @@ import pytest
 from scenes import scene_from_dict
 
 from springbeam import load_scene, simulate, with_changes
+from springbeam.scene import as_scene
 from springbeam.signals.driven import responses, settled
-from springbeam.signals.spectra import power_spectrum, shock_of_run, shock_spectrum, spectra
+from springbeam.signals.shock import base_velocity, shock_of_run, shock_spectrum
+from springbeam.signals.spectra import power_spectrum, spectra
 from springbeam.studies.metrics import METRICS
 from springbeam.studies.spectrum import spectrum
 from springbeam.studies.sweep import Sweep
@@ -79,6 +81,78 @@ def test_an_oscillator_driven_at_its_resonance_without_damping_never_settles():
     run = simulate(with_changes(scene, coupling={"macro_step": 0.02}))
     assert np.abs(run.y[-100:]).max() == pytest.approx(FORCE * t_end / (2.0 * MASS * rate), rel=0.02)
     assert settled(run) is None
+
+
+@pytest.mark.parametrize(("multiple", "amplitude"), [(1, 1.3), (2, 2.25)])
+def test_a_motion_whose_impacts_fall_on_the_strobe_has_its_period(multiple, amplitude):
+    """A ball on a shaking table, e = 1/2; points equal to 1e-13 had the velocity before or after an impact.
+
+    It flies for n periods T, so leaves with g n T/2 as it returns, and the table's velocity is then a third of that:
+    with an acceleration of ``amplitude`` g the phase φ of the drive has cos φ = n π/(3 amplitude). Stable (P. J.
+    Holmes, J. Sound Vib. 84, 1982) for amplitudes from n π/3 to the root of (n π/3)² + 1.235.
+    """
+    gravity = 9.81
+    scene = as_scene(
+        {
+            "time": {"t_end": 60.0 * multiple},
+            "spring": {"element": "point_mass", "mass": 1.0, "velocity": gravity * multiple / 3.0},
+            "stop": {"position": 0.0, "restitution": 0.5},
+            "loads": [
+                {
+                    "on": "base",
+                    "signal": "harmonic",
+                    "amplitude": -gravity * amplitude,
+                    "frequency": 1.0,
+                    "phase": float(np.arccos(multiple * pi / 3.0 / amplitude)),
+                },
+                {"on": "base", "amplitude": gravity},
+            ],
+            "coupling": {"macro_step": 0.05},
+        }
+    )
+    found = settled(simulate(scene))
+    assert found is not None
+    assert found.multiple == multiple
+
+
+@pytest.mark.parametrize(("t_end", "words"), [(8.0, "no period of 1 to 7 times"), (0.5, "4 periods of the drive are")])
+def test_a_motion_that_repeats_nothing_is_not_called_chaotic(t_end, words):
+    """A beat of 7 Hz and of 10.07 Hz without damping has no period in 8 s."""
+    run = simulate(with_changes(oscillator(t_end=t_end), spring={"damping": 0.0}))
+    said = dict(spectra(run).in_words())["motion"]
+    assert words in said
+    assert "within 1% of the range: it may be longer" in said or t_end < 1.0
+
+
+@pytest.mark.parametrize("duration", [5e-4, 1e-6])
+def test_a_base_is_integrated_however_short_its_pulse_is(duration):
+    """The change of its velocity, 2 A D/π, counts at every time after it; sampled, a pulse was seen or missed."""
+    load = {"on": "base", "signal": "half_sine", "start": 0.0101, "duration": duration, "frequency": None}
+    scene = oscillator(t_end=1.0, amplitude=1.0 / duration, **load)
+    found = base_velocity(scene, np.linspace(0.0, 1.0, 200))
+    assert found[:3] == pytest.approx([0.0] * 3, abs=0.0)
+    assert found[3:] == pytest.approx([2.0 / pi] * 197, rel=1e-12)
+
+
+def test_a_fast_load_on_the_base_is_integrated_between_samples():
+    """Four periods and a third of a sine lie between two samples."""
+    rate = 2.0 * pi * 130.0
+    scene = oscillator(t_end=1.0, on="base", amplitude=5.0, frequency=130.0)
+    times = np.arange(31.0) / 30.0
+    assert base_velocity(scene, times) == pytest.approx(5.0 / rate * (1.0 - np.cos(rate * times)), abs=1e-11 / rate)
+
+
+def test_the_shock_of_a_short_pulse_does_not_depend_on_the_macro_step():
+    """From a base that was sampled it was 3.94 m/s² for 6.61 at 0.5 Hz, and 69 for 16.6 at 12 Hz."""
+    pulse = {"on": "base", "signal": "half_sine", "start": 0.0101, "duration": 5e-4, "frequency": None}
+    scene = with_changes(oscillator(t_end=2.0, amplitude=5000.0, **pulse), spring={"initial_velocity": 0.0})
+    scene = with_changes(scene, spring={"mass": 1.0, "linear_stiffness": 100.0, "damping": 1.0})
+    coarse, fine = (
+        shock_of_run(simulate(with_changes(scene, coupling={"macro_step": step})), "spring", np.array([0.5, 12.0]))
+        for step in (4e-3, 1e-4)
+    )
+    assert coarse.maximax == pytest.approx([6.61, 16.6], rel=3e-3)
+    assert coarse.maximax == pytest.approx(fine.maximax, rel=1e-3)
 
 
 # -- metrics ------------------------------------------------------------------------------------------------------

@@ -12,10 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from ..results.dense import rows_at
 from ..results.trajectory import Trajectory
 from ..scene import SceneError
 from ..scene.messages import nearest
 
+#: Largest number of samples of a run.
+MOST = 4_000_000
 #: ``package.module:function``
 _FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
@@ -50,6 +53,27 @@ def signal(run: Trajectory, text: str) -> np.ndarray:
     if not np.isfinite(values).all():
         raise SceneError(f"{text}: is not finite at t = {run.time[~np.isfinite(values)][0]!s} s")
     return values
+
+
+def sampled(
+    run: Trajectory, what: str, step: float | None = None, since: float | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return equal steps of time from ``since`` [s] on, and a column of ``run``, or a function of it, at these.
+
+    They are ``step`` [s] long; without that there are as many as rows. Values lie on the curve of the run between its
+    rows (`springbeam.Trajectory.at`). Raises SceneError where there is nothing to sample.
+    """
+    begin = float(run.time[0]) if since is None else since
+    end = float(run.time[-1])
+    if not begin < end:
+        raise SceneError(f"from {begin:g} s: the run ends at {end:g} s")
+    count = int(np.count_nonzero(run.time >= begin)) if step is None else int((end - begin) / step * (1 + 1e-12)) + 1
+    if not 2 <= count <= MOST:
+        raise SceneError(
+            f"{what}: {count:,} samples; there must be from 2 to {MOST:,}: take lower frequencies, or less of the run"
+        )
+    times = np.linspace(begin, end, count) if step is None else begin + step * np.arange(count)
+    return times, signal(rows_at(run, np.minimum(times, end)), what)
 
 
 def function_of(text: str) -> Callable[[Trajectory], Any] | None:

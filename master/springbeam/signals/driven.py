@@ -20,6 +20,8 @@ _ALIKE = 0.01
 #: … for so many periods of the motion, each of at most so many periods of the drive.
 _PERIODS = 8
 _LONGEST = 8
+#: An impact within this share of a period of the drive is on the strobe.
+_ON_STROBE = 0.01
 #: Periods of a chirp over which the range of its response is taken.
 _OF_CHIRP = 2
 
@@ -63,6 +65,33 @@ def poincare(run: Trajectory, period: float, start: float = 0.0) -> tuple[np.nda
     return found.time, np.column_stack([found[name] for name in _point(run)])
 
 
+def strobe(run: Trajectory, drive: HarmonicLoad) -> float:
+    """Return a time [s] from which points once a period of the ``drive`` show the motion: where the drive starts.
+
+    Where events of the later half of the run fall there, a velocity would be that before or after one by rounding: then
+    it is the middle of the longest part of a period without events.
+    """
+    period = 1.0 / drive.frequency
+    late = [event.time for event in run.events if event.time >= 0.5 * (run.time[0] + run.time[-1])]
+    phases = np.sort((np.array(late) - drive.start) / period % 1.0)
+    if not (np.minimum(phases, 1.0 - phases) < _ON_STROBE).any():
+        return drive.start
+    lengths = np.diff(phases, append=phases[0] + 1.0)
+    longest = int(np.argmax(lengths))
+    return drive.start + period * float((phases[longest] + 0.5 * lengths[longest]) % 1.0)
+
+
+def not_repeating(points: int) -> str:
+    """Return in words what has been looked for in vain in ``points`` once a period of the drive."""
+    most = min(_LONGEST, (points - 1) // _PERIODS)
+    if most < 1:
+        return f"{points} periods of the drive are too few: a motion has settled if {_PERIODS + 1} points are alike"
+    return (
+        f"no period of 1 to {most} times the drive's repeats itself {_PERIODS} times within {_ALIKE:.0%} of the range: "
+        "it may be longer, not settled yet, or chaotic"
+    )
+
+
 def _point(run: Trajectory) -> tuple[str, str]:
     """Return the columns of the observed point, position and velocity."""
     return ("u_tip", "v_tip") if "u_tip" in run.columns else ("y", "z")
@@ -76,9 +105,9 @@ def settled(run: Trajectory) -> Settled | None:
     run looks like a settled motion.
     """
     drive = drive_of(run)
-    if drive is None or drive.frequency is None or run.steps is None:
+    if drive is None or run.steps is None:
         return None
-    times, points = poincare(run, 1.0 / drive.frequency, drive.start)
+    times, points = poincare(run, 1.0 / drive.frequency, strobe(run, drive))
     late = run.time >= 0.5 * (run.time[0] + run.time[-1])
     scale = np.array([float(np.ptp(run[name][late])) for name in _point(run)])
     found = repeating(points / scale) if (scale > 0.0).all() else None

@@ -1,14 +1,4 @@
-"""Spectra of a run: power of its curves by Welch's method, shock response of its ends.
-
-Shock: an oscillator of frequency f = ω/2π and quality Q = 1/2ζ answers the acceleration a of its base with its own,
-
-    ẍ = H a,    H(s) = (2ζω s + ω²)/(s² + 2ζω s + ω²),
-
-and its spectrum is the largest ẍ (positive), the largest −ẍ (negative), or the larger of the two (maximax), while the
-base moves and after it. The base is given by its velocity, linear between samples: D. O. Smallwood's ramp-invariant
-filter (Shock Vib. Bull. 51, 1981) for s H(s). An impact is a jump of velocity, which is one more sample of that line;
-its acceleration would be no number. For the same reason a spectrum that has a jump rises with f without limit.
-"""
+"""Spectra of a run: power of its curves by Welch's method, shock response of its ends (`shock`), settled motion."""
 
 from __future__ import annotations
 
@@ -18,47 +8,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..results.dense import rows_at
 from ..results.trajectory import Trajectory
 from ..scene import SceneError
-from .curves import signal
-from .driven import Response, Settled, drive_of, poincare, responses, settled
+from .curves import sampled
+from .driven import Response, Settled, drive_of, not_repeating, poincare, responses, settled, strobe
+from .shock import VELOCITIES, ShockSpectrum, shock_of_run
 
-#: Largest number of samples of a run.
-MOST = 4_000_000
-#: Samples in a period of the fastest oscillator: a peak between two of them is missed by 1 − cos(π/64), 0.12 %.
-_PER_PERIOD = 64
 #: A jump of velocity below this share of the largest speed is negligible.
 _JUMP = 1e-3
-#: Velocities for shock spectra, and their accelerations.
-VELOCITIES = {"tip": "v_tip", "spring": "z"}
+#: Velocities that accelerations are the rates of.
 _ACCELERATIONS = {"a_tip": "v_tip", "a_y": "z"}
 #: Oscillators of a shock spectrum in an octave.
 _PER_OCTAVE = 12
 #: Macro steps in a period of the fastest oscillator, and periods of the slowest in the run.
 _STEPS = 20.0
 _PERIODS = 1.0
-
-
-def sampled(
-    run: Trajectory, what: str, step: float | None = None, since: float | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return equal steps of time from ``since`` [s] on, and a column of ``run``, or a function of it, at these.
-
-    They are ``step`` [s] long; without that there are as many as rows. Values lie on the curve of the run between its
-    rows (`springbeam.Trajectory.at`). Raises SceneError where there is nothing to sample.
-    """
-    begin = float(run.time[0]) if since is None else since
-    end = float(run.time[-1])
-    if not begin < end:
-        raise SceneError(f"from {begin:g} s: the run ends at {end:g} s")
-    count = int(np.count_nonzero(run.time >= begin)) if step is None else int((end - begin) / step * (1 + 1e-12)) + 1
-    if not 2 <= count <= MOST:
-        raise SceneError(
-            f"{what}: {count:,} samples; there must be from 2 to {MOST:,}: take lower frequencies, or less of the run"
-        )
-    times = np.linspace(begin, end, count) if step is None else begin + step * np.arange(count)
-    return times, signal(rows_at(run, np.minimum(times, end)), what)
 
 
 class PowerSpectrum(NamedTuple):
@@ -95,64 +59,6 @@ def power_spectrum(run: Trajectory, what: str, since: float | None = None, segme
     frequency, density = welch(values, scaling="density", **shared)
     _, squares = welch(values, scaling="spectrum", **shared)
     return PowerSpectrum(frequency, density, np.sqrt(2.0 * squares))
-
-
-class ShockSpectrum(NamedTuple):
-    """Largest accelerations by frequency, shape (n,)."""
-
-    frequency: np.ndarray  #: of the oscillators [Hz]
-    maximax: np.ndarray  #: [m/s²]
-    positive: np.ndarray  #: [m/s²]
-    negative: np.ndarray  #: [m/s²], not below 0
-
-
-def shock_spectrum(velocity: np.ndarray, step: float, frequencies: np.ndarray, quality: float = 10.0) -> ShockSpectrum:
-    """Return the shock response spectrum of a base.
-
-    Parameters
-    ----------
-    velocity
-        Of the base at equal steps [m/s], shape (n,); before the first sample it has its value, after the last too.
-    step
-        [s]
-    frequencies
-        Of the oscillators [Hz], shape (m,), above 0 and below half a sample each.
-    quality
-        Q above 1/2.
-
-    Raises SceneError for other frequencies and qualities.
-    """
-    frequencies = np.atleast_1d(np.asarray(frequencies, dtype=float))
-    if not (quality > 0.5 and np.isfinite(quality)):
-        raise SceneError(f"quality {quality:g}: must be above 0.5, the quality of an oscillator that does not swing")
-    if not ((frequencies > 0.0) & (frequencies * step < 0.5)).all():
-        raise SceneError(f"frequencies: must lie between 0 and half the sampling rate, {0.5 / step:g} Hz")
-    answers = (_answer(velocity, step, f, quality) for f in frequencies)
-    highest, lowest = np.maximum([(answer.max(), -answer.min()) for answer in answers], 0.0).T
-    return ShockSpectrum(frequencies, np.maximum(highest, lowest), highest, lowest)
-
-
-def _answer(velocity: np.ndarray, step: float, frequency: float, quality: float) -> np.ndarray:
-    """Return ẍ, up to one period after the base has come to its last velocity."""
-    from scipy.signal import cont2discrete, lfilter  # see `power_spectrum`
-
-    omega = 2.0 * np.pi * frequency
-    after = np.full(int(np.ceil(1.0 / (frequency * step))) + 1, velocity[-1])
-    of_velocity = (omega / quality, omega**2, 0.0), (1.0, omega / quality, omega**2)  # s H(s)
-    numerator, denominator, _ = cont2discrete(of_velocity, step, "foh")
-    return np.asarray(lfilter(numerator[0], denominator, np.concatenate([velocity, after]) - velocity[0]))
-
-
-def shock_of_run(run: Trajectory, end: str, frequencies: np.ndarray, quality: float = 10.0) -> ShockSpectrum:
-    """Return the shock response spectrum at an ``end`` of a run, ``"tip"`` or ``"spring"``.
-
-    The motion is that in space: where the base accelerates, its velocity is added.
-    """
-    step = min(1.0 / np.max(frequencies), run.time[-1] - run.time[0]) / _PER_PERIOD
-    times, velocity = sampled(run, VELOCITIES[end], float(step))
-    middle = times[:-1] + 0.5 * step
-    of_base = sum((load.value(middle) for load in run.scene.loads if load.on == "base"), np.zeros(len(middle)))
-    return shock_spectrum(velocity + np.append(0.0, step * np.cumsum(of_base)), float(step), frequencies, quality)
 
 
 def ends_of(run: Trajectory) -> dict[str, str]:
@@ -219,7 +125,7 @@ class Spectra:
             of = "the drive's" if self.settled.multiple == 1 else f"{self.settled.multiple} of the drive's"
             yield "motion", f"periodic from {self.settled.since:.6g} s on, period {self.settled.period:.6g} s, {of}"
         elif self.points is not None:
-            yield "motion", "not periodic within the run: not settled yet, or chaotic"
+            yield "motion", not_repeating(len(self.points[0]))
 
 
 def spectra(
@@ -266,7 +172,7 @@ def spectra(
         power={what: power_spectrum(run, what, begin, segments) for what in wanted},
         without_peak={what: why for what in wanted if (why := without_peak(run, [what]))},
         responses={what: found for what in wanted if (found := responses(run, what))},
-        points=poincare(run, 1.0 / drive.frequency, drive.start) if drive and drive.frequency else None,
+        points=poincare(run, 1.0 / drive.frequency, strobe(run, drive)) if drive else None,
         settled=tail,
         quality=quality,
     )
