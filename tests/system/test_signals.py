@@ -1,18 +1,22 @@
 """Numbers and spectra of runs: beside closed forms of linear oscillators, and by the command."""
 
+import json
 from math import pi, sqrt
 
 import numpy as np
 import pytest
+from commands import printed, refused
 from scenes import scene_from_dict
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.scene import as_scene
+from springbeam.scene.recorded import Reading
 from springbeam.signals.driven import responses, settled
-from springbeam.signals.shock import base_velocity, shock_of_run, shock_spectrum
+from springbeam.signals.record import read_record
+from springbeam.signals.shock import base_velocity, shock_of_record, shock_of_run, shock_spectrum
 from springbeam.signals.spectra import power_spectrum, spectra
 from springbeam.studies.metrics import METRICS
-from springbeam.studies.spectrum import spectrum
+from springbeam.studies.spectrum import Shocks, spectrum
 from springbeam.studies.sweep import Sweep
 
 MASS = 0.2
@@ -328,7 +332,7 @@ def test_the_picture_and_the_tables_of_a_driven_run_have_its_spectra_and_points(
     assert np.array_equal(tables["poincare"], np.column_stack([found.points[0], found.points[1]]))
     seen = density[1:][density[1:, 1] > 1e-12 * density[1:, 1].max()]
     assert np.array_equal(drawn["largest acceleration [m/s²]"][0], np.column_stack(found.shock["spring"][:2]))
-    assert np.array_equal(drawn["power density [unit²/Hz]"][0], seen)
+    assert np.array_equal(drawn["power density [m²/Hz]"][0], seen)
     assert np.array_equal(drawn["velocity [m/s]"][0], found.points[1])
     assert looks == [("-", "", "log"), ("--", "", "log"), ("None", ".", "linear")]
 
@@ -338,5 +342,82 @@ def test_the_picture_of_a_sweep_has_half_the_range_by_frequency():
     up, down = (np.column_stack([chirp.frequency, chirp.amplitude]) for chirp in found.responses["y"])
     assert np.array_equal(tables["response-y-load-0"], up)
     assert np.array_equal(tables["response-y-load-1"], down)
-    assert all(map(np.array_equal, drawn["half the range [unit]"], (up, down)))
+    assert all(map(np.array_equal, drawn["half the range [m]"], (up, down)))
     assert looks[-1] == (":", "^", "linear")
+
+
+# -- records ------------------------------------------------------------------------------------------------------
+
+
+def write_record(path, step=1e-4):
+    """A pulse of 50 g in 11 ms in g, and a channel of 100 mV/g that sees twice as much, in mV."""
+    times = step * np.arange(400)
+    pulse = np.where((times > 0.01) & (times < 0.021), 50.0 * np.sin(pi * (times - 0.01) / 0.011), 0.0)
+    np.savetxt(path, np.column_stack([1e3 * times, pulse, 200.0 * pulse]), header="time [ms] table [g] dut [mV]")
+    return path
+
+
+def test_the_shock_spectrum_of_a_record_is_in_its_unit_and_over_that_of_the_input(tmp_path):
+    """The spectrum of a half sine at Q = 10 has its maximum, 1.65 times the peak, at 0.82 over its length."""
+    path = write_record(tmp_path / "record.dat")
+    line = ["spectrum", str(path), "--of", "table", "--of", "dut", "--scale", "dut=10 g/V", "--over", "table", "--json"]
+    found = json.loads(printed(*line, "--no-plots"))
+    assert found["unit"] == "g"
+    table = found["shock"]["table"]
+    assert max(table["maximax"]) == pytest.approx(1.65 * 50.0, rel=2e-3)
+    assert table["frequency"][int(np.argmax(table["maximax"]))] * 0.011 == pytest.approx(0.82, abs=0.03)
+    assert found["shock"]["dut"]["maximax"] == pytest.approx(2.0 * np.array(table["maximax"]), rel=1e-12)
+    rows = (tmp_path / "record-spectrum" / "shock-dut.csv").read_text().splitlines()
+    assert rows[0].endswith(",over_table")
+    assert all(float(row.rpartition(",")[2]) == pytest.approx(2.0, rel=1e-12) for row in rows[1:])
+    in_si = json.loads(printed(*line, "--no-plots", "--unit", "m/s²", "--out", str(tmp_path / "si")))
+    assert in_si["shock"]["table"]["maximax"] == pytest.approx(9.80665 * np.array(table["maximax"]), rel=1e-12)
+
+
+def test_a_record_is_judged_by_the_spectrum_that_is_required_and_says_where_it_is_uncertain(tmp_path):
+    path = write_record(tmp_path / "record.dat")
+    required = tmp_path / "required.csv"
+    required.write_text("frequency [Hz],level [g]\n70,82.5\n80,82.5\n")
+    line = ["spectrum", str(path), "--of", "table", "--required", str(required), "--low", "10", "--high", "1100"]
+    words = " ".join(printed(*line, "--tolerance=-0.5:0.5").split())
+    assert "table: within -0.5 to +0.5 dB of --required at 100%" in words
+    assert "uncertain from 1000 Hz on" in words
+    assert "at 0%" in " ".join(printed(*line, "--tolerance", "1:6").split())
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        (["--of", "x"], "--of x: there are the columns table, dut"),
+        (["--of", "dut"], "column dut: [mV] is no unit of what a run has in m/s²"),
+        (["--over", "dut"], "--over dut: there are shock spectra of table"),
+        (["--tolerance", "3"], "--tolerance 3: must be LOW:HIGH in dB"),
+        (["--since", "1"], "--since is for runs"),
+        (["--required", "nowhere.csv"], "nowhere.csv: No such file"),
+        (["--low", "9", "--high", "6"], "from 9 to 6 Hz: frequencies rise"),
+        (["--high", "1e5"], "must lie between 0 and half the sampling rate, 5000 Hz"),
+    ],
+)
+def test_a_spectrum_that_a_record_does_not_have_is_refused(tmp_path, more, why):
+    assert why in " ".join(refused("spectrum", str(write_record(tmp_path / "record.dat")), *more).split())
+
+
+def test_unequal_steps_of_a_record_are_made_equal(tmp_path):
+    """Every third sample left out: values between stand on lines, which a half sine leaves by 4e-4 of its peak."""
+    path = write_record(tmp_path / "record.dat")
+    lines = path.read_text().splitlines()
+    (tmp_path / "gaps.dat").write_text("\n".join(line for k, line in enumerate(lines) if k % 3 or k < 2))
+    whole, gaps = (read_record(tmp_path / name, ["table"], Reading(), {}) for name in ("record.dat", "gaps.dat"))
+    assert gaps.step == pytest.approx(1e-4, rel=1e-6)
+    assert any("are made equal" in note for note in gaps.notes)
+    found = [shock_of_record(of.values["table"], of.step, np.array([70.0])).maximax[0] for of in (whole, gaps)]
+    assert found[1] == pytest.approx(found[0], rel=1e-3)
+
+
+def test_the_shock_of_a_run_is_shown_over_that_of_its_base(tmp_path):
+    """A mount much stiffer than the pulse is short moves with its base: the ratio is 1."""
+    stiff = {"mass": 1e-3, "linear_stiffness": 1e-3 * (2.0 * pi * 8000.0) ** 2, "damping": 2.0, "initial_velocity": 0.0}
+    pulse = {"on": "base", "signal": "half_sine", "frequency": None, "amplitude": 500.0, "duration": 0.011}
+    run = simulate(with_changes(oscillator(t_end=0.03, **pulse), spring=stiff, coupling={"macro_step": 2e-5}))
+    found = spectrum(run, ["y"], 40.0, 300.0, 10.0, None, 1, "", Shocks("g", "base"))
+    assert [row["over_base"] for row in found.tables["shock-spring"]] == pytest.approx([1.0] * 36, rel=5e-3)

@@ -200,13 +200,16 @@ def compare(
 
 
 def spectrum(
-    run: RunArgument,
+    run: Annotated[
+        Path, typer.Argument(metavar="DIR|FILE", help="Results of springbeam run, or a file of recorded accelerations.")
+    ],
     of: Annotated[
         list[str] | None,
         typer.Option(
             "--of",
             metavar="COLUMN",
-            help="Column for the power spectrum, such as a_tip, or module:function of the run; may be repeated.",
+            help="Column for the power spectrum, such as a_tip, or module:function of the run; or column of the file; "
+            "may be repeated.",
         ),
     ] = None,
     low: Annotated[float | None, typer.Option("--low", metavar="HZ", help="Lowest oscillator of the shock.")] = None,
@@ -218,6 +221,27 @@ def spectrum(
             "--since", metavar="SECONDS", help="Start of the power spectra. Default: where the motion settles."
         ),
     ] = None,
+    unit: Annotated[
+        Literal["m/s²", "g"] | None,
+        typer.Option("--unit", help="Unit of accelerations. Default: m/s², or g if the file has g."),
+    ] = None,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--over",
+            metavar="NAME",
+            help="Also show shock spectra over that of the base, or of a column of the file.",
+        ),
+    ] = None,
+    required: Annotated[
+        Path | None,
+        typer.Option("--required", metavar="FILE", help="Compare with a shock spectrum: a file of Hz and m/s² or g."),
+    ] = None,
+    tolerance: Annotated[
+        str, typer.Option("--tolerance", metavar="LOW:HIGH", help="Allowed deviation from --required in dB.")
+    ] = "-3:6",
+    scale: ScaleOption = None,
+    read: ReadOption = None,
     segments: Annotated[
         int, typer.Option("--segments", metavar="N", min=1, help="Parts whose power spectra are averaged.")
     ] = 1,
@@ -231,17 +255,37 @@ def spectrum(
 ) -> Findings:
     """Compute spectra of a run: shock response, power, and the points and the period of a driven motion.
 
+    Of a file: shock response and power of the accelerations in it.
+
     Example: springbeam spectrum results/soft --of a_tip --quality 25
     """
     from ..results.files import load_trajectory
+    from ..signals.measured import by_column, reading_of
+    from ..studies.spectrum import Shocks, spectrum_of_record
     from ..studies.spectrum import spectrum as spectra_of
 
-    results_directory(run)
+    recorded = run.is_file()
+    if not recorded:
+        results_directory(run)
+    if (recorded and since is not None) or (not recorded and (scale or read)):
+        fail(BAD_INPUT, "--since is for runs, --scale and --read are for files")
+    try:
+        lowest, highest = map(float, tolerance.split(":"))
+    except ValueError:
+        fail(BAD_INPUT, f"--tolerance {tolerance}: must be LOW:HIGH in dB, as -3:6")
+    shocks = Shocks(unit or "m/s²", over, required, (lowest, highest))
     with progress("reads the run", 3, silent=quiet or as_json) as show:
-        trajectory = load_trajectory(run)
-        show(1, "computes spectra")
-        found = spectra_of(trajectory, of or (), low, high, quality, since, segments, str(run))
+        if recorded:
+            show(1, "computes spectra")
+            scales = by_column("scale", scale or (), "CH1=2.5 mm/V")
+            found = spectrum_of_record(
+                run, of or (), low, high, quality, segments, reading_of(read or ()), scales, shocks, unit
+            )
+        else:
+            trajectory = load_trajectory(run)
+            show(1, "computes spectra")
+            found = spectra_of(trajectory, of or (), low, high, quality, since, segments, str(run), shocks)
         show(2, "writes and draws")
-        directory = out or run.with_name(f"{run.resolve().name}-spectrum")
+        directory = out or run.with_name(f"{run.stem if recorded else run.resolve().name}-spectrum")
         directory.mkdir(parents=True, exist_ok=True)
         return found.written(directory, pictures=not no_plots)

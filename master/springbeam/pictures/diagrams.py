@@ -13,6 +13,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 #: Letters of a title, and inches of an entry of the key, to an inch of a figure.
@@ -20,6 +21,9 @@ _LETTERS = 9
 _ENTRY = 2.4
 _MARKERS = "os^DvPX*<"
 _DASHES = ("-", "--", ":")
+#: Between these, decades of a logarithmic axis are written as numbers; within this ratio, it has more labels.
+_SHORT = (1e-3, 1e5)
+_FEW = 200.0
 #: A curve of more points than this has no markers.
 _MARKED = 60
 
@@ -54,9 +58,25 @@ def draw_diagrams(
             marker = "." if dots else _MARKERS[k % len(_MARKERS)] if len(seen) <= _MARKED else ""
             (key[name],) = ax.plot(*seen.T, color=f"C{k % 10}", marker=marker, markersize=4.0, linewidth=1.1,
                                    linestyle="none" if dots else _DASHES[k % len(_DASHES)])  # fmt: skip
+        for axis in (ax.xaxis, ax.yaxis) if diagram.log else ():
+            _label(axis)
     columns = max(1, int(figure.get_figwidth() / _ENTRY))
     figure.legend(key.values(), key, loc="outside lower center", fontsize="small", ncols=columns)
     return figure
+
+
+def _label(axis: Axis) -> None:
+    """Label a logarithmic axis: decades as numbers where these are short, also 2 and 5 where there are few decades."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    plain = FuncFormatter(lambda value, _: f"{value:g}")
+    if low >= _SHORT[0] and high <= _SHORT[1]:
+        axis.set_major_formatter(plain)
+    few = high < _FEW * low
+    axis.set_minor_formatter(plain if few else NullFormatter())
+    if few:
+        axis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
 
 
 def figure_with(count: int, wide: int, size: tuple[float, float], title: str) -> tuple[Figure, list[Axes]]:

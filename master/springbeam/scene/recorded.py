@@ -100,7 +100,8 @@ class Recorded:
         self.units = [name[2] or name[3] or "" for name in found if name] or [""] * width
         if len(head) > 1:
             self.units = [cell.strip("[]()") for cell in head[1]]
-        self._labels = self.names or [str(k + 1) for k in range(width)]
+        #: Names of the columns, or their numbers.
+        self.labels = self.names or [str(k + 1) for k in range(width)]
         #: Number of the column of times, from 0.
         self.time = self._time_column()
 
@@ -174,17 +175,17 @@ class Recorded:
             return next((k for k, name in enumerate(self.names) if name.lower() in _TIMES), 0)
         if wanted in self.names:
             return self.names.index(wanted)
-        if wanted.isdecimal() and 0 < int(wanted) <= len(self._labels):
+        if wanted.isdecimal() and 0 < int(wanted) <= len(self.labels):
             return int(wanted) - 1
-        raise ValueError(f"time_column = {wanted!r}: there are the columns {', '.join(self._labels)}")
+        raise ValueError(f"time_column = {wanted!r}: there are the columns {', '.join(self.labels)}")
 
-    def read(self, wanted: Mapping[int, str]) -> "tuple[np.ndarray, dict[int, np.ndarray]]":
+    def read(self, wanted: Mapping[int, str], along: str = "s") -> "tuple[np.ndarray, dict[int, np.ndarray]]":
         """Return the times [s], ascending, shape (n,), and columns by their numbers, shapes (n,).
 
-        ``wanted`` are the units of the result by number of the column; "" leaves a column as it is. `notes` then has
-        the changes made to the data.
+        ``wanted`` are the units of the result by number of the column; "" leaves a column as it is. ``along`` is the
+        unit of the times, or of another quantity in their place. `notes` then has the changes made to the data.
         """
-        units = {self.time: "s", **wanted}
+        units = {self.time: along, **wanted}
         factors = [self._factor(k, unit) for k, unit in units.items()]
         values = self._ascending(self._present(self._values(list(units))))
         if self._reading.missing == "interpolate":
@@ -196,7 +197,7 @@ class Recorded:
 
     def _factor(self, k: int, wanted: str) -> float:
         """Return the factor of column ``k`` to the unit ``wanted``; one without a unit has it already."""
-        label = f"column {self._labels[k]}"
+        label = f"column {self.labels[k]}"
         if not wanted:
             return 1.0
         if not self.units[k]:
@@ -216,7 +217,7 @@ class Recorded:
         import pyarrow as arrow  # takes a tenth of a second: only if there is a file
         from pyarrow import csv as arrow_csv
 
-        columns = [str(k) for k in range(len(self._labels))]
+        columns = [str(k) for k in range(len(self.labels))]
         names = [str(k) for k in wanted]
         blanks = self._mark == " "
         mark = "\t" if blanks else self._mark
@@ -263,7 +264,7 @@ class Recorded:
 
     def _place(self, row: int, k: int) -> str:
         """Return line and column of a value in words."""
-        return f"line {self._numbers[row]}, column {self._labels[k]}"
+        return f"line {self._numbers[row]}, column {self.labels[k]}"
 
     def _in_words(self, trouble: str) -> str:
         """Return an error of pyarrow, which is about a cell that is no number, with its place and a remedy."""

@@ -132,7 +132,7 @@ def _read(file: Recorded, units: Mapping[str, str], names: Mapping[str, str], sc
     for name, what in wanted.items():
         check(what, units)
         k = file.names.index(name)
-        factors[k], unit = _scale(name, scales[name]) if name in scales else (1.0, "")
+        factors[k], unit = scale_of(name, scales[name]) if name in scales else (1.0, "")
         file.units[k] = f"{file.units[k]} {unit}".strip()
         wanted_units[k] = unit_of(what, units)
         if file.units[k] and not wanted_units[k]:
@@ -145,7 +145,7 @@ def _read(file: Recorded, units: Mapping[str, str], names: Mapping[str, str], sc
     return Measured(times, curves, file.notes)
 
 
-def _scale(name: str, text: str) -> tuple[float, str]:
+def scale_of(name: str, text: str) -> tuple[float, str]:
     """Return number and unit of a scale, ``2.5 mm/V``. Raises SceneError if it is none."""
     number, _, unit = text.strip().partition(" ")
     with suppress(ValueError):

@@ -27,6 +27,8 @@ from .curves import sampled
 
 #: Places in a period of an oscillator at which it is evaluated: a peak is missed by up to 1 − cos(π/64), 0.12 %.
 _PER_PERIOD = 64
+#: Oscillators of a shock spectrum in an octave.
+_PER_OCTAVE = 12
 #: Velocities of the ends of a run.
 VELOCITIES = {"tip": "v_tip", "spring": "z"}
 #: A record has no more than this share of its sampling rate to be certain (ISO 18431-4).
@@ -47,6 +49,13 @@ class ShockSpectrum(NamedTuple):
     maximax: np.ndarray
     positive: np.ndarray
     negative: np.ndarray  #: not below 0
+
+
+def frequencies_between(low: float, high: float) -> np.ndarray:
+    """Return frequencies of oscillators [Hz], 12 to an octave. Raises SceneError unless they rise from above 0."""
+    if not 0.0 < low < high:
+        raise SceneError(f"from {low:g} to {high:g} Hz: frequencies rise from above 0")
+    return np.geomspace(low, high, 1 + int(np.ceil(_PER_OCTAVE * np.log2(high / low))))
 
 
 def shock_spectrum(velocity: np.ndarray, step: float, frequencies: np.ndarray, quality: float = 10.0) -> ShockSpectrum:
@@ -134,15 +143,16 @@ def _phi_2(x: complex) -> complex:
 
 
 def shock_of_run(run: Trajectory, end: str, frequencies: np.ndarray, quality: float = 10.0) -> ShockSpectrum:
-    """Return the shock response spectrum at an ``end`` of a run, ``"tip"`` or ``"spring"``.
+    """Return the shock response spectrum at an ``end`` of a run, ``"tip"`` or ``"spring"``, or of its ``"base"``.
 
     The motion is that in space: where the base accelerates, its velocity is added. Steps are no longer than those of
     the run.
     """
     duration = float(run.time[-1] - run.time[0])
     step = min(min(1.0 / float(np.max(frequencies)), duration) / _PER_PERIOD, duration / (len(run) - 1))
-    times, velocity = sampled(run, VELOCITIES[end], step)
-    return shock_spectrum(velocity + base_velocity(run.scene, times), step, frequencies, quality)
+    times, velocity = sampled(run, VELOCITIES.get(end, "time"), step)
+    of_base = base_velocity(run.scene, times)
+    return shock_spectrum(velocity + of_base if end in VELOCITIES else of_base, step, frequencies, quality)
 
 
 def base_velocity(scene: Scene, times: np.ndarray) -> np.ndarray:

@@ -12,14 +12,12 @@ from ..results.trajectory import Trajectory
 from ..scene import SceneError
 from .curves import sampled
 from .driven import Response, Settled, drive_of, not_repeating, poincare, responses, settled, strobe
-from .shock import VELOCITIES, ShockSpectrum, shock_of_run
+from .shock import VELOCITIES, ShockSpectrum, frequencies_between, shock_of_run
 
 #: A jump of velocity below this share of the largest speed is negligible.
 _JUMP = 1e-3
 #: Velocities that accelerations are the rates of.
 _ACCELERATIONS = {"a_tip": "v_tip", "a_y": "z"}
-#: Oscillators of a shock spectrum in an octave.
-_PER_OCTAVE = 12
 #: Macro steps in a period of the fastest oscillator, and periods of the slowest in the run.
 _STEPS = 20.0
 _PERIODS = 1.0
@@ -51,11 +49,16 @@ def power_spectrum(run: Trajectory, what: str, since: float | None = None, segme
 
     Raises SceneError where there is nothing to sample.
     """
+    times, values = sampled(run, what, since=since)
+    return power_of(values, float(times[1] - times[0]), segments)
+
+
+def power_of(values: np.ndarray, step: float, segments: int = 1) -> PowerSpectrum:
+    """Return the spectrum of ``values`` at equal steps [s], shape (n,), without their mean."""
     from scipy.signal import welch  # takes half a second to load: only for spectra
 
-    times, values = sampled(run, what, since=since)
     length = max(2, 2 * len(values) // (segments + 1))
-    shared = {"fs": 1.0 / (times[1] - times[0]), "window": "hann", "nperseg": length, "detrend": "constant"}
+    shared = {"fs": 1.0 / step, "window": "hann", "nperseg": length, "detrend": "constant"}
     frequency, density = welch(values, scaling="density", **shared)
     _, squares = welch(values, scaling="spectrum", **shared)
     return PowerSpectrum(frequency, density, np.sqrt(2.0 * squares))
@@ -64,6 +67,11 @@ def power_spectrum(run: Trajectory, what: str, since: float | None = None, segme
 def ends_of(run: Trajectory) -> dict[str, str]:
     """Return the ends of a run, ``"tip"`` and ``"spring"``, and the columns of their velocities."""
     return {end: column for end, column in VELOCITIES.items() if column in run.columns}
+
+
+def _shocked(run: Trajectory) -> list[str]:
+    """Return what of a run has a shock spectrum: its ends, and a base that loads accelerate."""
+    return [*ends_of(run), *["base"] * any(load.on == "base" and load.begins > -np.inf for load in run.scene.loads)]
 
 
 def without_peak(run: Trajectory, columns: Iterable[str]) -> str:
@@ -93,7 +101,7 @@ def largest_jump(run: Trajectory, column: str) -> float:
 class Spectra:
     """Spectra of a run by signal."""
 
-    shock: Mapping[str, ShockSpectrum]  #: by the end, "tip" or "spring"
+    shock: Mapping[str, ShockSpectrum]  #: by the end, "tip" or "spring", and of the "base"
     jumps: Mapping[str, float]  #: largest jump of each end's velocity [m/s]
     power: Mapping[str, PowerSpectrum]
     without_peak: Mapping[str, str]  #: why signals with accelerations of rigid impacts have no peak
@@ -102,13 +110,13 @@ class Spectra:
     settled: Settled | None
     quality: float
 
-    def in_words(self) -> Iterator[tuple[str, str]]:
-        """Yield what is found, and how much."""
+    def in_words(self, unit: str = "m/s²", size: float = 1.0) -> Iterator[tuple[str, str]]:
+        """Yield what is found, and how much; accelerations in a ``unit`` of a ``size`` [m/s²]."""
         for end, found in self.shock.items():
             at = int(np.argmax(found.maximax))
-            peak = f"{found.maximax[at]:.4g} m/s² at {found.frequency[at]:.4g} Hz, Q = {self.quality:g}"
+            peak = f"{found.maximax[at] / size:.4g} {unit} at {found.frequency[at]:.4g} Hz, Q = {self.quality:g}"
             yield f"shock at the {end}", peak
-            if self.jumps[end]:
+            if self.jumps.get(end):
                 jump = f"its velocity jumps by up to {self.jumps[end]:.4g} m/s"
                 yield "", f"{jump}: the spectrum rises with frequency without limit, there is no peak acceleration"
         for what, power in self.power.items():
@@ -161,13 +169,11 @@ def spectra(
     drive = drive_of(run)
     low = _PERIODS / duration if low is None else low
     high = max(2.0 * low, (len(run) - 1) / duration / _STEPS) if high is None else high
-    if not 0.0 < low < high:
-        raise SceneError(f"from {low:g} to {high:g} Hz: frequencies rise from above 0")
-    frequencies = np.geomspace(low, high, 1 + int(np.ceil(_PER_OCTAVE * np.log2(high / low))))
+    frequencies = frequencies_between(low, high)
     begin = since if since is not None or tail is None else tail.since
     wanted = of or [name for name in ("u_tip", "y") if name in run.columns]
     return Spectra(
-        shock={end: shock_of_run(run, end, frequencies, quality) for end in ends_of(run)},
+        shock={end: shock_of_run(run, end, frequencies, quality) for end in _shocked(run)},
         jumps={end: largest_jump(run, column) for end, column in ends_of(run).items()},
         power={what: power_spectrum(run, what, begin, segments) for what in wanted},
         without_peak={what: why for what in wanted if (why := without_peak(run, [what]))},
