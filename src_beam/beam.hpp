@@ -225,7 +225,8 @@ class Beam {
   ///     u(t + 2·size) = u(t) + 2·size·w + C₁ r[1] + C₂ r[0].
   /// r[2]: what a tip impulse of 1 N·s adds to w [1/kg].
   /// @throws as step()
-  std::array<double, 3> tip_response(double size);
+  using TipResponse = std::array<double, 3>;
+  TipResponse tip_response(double size);
 
   /// The whole dynamic state.
   struct State {

@@ -30,6 +30,9 @@ class Spring {
   Spring(const Spring&) = delete;
   Spring& operator=(const Spring&) = delete;
 
+  /// Whether the law inside makes the contact force, from now on, or the input is it.
+  void set_contact_law(ContactLaw law) { parameters_.contact_law = law; }
+
   /// Advance by `size` [s] > 0, finite, from `time`. The work is bounded: a step that spans too much of the motion is
   /// refused.
   /// @throws StepFailure (state unchanged)
@@ -111,7 +114,7 @@ class Spring {
   double depth() const { return parameters_.compliant() ? state_.y - tip()[0] : -1.0; }
   bool finite() const;
 
-  const Parameters parameters_;
+  Parameters parameters_;
   const EquationOfMotion equation_;
   Flight flight_;
   State state_;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <string>
 
 #include "held_contact.hpp"
 
@@ -18,26 +19,29 @@ class Wiring {
     swapped,            ///< it is where it would be with r₁ for r₂
     no_first_exchange,  ///< it made the first step without the contact force
     no_law,             ///< a tip arrives, but there is no contact law inside
-    forecast_not_used,  ///< a forecast arrives, but no force is held
+    unsteady,           ///< step sizes change in contact, which adds more than the contact ever stored
+    unresolved,         ///< a beam sends a forecast but no responses, in contact that steps must resolve and do not
     faults
   };
 
-  /// Before the first step: the tip as `arrived`, the contact having begun with it.
-  void check_start(const HeldContact& contact, const TipMessage& arrived);
   /// At a step's end, before the contact is advanced: the tip as `arrived` at the start of the step.
   void check_step(const HeldContact& contact, const TipMessage& arrived);
+  /// After a step of `size` [s] with a law of this `stiffness` [N/m] inside, under what a beam's forecast says.
+  void check_resolved(double size, double stiffness, double mass);
   /// A step in which the fault shows.
   void count(Fault fault) { ++shown_[fault]; }
 
   /// Steps in which something is wrong, of faults that are certain.
   int warnings() const;
-  /// What is wrong and what to do, once for each fault; NULL if there is nothing new.
-  const char* news();
+  /// What is wrong and what to do, once for each fault; empty if there is nothing new.
+  std::string news();
 
  private:
   std::array<int, faults> shown_{};
   std::array<bool, faults> reported_{};
-  double path_ = 0.0;  ///< longest one of the tip in a step so far [m]
+  double path_ = 0.0;       ///< longest one of the tip in a step so far [m]
+  double stored_ = 0.0;     ///< most energy that the contact has stored so far [J]
+  double resolving_ = 0.0;  ///< step size that would do [s]
 };
 
 }  // namespace spring

@@ -72,7 +72,7 @@ void Instance::ensure_built() {
   model_->build(progress.tolerance);
   model_->evaluate(Model::Acting::as_stepped);
   for (const Variable& v : table_.variables)
-    if (v.get) finite(v, v.get(*model_), ": the parameters leave the range of floating-point numbers");
+    if (v.get && !v.on_demand) finite(v, v.get(*model_), ": the parameters leave the range of floating-point numbers");
   built_ = true;
   for (std::size_t i = n_settings_; i < settable_.size(); ++i) settable_[i]->set(*model_, values_[i]);
   dirty_ = inputs_set_ = true;

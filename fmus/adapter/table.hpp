@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "learnt_step.hpp"
 #include "model.hpp"
 
 namespace fmi {
@@ -44,6 +45,7 @@ struct Variable {
   double nominal = 1.0;
   bool exact = false;        ///< an output whose start is the initial state (initial="exact")
   bool discrete = false;     ///< an output that changes at steps only. It is a Real: some tools read all outputs so
+  bool on_demand = false;    ///< an output that costs too much to be computed where it is not read
   bool consumed = false;     ///< an input that acts once: read back as 0 after the step that used it
   std::size_t elements = 1;  ///< of the array that begins here, where variables can be arrays; 0: within one
 
@@ -61,6 +63,7 @@ struct Variable {
   Variable& range(double low, double high) { return min = low, max = high, *this; }
   Variable& at_least(double low) { return min = low, *this; }
   Variable& positive() { return min = std::numeric_limits<double>::min(), *this; }
+  Variable& only_read() { return on_demand = true, *this; }
   Variable& steps_only() { return discrete = true, *this; }
   Variable& typical(double value) { return nominal = value, *this; }
   Variable& from(std::vector<std::string> names) { return initial_dependencies = std::move(names), *this; }
@@ -90,8 +93,8 @@ inline constexpr int max_input_derivative_order = 2, max_output_derivative_order
 struct Table {
   std::string identifier;  ///< modelIdentifier
   std::string title, description;
-  double stop_time = 1.0, step_size = 1e-3, tolerance = 1e-6;  ///< DefaultExperiment
-  bool ends_steps_early = false;                               ///< at events, where it may
+  double stop_time = 1.0, step_size = default_step, tolerance = 1e-6;  ///< DefaultExperiment
+  bool ends_steps_early = false;                                       ///< at events, where it may
   std::vector<Choice> choices;
   std::vector<Variable> variables;
 };

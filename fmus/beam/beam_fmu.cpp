@@ -6,10 +6,12 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "../../src_beam/beam.hpp"
 #include "../adapter/flat.hpp"
+#include "../adapter/learnt_step.hpp"
 #include "../adapter/table.hpp"
 
 namespace {
@@ -22,7 +24,7 @@ using beam::Parameters;
 enum class InitialState { given = 1, at_rest = 2 };
 
 struct FmuParameters : Parameters {
-  double tip_load_coefficient = 0.0, communication_step = 0.0;
+  double tip_load_coefficient = 0.0;
   double gravity = 0.0;         ///< [m/s²]
   double section_height = 0.0;  ///< [m], 0: not given
   InitialState initial_state = InitialState::given;
@@ -35,16 +37,15 @@ struct BeamModel final : fmi::Model {
   Loads loads;
   double tip_impulse = 0.0;
   std::unique_ptr<Beam> beam;
-  std::array<double, 3> tip_response{};  ///< with communication_step > 0, otherwise 0
-  bool starts_at_rest = false;           ///< at the start, where that is a state of rest
+  bool starts_at_rest = false;  ///< at the start, where that is a state of rest
 
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override {
     beam = beam::make_beam(parameters);
     loads.set(Loads::hat, {parameters.tip_load_coefficient, 0.0, 0.0});
     set_distributed({});
-    tip_response = {};
-    if (predicts()) tip_response = beam->tip_response(parameters.communication_step);
+    size_ = fmi::default_step;
+    answers_.reset();
   }
 
   void evaluate(Acting acting) override {
@@ -54,7 +55,7 @@ struct BeamModel final : fmi::Model {
     if (starts_at_rest) beam->put_at_rest();
   }
 
-  Reached step(double, double size, bool) override {
+  Reached step(double time, double size, bool) override {
     std::optional<Beam::State> before;
     if (tip_impulse != 0.0) before = beam->state();
     try {
@@ -66,6 +67,7 @@ struct BeamModel final : fmi::Model {
       const bool too_long = dynamic_cast<const std::domain_error*>(&e) != nullptr;
       throw fmi::Discarded(e.what(), too_long ? Remedy::other_size : Remedy::none);
     }
+    size_ = fmi::learnt_step(size_, time, size);
     return {size, false};
   }
 
@@ -75,11 +77,11 @@ struct BeamModel final : fmi::Model {
 
   void save(std::vector<double>& state) const override {
     const Beam::State& now = beam->state();
-    fmi::flatten(state, now.q, now.v, now.scalars);
+    fmi::flatten(state, now.q, now.v, now.scalars, size_);
   }
   void restore(const std::vector<double>& state) override {
     Beam::State then = beam->state();
-    fmi::restore(state, then.q, then.v, then.scalars);
+    fmi::restore(state, then.q, then.v, then.scalars, size_);
     beam->restore(then);
   }
 
@@ -112,25 +114,39 @@ struct BeamModel final : fmi::Model {
     return sign * forces.moment[most] * parameters.section_height / (2.0 * parameters.second_moment_of_area);
   }
 
+  /// For a partner that exchanges values only between steps: how the tip goes on, and answers forces, in steps of the
+  /// size of the last one.
   const Beam::Forecast& forecast() const {
-    if (!derived_.forecast)
-      derived_.forecast = predicts() ? beam->forecast(parameters.communication_step) : Beam::Forecast{};
+    if (!derived_.forecast) derived_.forecast = foreseen([this] { return beam->forecast(size_); });
     return *derived_.forecast;
+  }
+  const Beam::TipResponse& tip_response() const {
+    if (!answers_ || answers_->size != size_)
+      answers_ = Answers{size_, foreseen([this] { return beam->tip_response(size_); })};
+    return answers_->response;
   }
   /// As the tip goes on under the tip force and the loads that are set.
   double forecast_rate() const {
-    double rate = forecast().acceleration + tip_response[2] * beam->tip_force();
+    double rate = forecast().acceleration + tip_response()[2] * beam->tip_force();
     loads.for_each([&](std::size_t i, const fmi::Polynomial& f) {
       if (f[1] != 0.0) rate += f[1] * forecast_per_load(i);
     });
     return rate;
   }
   double forecast_per_load(std::size_t load) const {
-    return predicts() ? beam->forecast_per_load(parameters.communication_step, load).velocity : 0.0;
+    return foreseen([this, load] { return beam->forecast_per_load(size_, load); }).velocity;
   }
 
  private:
-  bool predicts() const { return parameters.communication_step > 0.0; }
+  /// Zeros, by which the partner knows that nothing is, where the midpoint rule cannot make such steps.
+  template <class Foresee>
+  static std::invoke_result_t<Foresee> foreseen(const Foresee& foresee) {
+    try {
+      return foresee();
+    } catch (const std::domain_error&) {
+      return {};
+    }
+  }
   Loads::Values load_rates() const {
     Loads::Values rates{};
     loads.for_each([&](std::size_t i, const fmi::Polynomial& f) { rates[i] = f[1]; });
@@ -144,6 +160,13 @@ struct BeamModel final : fmi::Model {
     std::optional<Beam::Forecast> forecast;
   };
   mutable Derived derived_;
+  /// Kept as long as steps have the size that it is for.
+  struct Answers {
+    double size;
+    Beam::TipResponse response;
+  };
+  mutable std::optional<Answers> answers_;
+  double size_ = fmi::default_step;  ///< H, of the last step [s]
 };
 
 /// The partial derivative by an input where that is known: a state of rest follows the loads as a whole.
@@ -168,7 +191,6 @@ fmi::Table fmi::make_table() {
   t.description =
       "Viscoelastic (Kelvin-Voigt) Timoshenko beam, clamped at x = 0, loaded at its tip x = L by a contact force";
   t.stop_time = 0.6;
-  t.step_size = 1e-3;
   t.choices.push_back({"MassMatrix",
                        "mass of an element",
                        {"consistent, its kinetic energy exact",
@@ -233,11 +255,6 @@ fmi::Table fmi::make_table() {
   parameter("section_height", "m", &FmuParameters::section_height,
             "height of the cross-section h, for max_bending_stress; 0 = not given")
       .at_least(0);
-  parameter("communication_step", "s", &FmuParameters::communication_step,
-            "size H of the communication steps, for a spring with the same communication_step, which predicts the tip. "
-            "If > 0, tip_velocity_forecast, tip_response and tip_response_2 are computed")
-      .at_least(0)
-      .typical(1e-3);
 
   add.input(
       "tip_force", "N",
@@ -312,20 +329,34 @@ fmi::Table fmi::make_table() {
              "mass_matrix"});
   add.output(
          "tip_velocity_forecast", "m/s",
-         "predicted mean velocity of the tip over the next two steps of size communication_step without a tip_force; 0 "
-         "if communication_step = 0",
+         "predicted mean velocity of the tip over the next two steps without a tip_force; steps have the size of the "
+         "last "
+         "one, before the first that of DefaultExperiment",
          [](const BeamModel& m) { return m.forecast().velocity; }, [](const BeamModel& m) { return m.forecast_rate(); })
+      .only_read()
       .from_all();
   for (std::size_t i = 0; i < load_names.size(); ++i) {
     add.depends(load_names[i], unless_at_rest([i](const BeamModel& m) { return m.forecast_per_load(i); }));
   }
-  add.local("tip_response", "m/N",
-            "change of tip_displacement at the end of a step of size communication_step, per newton of constant tip "
-            "force in that step; 0 if communication_step = 0",
-            [](const BeamModel& m) { return m.tip_response[0]; });
-  add.local("tip_response_2", "m/N",
-            "as tip_response, but at the end of the following step, in which no tip force acts",
-            [](const BeamModel& m) { return m.tip_response[1]; });
+  const std::vector<std::string> discretised{"density",        "area",          "second_moment_of_area",
+                                             "young_modulus",  "shear_modulus", "shear_coefficient",
+                                             "length",         "alpha_b",       "n_elements",
+                                             "element_degree", "n_modes",       "reduced_integration",
+                                             "integrator",     "mass_matrix"};
+  add.output(
+         "tip_response", "m/N",
+         "change of tip_displacement at the end of a step, per newton of constant tip force in that step; for steps "
+         "as for tip_velocity_forecast",
+         [](const BeamModel& m) { return m.tip_response()[0]; })
+      .only_read()
+      .from(discretised)
+      .typical(1e-4);
+  add.output("tip_response_2", "m/N",
+             "as tip_response, but at the end of the following step, in which no tip force acts",
+             [](const BeamModel& m) { return m.tip_response()[1]; })
+      .only_read()
+      .from(discretised)
+      .typical(1e-4);
   // What follows forces without delay, as linear functions of the response.
   const auto instant = [&](const char* name, const char* unit, const char* text, auto of_response) {
     add.output(

@@ -26,7 +26,6 @@ fmi::Table fmi::make_table() {
       "Duffing spring m y'' + alpha_s y' + k1 x + k2 x^3 = -C + N + f_s, x = y - unloaded, under a contact force C, "
       "above a rigid foundation";
   t.stop_time = 0.6;
-  t.step_size = 1e-3;
   t.ends_steps_early = true;
   t.choices.push_back({"ContactLaw",
                        "source of the contact force",
@@ -62,16 +61,6 @@ fmi::Table fmi::make_table() {
       "compliance_damping", "s/m", &Parameters::compliance_damping,
       "damping chi of the contact law (Hunt and Crossley); the energy that it dissipates is part of dissipated_energy")
       .at_least(0);
-  parameter("communication_step", "s", &FmuParameters::communication_step,
-            "size of all communication steps, for contact_law = 2 and a beam with the same communication_step. If > 0, "
-            "the tip is predicted, and reaction is constant over each step at the value that does the work of the "
-            "contact law: no step size adds energy. If 0, the contact law acts with the extrapolated tip")
-      .at_least(0)
-      .typical(1e-3);
-  parameter("tip_response", "m/N", &FmuParameters::tip_response, "for communication_step > 0: tip_response of the beam")
-      .at_least(0);
-  parameter("tip_response_2", "m/N", &FmuParameters::tip_response_2,
-            "for communication_step > 0: tip_response_2 of the beam");
   parameter("stop_enabled", "", &Parameters::stop_enabled, "whether this FMU has the rigid foundation, with impacts");
   parameter("stop_position", "m", &Parameters::stop_position, "position phi of the foundation");
   parameter("restitution", "", &Parameters::restitution, "coefficient of restitution at the foundation").range(0, 1);
@@ -113,8 +102,16 @@ fmi::Table fmi::make_table() {
               m.tip_velocity_is_set = true;
             });
   add.input("tip_velocity_forecast", "m/s",
-            "for communication_step > 0: tip_velocity_forecast of the beam; its derivatives are not used",
+            "tip_velocity_forecast of the beam, used when tip_response > 0; its derivatives are not used",
             &SpringModel::forecast);
+  add.input("tip_response", "m/N",
+            "tip_response of the beam. If > 0 and contact_law = 2, the tip is predicted, and reaction is constant over "
+            "each step at the value that does the work of the contact law: no step size adds energy. If 0, the contact "
+            "law acts with the extrapolated tip. Its derivatives are not used",
+            &SpringModel::response)
+      .typical(1e-4);
+  add.input("tip_response_2", "m/N", "tip_response_2 of the beam, as tip_response", &SpringModel::response_2)
+      .typical(1e-4);
 
   add.output("displacement", "m", "position y of the top", of(&Spring::displacement), of(&Spring::velocity));
   add.exact_start(&SpringModel::parameters, &FmuParameters::displacement);
@@ -122,11 +119,11 @@ fmi::Table fmi::make_table() {
   add.exact_start(&SpringModel::parameters, &FmuParameters::velocity);
   const std::vector<std::string> motion{"contact_law", "compliance_stiffness", "compliance_exponent",
                                         "compliance_damping", "displacement", "tip_displacement", "tip_velocity",
-                                        // with communication_step > 0, of which the first is predicted:
-                                        "communication_step", "tip_response", "tip_velocity_forecast", "velocity",
-                                        "mass", "damping", "linear_stiffness", "cubic_stiffness", "unloaded",
-                                        "external_force", "base_acceleration", "foundation_force", "stop_enabled",
-                                        "stop_position", "restitution", "gravity"};
+                                        // with tip_response > 0, of which the first is predicted:
+                                        "tip_response", "tip_velocity_forecast", "velocity", "mass", "damping",
+                                        "linear_stiffness", "cubic_stiffness", "unloaded", "external_force",
+                                        "base_acceleration", "foundation_force", "stop_enabled", "stop_position",
+                                        "restitution", "gravity"};
   using M = const SpringModel&;
   add.output("displacement_integral", "m.s", "integral of displacement over the last step",
              of(&Spring::displacement_integral), of(&Spring::displacement));
@@ -149,7 +146,8 @@ fmi::Table fmi::make_table() {
   const Influence contact[] = {{"tip_displacement", [](M m) { return m.reaction_by_tip_displacement(); }},
                                {"tip_displacement", [](M m) { return m.reaction_by_tip_rate(); }, 1},
                                {"tip_velocity", [](M m) { return m.reaction_by_tip_velocity(); }},
-                               {"tip_velocity_forecast", by_held}};
+                               {"tip_velocity_forecast", by_held},
+                               {"tip_response", by_held}};
   for (const auto& [name, partial, order] : contact) add.depends(name, partial, order);
   for (const auto& [name, partial, order] : loads)
     add.depends(name, [=, by = partial](M m) { return by(m) * by_held(m); });

@@ -15,14 +15,14 @@
 #include "../../src_spring/trial_steps.hpp"
 #include "../../src_spring/wiring.hpp"
 #include "../adapter/flat.hpp"
+#include "../adapter/learnt_step.hpp"
 #include "../adapter/model.hpp"
 #include "../adapter/text.hpp"
 
-/// The spring's parameters, where its top rests, and what exchange between steps adds to them.
+/// The spring's parameters and where its top rests.
 struct FmuParameters : spring::Parameters {
   double equilibrium = 0.0;  ///< Ψ [m]: for the partner; it plays no part in the motion
   double gravity = 0.0;      ///< [m/s²]
-  double communication_step = 0.0, tip_response = 0.0, tip_response_2 = 0.0;
 };
 
 class SpringModel final : public fmi::Model {
@@ -32,27 +32,21 @@ class SpringModel final : public fmi::Model {
   // As set.
   spring::Inputs inputs;  ///< but for the tip
   double impulse = 0.0;
-  fmi::Polynomial tip_displacement{}, tip_velocity{}, forecast{};
+  fmi::Polynomial tip_displacement{}, tip_velocity{}, forecast{}, response{}, response_2{};
   bool tip_is_set = false, tip_velocity_is_set = false;  ///< since the last step
 
   void build(double tolerance) override {
     FmuParameters p = parameters;
     if (tolerance > 0.0) p.relative_tolerance = std::min(p.relative_tolerance, tolerance);
-    const bool holds = p.compliant() && p.communication_step > 0.0;
-    if (holds) p.contact_law = spring::ContactLaw::external;
-    held_.reset();
     spring_.emplace(p);  // checks the parameters
     trials_.emplace(*spring_);
-    const spring::Compliance law(p.compliance_stiffness, p.compliance_exponent, p.compliance_damping);
-    if (holds) held_.emplace(law, p.mass, p.communication_step, std::array{p.tip_response, p.tip_response_2});
+    held_.emplace(spring::Compliance(p.compliance_stiffness, p.compliance_exponent, p.compliance_damping), p.mass);
+    rhythm_ = {};
   }
 
   void evaluate(Acting acting) override {
     if (acting == Acting::as_stepped) return;
-    if (held_ && !held_->started()) {
-      held_->begin(message(), acting == Acting::at_start, top().displacement(), trials());
-      wiring_.check_start(*held_, message());
-    }
+    hold();
     observe();
   }
 
@@ -60,9 +54,10 @@ class SpringModel final : public fmi::Model {
     using Remedy = fmi::Discarded::Remedy;
     const State before = state();
     Reached reached{size, false};
+    const Remedy remedy = std::isfinite(held_->force()) ? Remedy::other_size : Remedy::none;
     try {
       if (impulse != 0.0) spring_->apply_impulse(impulse);
-      if (held_) {
+      if (held()) {
         step_held(time, size);
       } else {
         spring::Inputs present = acting();
@@ -72,8 +67,9 @@ class SpringModel final : public fmi::Model {
       }
     } catch (const spring::StepFailure& e) {
       restore(before);
-      throw fmi::Discarded(e.what(), held_ ? Remedy::none : Remedy::other_size);
+      throw fmi::Discarded(e.what(), remedy);
     }
+    rhythm_ = {fmi::learnt_step(rhythm_.size, time, reached.size), 1.0};
     check_wiring();
     return reached;
   }
@@ -96,20 +92,23 @@ class SpringModel final : public fmi::Model {
   const spring::Spring& top() const { return *spring_; }
   int warnings() const { return refused + wiring_.warnings(); }
 
-  double reaction() const { return held_ ? held_->force() : top().reaction(); }
-  double elastic_reaction() const { return held_ ? held_->elastic(top().displacement()) : top().elastic_reaction(); }
-  double contact_energy() const { return held_ ? held_->energy(top().displacement()) : top().contact_energy(); }
-  double dissipated_energy() const { return top().dissipated_energy() + (held_ ? held_->dissipated() : 0.0); }
+  double reaction() const { return held() ? held_->force() : top().reaction(); }
+  double elastic_reaction() const { return held() ? held_->elastic(top().displacement()) : top().elastic_reaction(); }
+  double contact_energy() const {
+    if (!held()) return top().contact_energy();
+    return held_->energy(top().displacement(), top().extrapolated() ? held_->state().tip : top().tip()[0]);
+  }
+  double dissipated_energy() const { return top().dissipated_energy() + held_->dissipated(); }
 
   // Rates of outputs, under the inputs that are set.
-  double approach() const { return top().velocity() - (held_ ? tip_velocity[0] : top().tip()[1]); }  ///< δ̇
+  double approach() const { return top().velocity() - (held() ? tip_velocity[0] : top().tip()[1]); }  ///< δ̇
   double reaction_rate() const {
     const auto slopes = top().reaction_slopes();
     return slopes.force_by_depth * approach() + slopes.force_by_rate * (top().acceleration() - top().tip()[2]);
   }
 
   double dissipated_power() const {
-    const double by_contact = held_ ? 0.0 : (top().reaction() - top().elastic_reaction()) * approach();
+    const double by_contact = held() ? 0.0 : (top().reaction() - top().elastic_reaction()) * approach();
     return parameters.damping * top().velocity() * top().velocity() + by_contact;
   }
 
@@ -118,21 +117,22 @@ class SpringModel final : public fmi::Model {
   double contact_power() const { return elastic_reaction() * approach(); }
   double load_power() const { return spring::load_of(parameters, acting())[0] * top().velocity(); }
   double jerk() const {
-    return top().jerk(spring::Loads::from(parameters, acting()).force[1], held_ ? 0.0 : reaction_rate());
+    return top().jerk(spring::Loads::from(parameters, acting()).force[1], held() ? 0.0 : reaction_rate());
   }
 
   // Derivatives of outputs.
   double mobility() const { return top().seated() ? 0.0 : 1.0 / parameters.mass; }  ///< of the top, by a force on it
   /// Not a number, so found by differences, where the held force follows an input: before its first step.
   double held_force_by_input() const {
-    return held_ && !held_->started() ? std::numeric_limits<double>::quiet_NaN() : 0.0;
+    return held() && rhythm_.stepped == 0.0 ? std::numeric_limits<double>::quiet_NaN() : 0.0;
   }
 
   double reaction_by_tip_displacement() const {
-    return held_ ? held_force_by_input() : -top().reaction_slopes().force_by_depth;
+    return held() ? held_force_by_input() : -top().reaction_slopes().force_by_depth;
   }
 
   double reaction_by_tip_velocity() const {
+    if (held()) return held_force_by_input();
     return tip_displacement[1] != 0.0 ? 0.0 : -top().reaction_slopes().force_by_rate;
   }
 
@@ -141,17 +141,47 @@ class SpringModel final : public fmi::Model {
     return tip_displacement[1] != 0.0 ? -top().reaction_slopes().force_by_rate : 0.0;
   }
 
-  double contact_energy_by_tip_displacement() const { return held_ && held_->started() ? 0.0 : -elastic_reaction(); }
+  double contact_energy_by_tip_displacement() const {
+    return held() && rhythm_.stepped != 0.0 ? -held_->last_force() : -elastic_reaction();
+  }
 
  private:
+  /// What is known of the steps: the size that is expected [s], and whether there was one.
+  struct Rhythm {
+    double size = fmi::default_step, stepped = 0.0;
+  };
   struct State {
     spring::Spring::State top;
-    spring::HeldContact::State contact;  ///< all 0 without one
+    spring::HeldContact::State contact;  ///< all 0 where no force is held
+    Rhythm rhythm;
   };
-  State state() const { return {spring_->state(), held_ ? held_->state() : spring::HeldContact::State{}}; }
+  State state() const { return {spring_->state(), held_->state(), rhythm_}; }
   void restore(const State& state) {
     spring_->restore(state.top);
-    if (held_) held_->restore(state.contact);
+    held_->restore(state.contact);
+    rhythm_ = state.rhythm;
+    choose_law();
+  }
+
+  /// Whether the contact force is held over steps: the beam says how its tip answers it. Otherwise the law acts within
+  /// the steps, on the extrapolated tip.
+  bool held() const { return held_->held(); }
+  void choose_law() { spring_->set_contact_law(held() ? spring::ContactLaw::external : parameters.contact_law); }
+  /// Follow the message before the first step. One that comes later finds the force of its step sent.
+  void hold() {
+    const spring::TipMessage arrived = message();
+    if (!parameters.compliant() || held_->started()) return;
+    if (rhythm_.stepped != 0.0) {
+      if (held() || !arrived.predicts()) return;
+      held_->take_over(top().tip()[0], rhythm_.size, top().displacement(), top().reaction());
+      if (top().displacement() > arrived.displacement) wiring_.count(spring::Wiring::no_first_exchange);
+    } else if (arrived.predicts()) {
+      spring_->set_contact_law(spring::ContactLaw::external);
+      held_->begin(arrived, rhythm_.size, top().displacement(), trials(rhythm_.size));
+    } else {
+      held_->restore({});
+    }
+    choose_law();
   }
 
   /// What acts, but for the tip.
@@ -159,7 +189,7 @@ class SpringModel final : public fmi::Model {
     spring::Inputs present = inputs;
     present.external_force[0] -= parameters.mass * parameters.gravity;
     if (parameters.compliant())
-      present.contact_force = {held_ && std::isfinite(held_->force()) ? held_->force() : 0.0, 0.0, 0.0};
+      present.contact_force = {held() && std::isfinite(held_->force()) ? held_->force() : 0.0, 0.0, 0.0};
     return present;
   }
 
@@ -170,7 +200,9 @@ class SpringModel final : public fmi::Model {
     return tip_displacement;
   }
 
-  spring::TipMessage message() const { return {tip_displacement[0], forecast[0]}; }
+  spring::TipMessage message() const {
+    return {tip_displacement[0], tip_velocity[0], forecast[0], response[0], response_2[0]};
+  }
   /// To what outputs refer. A tip that was not set since the last step is where that one left it.
   void observe() {
     spring::Inputs present = acting();
@@ -182,33 +214,26 @@ class SpringModel final : public fmi::Model {
     spring_->observe(present, extrapolated);
   }
 
-  /// A held force asks for steps of one size.
   void step_held(double time, double size) {
-    constexpr double share = 1e-6;  // of the size, which sums of steps may lack, or be more than nothing
-    const double H = held_->size(), difference = std::abs(size - H);
-    const double of_time = 64.0 * std::numeric_limits<double>::epsilon() * std::abs(time);  // t itself is rounded
-    const bool whole = size > share * H + of_time;
-    if (whole && difference > share * H + of_time)
-      throw spring::StepFailure("a step of " + fmi::number(size) + " s, but communication_step = " + fmi::number(H) +
-                                    " s: steps must have that size, or the parameter be 0",
-                                0.0);
+    const double expected = fmi::learnt_step(rhythm_.size, time, size);
+    const double rounding = 64.0 * std::numeric_limits<double>::epsilon() * std::abs(time);  // of the importer's times
     require_held_force();
-    if (difference <= of_time) size = H;
+    if (std::abs(size - expected) <= rounding) size = expected;
     if (!trials_->adopt(size, acting())) spring_->step(size, acting(), time);
-    if (whole) {  // else the force is held on
+    if (!fmi::is_rest(expected, time, size)) {  // else the force is held on
       wiring_.check_step(*held_, message());
-      held_->advance(message(), top().displacement(), trials());
+      held_->advance(message(), expected, top().displacement(), trials(expected));
       require_held_force();
     }
     observe();
   }
 
-  /// Where the top would be after the next step, other inputs staying as they are.
-  spring::HeldContact::Top trials() {
+  /// Where the top would be after the next step, of `size`, other inputs staying as they are.
+  spring::HeldContact::Top trials(double size) {
     spring::Inputs next = acting();
     for (auto* input : {&next.foundation_force, &next.external_force, &next.base_acceleration})
       (*input)[1] = (*input)[2] = 0.0;
-    trials_->begin(held_->size(), next);
+    trials_->begin(size, next);
     return [this](double force) { return trials_->displacement_under(force); };
   }
 
@@ -223,15 +248,17 @@ class SpringModel final : public fmi::Model {
   }
 
   void check_wiring() {
-    const bool law = parameters.compliant(), ahead = parameters.communication_step > 0.0 || forecast[0] != 0.0;
-    const bool arrives = ahead || tip_displacement[0] != 0.0 || tip_velocity[0] != 0.0;
-    if (!law && arrives) wiring_.count(spring::Wiring::no_law);
-    if (law && !held_ && ahead) wiring_.count(spring::Wiring::forecast_not_used);
-    if (const char* news = wiring_.news()) warning = news;
+    const spring::TipMessage m = message();
+    const bool arrives = m.displacement != 0.0 || m.velocity != 0.0 || m.forecast != 0.0 || m.predicts();
+    const double stiffness = top().reaction_slopes().force_by_depth;
+    if (!parameters.compliant() && arrives) wiring_.count(spring::Wiring::no_law);
+    if (m.forecast != 0.0 && stiffness > 0.0) wiring_.check_resolved(rhythm_.size, stiffness, parameters.mass);
+    if (const std::string news = wiring_.news(); !news.empty()) warning = news;
   }
 
   std::optional<spring::Spring> spring_;
   std::optional<spring::TrialSteps> trials_;
   std::optional<spring::HeldContact> held_;
+  Rhythm rhythm_;
   spring::Wiring wiring_;  ///< no part of the state
 };

@@ -165,17 +165,6 @@ int main(int argc, char** argv) {
     const double force = 1.0;
     bench::compare("modal fmu", o, [&] { fmu.step(h); }, [&] { bare.step(force); });
     bench::compare("modal fmu repeated", o, [&] { fmu.repeat(h); }, [&] { bare.step(force); });
-
-    // What a forecast costs that nobody reads.
-    bench::Values with_forecast = values;
-    with_forecast.emplace_back("communication_step", h);
-    bench::Fmu foreseeing(with_forecast);
-    const unsigned load = bench::Fmu::reference("distributed_load");
-    double value = 0.0;
-    bench::compare("forecast step", o, [&] { foreseeing.step(h); }, [&] { fmu.step(h); });
-    bench::compare(
-        "forecast load", o, [&] { foreseeing.set(load, value += 1e-3); }, [&] { fmu.set(load, value += 1e-3); });
-    bench::compare("forecast restore", o, [&] { foreseeing.restore(); }, [&] { fmu.restore(); });
   }
   scaling(o);
   return 0;

@@ -40,12 +40,6 @@ def beam(effort):
         rival = f"64 products of 2 × 2 matrices: {shown(statistics.median(modal.rival))}"
         name = f"beam step of the FMU, 64 modes{what}, called from C"
         yield below(name, [1e6 * s for s in modal.ours], goal, "µs", rival)
-    for key, what in (
-        ("step", "a step of the FMU with a forecast that nobody reads"),
-        ("load", "a load set on it"),
-        ("restore", "a state set back in it"),
-    ):
-        yield ratio_row(what, _of(found[f"forecast {key}"]), 1.1, "the same without communication_step")
     yield from _initialisation(effort)
     for modes, name in ((0, "midpoint rule"), (64, "64 modes")):
         line = found[f"scaling {modes}"]

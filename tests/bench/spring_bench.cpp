@@ -164,7 +164,6 @@ void compare_held(const bench::Options& o) {
   inside.insert(inside.end(), {{"contact_law", 2.0},
                                {"compliance_stiffness", 1e4},
                                {"compliance_exponent", 1.5},
-                               {"communication_step", H},
                                {"tip_response", 1e-9}});
   outside.emplace_back("contact_force", 5.0);
   bench::Fmu plain(outside);

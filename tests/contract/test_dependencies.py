@@ -115,7 +115,9 @@ def test_directional_derivatives_are_those_of_the_outputs(case):
         for step in (False, True):
             if step:
                 k.step(0.0, 1e-3)
-            found.append(sum(compare(k, case.outputs, name, change) for name in inputs(case)))
+            # From 0 on `tip_response` makes the force a held one.
+            names = [n for n in inputs(case) if n != "tip_response" or "tip_response" in base]
+            found.append(sum(compare(k, case.outputs, name, change) for name in names))
         k.free()
     assert sum(found) >= {"beam": 16, "spring": 12}[case.name]
 
@@ -170,7 +172,7 @@ def test_directional_derivatives_at_the_start_are_those_of_the_outputs(case):
                 continue
             outputs = [o for o in case.outputs if name in pairs.get(o, ()) and o not in skipped]
             value = k.get(name)
-            edge = name in {"alpha_b", "communication_step", "restitution", "compliance_damping"}
+            edge = name in {"alpha_b", "restitution", "compliance_damping", "tip_response"}
             if outputs and (not edge or value not in (0.0, 1.0)):
                 change = 1e-4 * max(abs(value), 1e-2)
                 own_change = 1e-6 * (abs(value) or float(case.variables[name].nominal or 1.0))

@@ -148,7 +148,7 @@ def test_a_slow_contact_is_told_once(spring, speed):
 
 
 def test_a_held_force_asks_for_whole_steps(spring):
-    values = {"contact_law": 2, "communication_step": 0.2, "tip_response": 1e-3, "tip_displacement": 10.0}
+    values = {"contact_law": 2, "tip_response": 1e-3, "tip_displacement": 10.0}
     k = started(spring, **FALLING, **values)
     k.step(0.0, 0.2)
     assert told(k) == (False, False, False)

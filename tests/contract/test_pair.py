@@ -20,8 +20,8 @@ E0 = 1 / 6  # ρAs²/6 + ρIs²/6·0: kinetic energy of u_t = −x, the rotation
 BEAM = {"young_modulus": 100.0, "shear_modulus": 100.0, "n_elements": 50, "initial_velocity_slope": -1.0}
 SPRING = {"linear_stiffness": 3.0, "cubic_stiffness": -0.2, "contact_law": 2, "stop_enabled": True}
 SPRING |= {"stop_position": -0.015, **LAW}
-#: Connected by name, whether the pair looks ahead or not; `reaction` goes to `tip_force`.
-BY_NAME = ["tip_displacement", "tip_velocity", "tip_velocity_forecast"]
+#: Connected by name; `reaction` goes to `tip_force`. Without the last two the spring does not predict the tip.
+BY_NAME = ["tip_displacement", "tip_velocity", "tip_velocity_forecast", "tip_response", "tip_response_2"]
 
 WRONG = tomllib.loads(Path(__file__).with_name("values.toml").read_text(encoding="utf-8"))["wrong"]
 STORED = ["kinetic_energy", "potential_energy", "contact_energy"]
@@ -36,28 +36,25 @@ class Pair:
         self.time = 0.0
         self.beam = beam.instance()
         self.spring = spring.instance()
-        self.ahead = {"communication_step": size} if look_ahead else {}
-        self.connected = BY_NAME
+        self.connected = {name: name for name in BY_NAME[: 5 if look_ahead else 3]}
         self.returns = True  # whether `reaction` is connected
 
-    def start(self, **parameters):
+    def start(self, passes=2, **parameters):
         """Parameters of the beam are in `BEAM` or unknown to the spring."""
         of_beam = {n: v for n, v in parameters.items() if n not in self.spring.fmu.variables}
         of_spring = {n: v for n, v in parameters.items() if n not in of_beam}
-        self.beam.enter(**{**BEAM, **self.ahead, **of_beam})
-        if self.ahead:
-            names = ["tip_response", "tip_response_2", "tip_velocity_forecast"]
-            of_spring = {**self.ahead, **dict(zip(names, self.beam.get(*names), strict=True)), **of_spring}
+        self.beam.enter(**{**BEAM, **of_beam})
         self.spring.enter(**{**SPRING, **of_spring})
-        self.exchange()
+        for _ in range(passes):
+            self.exchange()
         for k in (self.beam, self.spring):
             assert k.call("ExitInitializationMode") == 0
         return self
 
     def exchange(self, of_beam=True, of_spring=True):
         force = self.spring.get("reaction")
-        for name in self.connected if of_beam else ():
-            self.spring.set(name, self.beam.get(name))
+        for name, source in self.connected.items() if of_beam else ():
+            self.spring.set(name, self.beam.get(source))
         if of_spring and self.returns:
             self.beam.set("tip_force", force if self.late else self.spring.get("reaction"))
 
@@ -66,13 +63,16 @@ class Pair:
         total = sum(self.beam.get(*names))
         return float(total + sum(self.spring.get(*STORED, "dissipated_energy", "impact_loss")))
 
+    def step(self):
+        for k in (self.beam, self.spring):
+            k.step(self.time, self.size)
+        self.time += self.size
+
     def run(self, end):
         """Rows (time, y, total energy), from the next step on."""
         rows = []
         while self.time < end - self.size / 2:
-            for k in (self.beam, self.spring):
-                k.step(self.time, self.size)
-            self.time += self.size
+            self.step()
             self.exchange()
             rows.append((self.time, self.spring.get("displacement"), self.energy()))
         return np.array(rows).T
@@ -89,9 +89,10 @@ def test_pair_that_looks_ahead_agrees_with_the_master_at_the_same_step(beam, spr
         differences.append(np.abs(y - of_master).max())
         # As good as the master: its own error is 2.3e-4 m at 1 ms, of a motion of 30 mm.
         assert np.abs(y - reference).max() < 1.1 * np.abs(of_master - reference).max()
-    # Same forces but for the first step, whose tip is predicted with an error of order H³ (u_tt grows from 0).
+    # The same forces, but for the first: its tip is interpolated between now and two steps ahead; and of the shorter
+    # step nobody knows before it is made, so its force is that for 1 ms.
     assert differences[0] < 4e-5
-    assert differences[1] < differences[0] / 8
+    assert differences[1] < 6e-5
 
 
 def test_pair_that_looks_ahead_does_not_depend_on_the_order_of_reading(beam, spring):
@@ -116,11 +117,89 @@ def test_pair_that_looks_ahead_does_not_depend_on_the_order_of_reading(beam, spr
 )
 def test_pair_that_looks_ahead_conserves_energy(beam, spring, body, stiffness):
     for size in (1e-3, 4e-3):
-        _, y, energy = Pair(beam, spring, size).start(compliance_stiffness=stiffness, **body).run(0.2)
+        pair = Pair(beam, spring, size).start(compliance_stiffness=stiffness, **body)
+        before = pair.energy()
+        _, y, energy = pair.run(0.2)
         energy += -body.get("external_force", 0.0) * y
-        assert energy[2:] == pytest.approx(energy[2], abs=2e-12)  # IDA's 1e-12, of 1/6 J
-        # The first step, predicted by the mean velocity over two.
-        assert energy[2] == pytest.approx(E0, rel=1e-3 if size == 1e-3 else 1e-2)
+        assert energy == pytest.approx(before, abs=2e-12)  # IDA's 1e-12, of 1/6 J
+
+
+@pytest.mark.parametrize(
+    "sizes",
+    [[1e-3], [3e-4], [1.7e-2], [1e-3, 5e-4], [5e-4, 1e-3], [1e-3, 1.7e-2], [1.7e-2, 1e-3]],
+    ids=str,
+)
+def test_wired_the_pair_keeps_its_energy_at_any_step_size(beam, spring, sizes):
+    """From the first step on, also in contact when the size changes; what the contact then owes it pays back."""
+    for change in (0.02, 0.051, 0.2):
+        pair = Pair(beam, spring, sizes[0]).start()
+        energies = [pair.run(change)[2]]
+        owed = pair.spring.get("contact_energy")
+        pair.size = sizes[-1]
+        energies.append(pair.run(0.4)[2])
+        assert np.concatenate(energies) == pytest.approx(E0, abs=1e-13)
+        assert warnings(pair) == []
+        # Of a size that nobody foresaw, 1e-3 before the first step: a part of the energy is left with the bodies.
+        longest = max(b / a for a, b in zip([1e-3, *sizes], sizes, strict=False))
+        owed = min(owed, pair.spring.get("contact_energy"))
+        assert owed > -1e-12 if longest == 1.0 else owed > -(0.03 if longest < 3.0 else 0.3) * E0
+
+
+def test_a_size_that_changes_is_followed_from_the_step_after(beam, spring):
+    """Both FMUs then are what they would be if all steps had had that size."""
+    names = ["tip_response", "tip_response_2"]
+    expected = {}
+    for size in (1e-3, 3e-4):
+        k = beam.running(**BEAM)
+        k.step(0.0, size)
+        expected[size] = k.get(*names)
+    k = beam.running(**BEAM)
+    assert k.get(*names) == expected[1e-3]  # until then that of DefaultExperiment
+    k.step(0.0, 3e-4)
+    assert k.get(*names) == expected[3e-4]
+    saved = k.serialized()
+    k.step(3e-4, 1e-3)
+    assert k.get(*names) == expected[1e-3]
+    k.restore(k.deserialized(saved))
+    assert k.get(*names) == expected[3e-4]
+    k.step(3e-4, 3e-14)  # nothing is learnt from what rounding leaves
+    assert k.get(*names) == expected[3e-4]
+
+
+def test_a_last_step_that_is_cut_short_costs_no_more_than_its_part(beam, spring):
+    """Of the whole step, the energy that the contact gains or owes; the pair's stays."""
+    whole = Pair(beam, spring, 1e-3).start()
+    short = Pair(beam, spring, 1e-3).start()
+    for pair in (whole, short):
+        pair.run(0.02)
+    before = [pair.spring.get("contact_energy") for pair in (whole, short)]
+    whole.run(0.021)
+    for part in (0.5, 0.1):
+        twin = Pair(beam, spring, 1e-3).start()
+        twin.run(0.02)
+        twin.size = part * 1e-3
+        assert twin.run(0.02 + twin.size)[2] == pytest.approx(E0, abs=1e-13)
+        work = twin.spring.get("reaction") * 1e-3
+        assert abs(twin.spring.get("contact_energy") - before[1]) < part * work
+        assert warnings(twin) == []
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-6])
+def test_four_lines_are_warned_of_where_the_steps_do_not_resolve_the_contact(beam, spring, size):
+    pair = Pair(beam, spring, size, look_ahead=False).start()
+    energy = pair.run(20.0 * size if size > 1e-4 else 2e-3)[2]
+    if size < 1e-4:
+        assert energy == pytest.approx(E0, rel=1e-3)
+        assert warnings(pair) == []
+        return
+    assert energy[-1] > 2.0 * E0
+    (warning,) = warnings(pair)
+    assert "Connect tip_response and tip_response_2" in warning
+    # What is then advised does: of the energy less than 1 % is gained.
+    advised = float(warning.split()[-2])
+    assert advised == pytest.approx(5e-6)
+    again = Pair(beam, spring, advised, look_ahead=False).start()
+    assert again.run(0.02)[2][-1] == pytest.approx(E0, rel=1e-2)
 
 
 def initial_inputs(case):
@@ -143,10 +222,8 @@ def test_the_connections_at_the_start_are_a_loop_that_two_passes_solve(beam, spr
     assert of_beam["tip_mass"] == set()
 
     pair = Pair(beam, spring, 1e-3)
-    pair.beam.enter(**BEAM, **pair.ahead)
-    names = ["tip_response", "tip_response_2"]
-    responses = dict(zip(names, pair.beam.get(*names), strict=True))
-    pair.spring.enter(**SPRING, **pair.ahead, **responses, displacement=1e-3)
+    pair.beam.enter(**BEAM)
+    pair.spring.enter(**SPRING, displacement=1e-3)
     passes = []
     for _ in range(3):
         pair.exchange()
@@ -196,7 +273,6 @@ def test_a_last_step_of_rounding_is_made_under_the_held_force(beam, spring):
     assert pair.spring.get("reaction") == twin.spring.get("reaction")
     pair.time += 3e-14
     assert pair.run(0.1)[1] == pytest.approx(twin.run(0.1)[1], abs=1e-10)  # 1 m/s times the rounding, and its effect
-    assert pair.spring.try_step(pair.time, 2e-9) == 2  # no rounding any more: 2e-6 of the step
     pair.spring.step(pair.time, size * (1 + 1e-9))  # as a tool's times may have it
 
 
@@ -209,14 +285,11 @@ def test_a_wrong_connection_is_warned_of_once(beam, spring, what):
     """One message says what is wrong; the output `warnings` counts the steps that show it."""
     case = WRONG[what]
     pair = Pair(beam, spring, 1e-3)
-    pair.connected = [name for name in BY_NAME if name != case.get("without")]
-    pair.returns = case.get("without") != "reaction"
-    pair.ahead = {"communication_step": case.get("steps_of_beam", 1e-3)}
-    ahead = beam.running(**BEAM, communication_step=case.get("responses_of", 1e-3))
-    responses = ahead.get("tip_response", "tip_response_2")
-    names = case.get("responses_as", ["tip_response", "tip_response_2"])
-    parameters = {"communication_step": 1e-3, **dict(zip(names, responses, strict=True)), **case.get("spring", {})}
-    pair.start(**parameters)
+    pair.connected |= case.get("instead", {})
+    for name in case.get("without", []):
+        pair.connected.pop(name, None)
+    pair.returns = "reaction" not in case.get("without", [])
+    pair.start(**case.get("spring", {}))
     pair.run(0.1)
     (warning,) = warnings(pair)
     assert all(text in warning for text in case["said"])
@@ -226,7 +299,7 @@ def test_a_wrong_connection_is_warned_of_once(beam, spring, what):
 def test_the_first_force_does_not_depend_on_what_was_seen_before(spring):
     forces = []
     for seen in ([0.0], [0.02, 0.0]):
-        k = spring.running(contact_law=2, communication_step=1e-3, tip_response=1e-6, displacement=0.01)
+        k = spring.running(contact_law=2, tip_response=1e-6, displacement=0.01)
         for u in seen:
             k.set("tip_displacement", u)
         forces.append(k.get("reaction"))
@@ -250,21 +323,45 @@ def test_a_tool_that_steps_one_after_the_other_is_warned(beam, spring, first, si
 @pytest.mark.parametrize("version", ["2.0"])
 @pytest.mark.parametrize("load", [0.0, -5.0])
 @pytest.mark.parametrize("body", [{}, {"compliance_exponent": 3.0, "compliance_stiffness": 1e10}], ids=str)
-def test_a_tool_that_passes_start_values_but_forgets_the_first_exchange_is_warned(beam, spring, load, body):
-    """Start values are those of the beam, so that the spring has a force; the beam makes its first step without it.
+def test_a_tool_that_does_not_pass_the_first_force_is_warned(beam, spring, load, body):
+    """The spring has a message before its first step, so a force; the beam makes that step without it.
 
-    From then on all is right. The contact begins with the run or later: then nothing is missed, nor warned of.
+    The third step finds that out, and the energy is again what it was. The contact begins with the run or later: then
+    nothing is missed, nor warned of.
     """
     size = 1e-3
     for begun, start in ((True, 0.0), (False, -3.5 * size)):  # the tip falls at 1 m/s
         pair = Pair(beam, spring, size)
         pair.returns = False
         pair.start(distributed_load=load, **body, displacement=start, unloaded=start)
+        before = pair.energy()
         assert begun == (pair.spring.get("reaction") > 0.0)
         pair.returns = True
-        pair.run(10.0 * size)
+        assert pair.run(10.0 * size)[2][3:] == pytest.approx(before, abs=1e-13)
         assert pair.spring.get("warnings") == begun
         assert [text.count("no values were exchanged before the first step") for text in warnings(pair)] == [1] * begun
+
+
+@pytest.mark.parametrize("late", [True, False])
+def test_a_tool_that_exchanges_nothing_before_the_first_step_keeps_the_energy_and_is_told(
+    beam, spring, late, reference
+):
+    pair = Pair(beam, spring, 1e-3, late=late).start(passes=0)
+    rows = pair.run(0.4)
+    assert rows[2] == pytest.approx(E0, abs=1e-13)
+    assert ["no values were exchanged before the first step" in text for text in warnings(pair)] == [True]
+    # The tip goes on at 1 m/s for two steps, in which the contact would have taken most of that.
+    assert np.abs(at_milliseconds(rows) - reference).max() < 3e-4
+
+
+def test_start_values_replace_a_first_exchange(beam, spring):
+    """As of a tool that exchanges nothing before its first step, but takes start values of inputs."""
+    pair = Pair(beam, spring, 1e-3).start()
+    values = dict(zip(BY_NAME, pair.beam.get(*BY_NAME), strict=True))
+    force = pair.spring.get("reaction")
+    other = Pair(beam, spring, 1e-3).start(passes=0, tip_force=force, **values)
+    assert np.array_equal(other.run(0.1), pair.run(0.1))
+    assert warnings(other) == []
 
 
 @pytest.mark.parametrize("version", ["2.0"])
@@ -273,17 +370,16 @@ def test_a_tool_that_passes_start_values_but_forgets_the_first_exchange_is_warne
     "load", [lambda t: 0.0, lambda t: -300.0 * (t > 0.05), lambda t: -3.0 * np.sin(40 * t)], ids=["none", "jump", "sin"]
 )
 def test_a_right_pair_is_not_warned_of_its_loads(beam, spring, load, slope):
-    for ahead in (True, False):
-        pair = Pair(beam, spring, 1e-3 if ahead else 1e-4, look_ahead=ahead).start(initial_velocity_slope=slope)
-        for i in range(100):
-            pair.beam.set("distributed_load", load(i * pair.size))
-            pair.run(pair.time + pair.size)
-        assert warnings(pair) == []
-        assert [k.get("warnings") for k in (pair.beam, pair.spring)] == [0, 0]
+    pair = Pair(beam, spring, 1e-3).start(initial_velocity_slope=slope)
+    for i in range(100):
+        pair.beam.set("distributed_load", load(i * pair.size))
+        pair.run(pair.time + pair.size)
+    assert warnings(pair) == []
+    assert [k.get("warnings") for k in (pair.beam, pair.spring)] == [0, 0]
 
 
 @pytest.mark.parametrize("version", ["2.0"])
-@pytest.mark.parametrize("size", [1e-3, 1e-2, 0.1, 0.2])
+@pytest.mark.parametrize("size", [1e-3, 1e-2, 0.1])
 @pytest.mark.parametrize("bend", [0.01, 1.0, -0.1])
 def test_a_right_pair_is_not_warned_of_a_beam_that_turns_in_the_first_step(beam, spring, size, bend):
     """A bent beam is released: the mean velocity over two steps, which stands for that of the first, is far from it."""
@@ -293,10 +389,24 @@ def test_a_right_pair_is_not_warned_of_a_beam_that_turns_in_the_first_step(beam,
     assert warnings(pair) == []
 
 
+#: A light top on a coarse beam, in steps that are long beside the waves in it.
+LIGHT = {"mass": 0.01, "linear_stiffness": 1.0, "compliance_stiffness": 100.0, "compliance_exponent": 1.0}
+
+
+@pytest.mark.parametrize("version", ["2.0"])
+@pytest.mark.parametrize("size", [0.1, 0.5])
+@pytest.mark.parametrize("slope", [-1.0, -0.1, 0.3])
+def test_a_right_pair_is_not_warned_of_a_first_step_that_was_a_guess(beam, spring, size, slope):
+    pair = Pair(beam, spring, size).start(n_elements=4, initial_velocity_slope=slope, **LIGHT)
+    pair.run(20.0 * size)
+    assert warnings(pair) == []
+
+
 def test_ssp_says_what_the_scene_and_the_beam_say(fmu_folder, beam):
     scene = springbeam.load_scene("soft")
     with zipfile.ZipFile(fmu_folder / "spring_beam.ssp") as archive:
         root = ET.fromstring(archive.read("resources/soft.ssv"))
+        structure = ET.fromstring(archive.read("SystemStructure.ssd"))
         for name in ("beam", "spring"):
             assert archive.read(f"resources/{name}.fmu") == (fmu_folder / f"{name}.fmu").read_bytes()
     parameters = {p.get("name"): p[0].get("value") for p in root.iter() if p.tag.endswith("}Parameter")}
@@ -307,10 +417,13 @@ def test_ssp_says_what_the_scene_and_the_beam_say(fmu_folder, beam):
         "spring": ("linear_stiffness", "cubic_stiffness"),
     }.items():
         assert [found[f"{body}.{key}"] for key in keys] == [getattr(getattr(scene, body), key) for key in keys]
-    k = beam.running(**{name.split(".")[1]: value for name, value in found.items() if name.startswith("beam.")})
-    for name in ("tip_response", "tip_response_2", "tip_velocity_forecast"):
-        assert found[f"spring.{name}"] == pytest.approx(k.get(name), rel=1e-12)
-    assert found["spring.communication_step"] == found["beam.communication_step"]
+    lines = {
+        (c.get("startElement"), c.get("startConnector"), c.get("endElement"), c.get("endConnector"))
+        for c in structure.iter()
+        if c.tag.endswith("}Connection")
+    }
+    assert lines == {("beam", n, "spring", n) for n in BY_NAME} | {("spring", "reaction", "beam", "tip_force")}
+    assert any(e.tag.endswith("}FixedStepMaster") for e in structure.iter())  # OMSimulator imports no file without it
 
 
 def test_ssp_in_fmpy(fmu_folder, reference, capfd):
@@ -319,7 +432,7 @@ def test_ssp_in_fmpy(fmu_folder, reference, capfd):
     result = simulate_ssp(
         path, stop_time=0.4 - size / 2, step_size=size, parameter_set=read_ssv(path, "resources/soft.ssv")
     )
-    # FMPy passes nothing on before its first step, which the tip makes without a force (energy + 7.5 %).
+    # FMPy passes nothing on before its first step: the tip makes two without a force.
     assert len(result) == 400
     assert "no values were exchanged before the first step" in "".join(capfd.readouterr())
-    assert np.abs(result["spring.displacement"] - reference).max() < 2e-4
+    assert np.abs(result["spring.displacement"] - reference).max() < 3e-4

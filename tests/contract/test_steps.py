@@ -42,7 +42,7 @@ def test_no_step_past_the_stop_time_nor_from_another_time(case):
     assert "past the stop time 0.3" in k.message
 
 
-AHEAD = {"contact_law": 2, "communication_step": 1e-3, "tip_response": 1e-4}
+AHEAD = {"contact_law": 2, "tip_response": 1e-4}
 VALUES = tomllib.loads(Path(__file__).with_name("values.toml").read_text(encoding="utf-8"))
 
 
@@ -65,7 +65,7 @@ def test_after_any_refusal_a_master_goes_on(loaded, step):
     assert k.get("warnings") == told + 1  # in the results, where messages are hidden
     # Nothing was done: the last time that holds is the start of the step.
     assert k.reached() == 1e-3
-    assert k.ends() is (name == "beam" or "communication_step" in parameters)  # where no step size helps
+    assert k.ends() is (name == "beam")  # where no step size helps
     if size != smaller:  # the inputs are still there
         k.step(k.reached(), smaller)
         assert k.outputs() != before
@@ -95,7 +95,7 @@ def test_a_step_that_fails_twice_alike_ends_the_simulation(spring):
 @pytest.mark.parametrize("start", [0.0, 7e4])
 def test_steps_of_the_communication_step_are_made_at_late_times(spring, start):
     """A time of 7e4 s is rounded by 7e-12 s, 1e-6 of a step of 1e-5 s."""
-    k = spring.running(**AHEAD | {"communication_step": 1e-5}, start_time=start)
+    k = spring.running(**AHEAD, start_time=start)
     times = start + 1e-5 * np.arange(2000)
     for time, size in zip(times, np.diff(times), strict=False):
         k.step(time, size)
@@ -143,9 +143,8 @@ def advance(case, k, time, steps, impulse):
 
 def test_the_bytes_of_a_state_are_all_that_another_instance_needs(case):
     """tests/fuzz repeats steps from their states."""
-    values = {"beam": {"communication_step": 1e-3}, "spring": {}}[case.name]
-    k = case.moving(**values)
-    twin = case.moving(**values)
+    k = case.moving()
+    twin = case.moving()
     fresh = case.instance()
     for one in (k, twin):
         told = advance(case, one, 0.0, 3, 0.2)[-1]

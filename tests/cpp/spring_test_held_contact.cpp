@@ -5,8 +5,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
-#include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -46,9 +44,14 @@ struct Collision {
   TipMessage seen;
 
   Collision(const Compliance& law, double gap, double H)
-      : tip{m_tip, gap, v}, top{m_top, 0.0, 0.0}, H(H), contact(law, m_top, H, response(m_tip, H)) {
-    seen = {tip.x, tip.v};
-    contact.begin(seen, true, top.x, predict());
+      : tip{m_tip, gap, v}, top{m_top, 0.0, 0.0}, H(H), contact(law, m_top) {
+    seen = message(H);
+    contact.begin(seen, H, top.x, predict());
+  }
+  /// A free mass has the velocity ahead that it has now.
+  TipMessage message(double size) const {
+    const auto [r1, r2] = response(m_tip, size);
+    return {tip.x, tip.v, tip.v, r1, r2};
   }
   HeldContact::Top predict() const {
     return [top = top, H = H](double force) mutable {
@@ -61,11 +64,12 @@ struct Collision {
     const double force = contact.force();
     tip.step(H, force);
     top.step(H, -force);
-    contact.advance(seen, top.x, predict());
-    seen = {tip.x, tip.v};  // a free mass has the velocity ahead that it has now
+    contact.advance(seen, H, top.x, predict());
+    seen = message(H);
   }
+  /// With the tip as it arrives.
   double energy() const {
-    return 0.5 * tip.mass * tip.v * tip.v + 0.5 * top.mass * top.v * top.v + contact.energy(top.x);
+    return 0.5 * tip.mass * tip.v * tip.v + 0.5 * top.mass * top.v * top.v + contact.energy(top.x, tip.x);
   }
 };
 
@@ -146,26 +150,76 @@ TEST(HeldContact, DampingIsBookedAtAnyStepAndRightAtSmallOnes) {
   EXPECT_NEAR(errors[1] / errors[2], 4.0, 1.0);
 }
 
-// A tool with nothing to pass on before its first step sends zeros, and no force to the beam either.
-TEST(HeldContact, ZerosBeforeTheFirstStepAreNoMessage) {
-  const double H = 1e-3;
-  Collision told(Compliance(1e6, 1.5), 0.0, H);
-  EXPECT_GT(told.contact.force(), 0.0);
-  Collision untold = told;
-  untold.contact.begin({0.0, 0.0}, false, 0.0, untold.predict());
-  EXPECT_TRUE(untold.contact.unanswered({0.0, 0.0}));
-  EXPECT_FALSE(untold.contact.unanswered(told.seen));
-  untold.seen = {0.0, 0.0};
-  EXPECT_EQ(untold.contact.force(), 0.0);
-  untold.step();
-  EXPECT_EQ(untold.top.v, 0.0);
-  EXPECT_NEAR(untold.contact.state().tip, H * v, 1e-18);
-  // From then on energy is conserved: what came in is the work that the force of the first step did not do.
-  const double after = untold.energy();
-  EXPECT_NEAR(after, 0.5 * m_tip * v * v + Compliance(1e6, 1.5).energy(-H * v), 1e-14);
-  for (int i = 0; i < 10; ++i) {
-    untold.step();
-    EXPECT_NEAR(untold.energy(), after, 1e-12 * after);
+// Steps of a size that nobody has announced: forces have done other work than the law's. The energy of the pair, with
+// what the contact owes, stays to rounding; and two steps after a single change nothing is owed any more.
+TEST(HeldContact, EnergyStaysWhereTheStepSizeChanges) {
+  for (const double chi : {0.0, 0.7}) {
+    for (const double factor : {0.05, 0.5, 0.9, 1.1, 2.0, 20.0}) {
+      for (int change = 1; change < 6; ++change) {
+        const double H = 2e-4;
+        Collision c(Compliance(1e6, 1.5, chi), -0.37 * H * v, H);
+        const double before = c.energy(), all = 0.5 * m_tip * v * v;
+        int steps = 0;
+        for (double lost = 0.0; steps < 10 || c.contact.force() > 0.0; ++steps) {
+          ASSERT_LT(steps, 1000);
+          if (steps == change) c.H = factor * H;
+          c.step();
+          EXPECT_GE(c.contact.dissipated(), lost);
+          lost = c.contact.dissipated();
+          EXPECT_NEAR(c.energy() + lost, before, 1e-13 * all) << factor << ' ' << change << ' ' << steps;
+        }
+        const bool alike = 0.5 <= factor && factor <= 2.0;
+        if (chi == 0.0 && alike) EXPECT_NEAR(c.contact.state().debt, 0.0, 0.2 * all) << factor << ' ' << change;
+      }
+    }
+  }
+}
+
+// The same with another size in each step.
+TEST(HeldContact, EnergyStaysWhereTheStepSizeAlwaysChanges) {
+  Collision c(Compliance(1e6, 1.5), 0.0, 2e-4);
+  const double before = c.energy();
+  for (int i = 0; i < 200; ++i) {
+    c.H = 2e-4 * (1.0 + 0.5 * std::sin(i));
+    c.step();
+    EXPECT_NEAR(c.energy(), before, 1e-13) << i;
+  }
+}
+
+// A tool with nothing to pass on before its first step: the tip makes that and the next one under the force that was
+// sent without a message, 0. What the contact has not taken from the bodies it owes, and takes then.
+TEST(HeldContact, WithoutAMessageAtTheStartTheEnergyStays) {
+  const double H = 1e-4, before = 0.5 * m_tip * v * v;
+  Collision c(Compliance(1e6, 1.5), 0.0, H);
+  c.tip.step(H, 0.0);
+  c.contact.take_over(0.0, H, c.top.x, 0.0);
+  c.seen = c.message(H);
+  EXPECT_TRUE(c.contact.held());
+  EXPECT_FALSE(c.contact.started());
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_NEAR(c.energy(), before, 1e-13 * before) << i;
+    c.step();
+  }
+  EXPECT_GT(c.tip.v, 0.0);
+  EXPECT_NEAR(c.contact.state().debt, 0.0, 1e-13 * before);
+}
+
+// The tip alone has made the first step without the force: that shows in the third, and from then on the energy is
+// again what it was.
+TEST(HeldContact, AFirstForceThatTheTipDidNotMeetIsFoundOut) {
+  Collision c(Compliance(1e6, 1.5), 0.0, 1e-4);
+  const double before = c.energy(), force = c.contact.force();
+  c.step();
+  c.tip.x -= c.H * c.H * force / (2.0 * m_tip);
+  c.tip.v -= c.H * force / m_tip;
+  c.seen = c.message(c.H);
+  EXPECT_FALSE(c.contact.first_force_missed(c.seen));
+  c.step();
+  EXPECT_TRUE(c.contact.first_force_missed(c.seen));
+  for (int i = 0; i < 20; ++i) {
+    c.step();
+    EXPECT_FALSE(c.contact.first_force_missed(c.seen));
+    EXPECT_NEAR(c.energy(), before, 1e-13 * before) << i;
   }
 }
 
@@ -190,12 +244,15 @@ TEST(HeldContact, EnergyIsConservedThroughImpactsOfTheTop) {
       return y;
     };
   };
-  HeldContact contact(Compliance(1e7, 1.5), p.mass, H, response(m_tip, H));
-  const double g = 5.0;  // presses the tip down: it comes again and again
-  const auto ahead = [&] { return TipMessage{tip.x, tip.v - g * H}; };  // u(t+2H) = u + 2H (v − gH)
+  HeldContact contact(Compliance(1e7, 1.5), p.mass);
+  const double g = 5.0;     // presses the tip down: it comes again and again
+  const auto ahead = [&] {  // u(t+2H) = u + 2H (v − gH)
+    const auto [r1, r2] = response(m_tip, H);
+    return TipMessage{tip.x, tip.v, tip.v - g * H, r1, r2};
+  };
   TipMessage seen = ahead();
-  contact.begin(seen, true, 0.0, predict());
-  double before = 0.0, impulses = 0.0;
+  contact.begin(seen, H, 0.0, predict());
+  double impulses = 0.0;
   for (int i = 0; i < 100; ++i) {
     spring::Inputs inputs;
     inputs.contact_force[0] = contact.force();
@@ -204,14 +261,11 @@ TEST(HeldContact, EnergyIsConservedThroughImpactsOfTheTop) {
     tip.x -= g * H * H / 2;
     top.step(H, inputs);
     impulses += top.stop_impulse();
-    contact.advance(seen, top.displacement(), predict());
+    contact.advance(seen, H, top.displacement(), predict());
     seen = ahead();
     const double energy = 0.5 * tip.mass * tip.v * tip.v + tip.mass * g * tip.x + top.kinetic_energy() +
-                          top.potential_energy() + contact.energy(top.displacement());
-    if (i == 1) before = energy;  // the first step is predicted by the mean velocity over two
-    if (i > 1) {
-      EXPECT_NEAR(energy, before, 1e-11 * 0.5 * m_tip * v * v) << i;
-    }
+                          top.potential_energy() + contact.energy(top.displacement(), tip.x);
+    EXPECT_NEAR(energy, 0.5 * m_tip * v * v, 1e-11 * 0.5 * m_tip * v * v) << i;
   }
   EXPECT_GT(impulses, 0.0);
 }
@@ -224,10 +278,10 @@ TEST(HeldContact, WhereTheTopGoesMayBeUnknown) {
   EXPECT_GT(force, 0.0);
   Collision limited(Compliance(1e6, 1.5), 0.5, 1e-3);
   EXPECT_EQ(limited.contact.force(), 0.0);
-  limited.contact.begin(c.seen, true, 0.0,
+  limited.contact.begin(c.seen, c.H, 0.0,
                         [top = c.predict(), force](double C) { return C > 1.01 * force ? unknown : top(C); });
   EXPECT_NEAR(limited.contact.force(), force, 1e-12 * force);
-  c.contact.advance(c.seen, c.top.x, [](double) { return unknown; });
+  c.contact.advance(c.seen, c.H, c.top.x, [](double) { return unknown; });
   EXPECT_FALSE(std::isfinite(c.contact.force()));
 }
 
@@ -241,11 +295,11 @@ TEST(HeldContact, AForceTakesTwoTrials) {
     c.tip.step(c.H, force);
     c.top.step(c.H, -force);
     trials = 0;
-    c.contact.advance(c.seen, c.top.x, [&trials, top = c.predict()](double C) {
+    c.contact.advance(c.seen, c.H, c.top.x, [&trials, top = c.predict()](double C) {
       ++trials;
       return top(C);
     });
-    c.seen = {c.tip.x, c.tip.v};
+    c.seen = c.message(c.H);
     touching += c.contact.force() > 0.0;
     EXPECT_LE(trials, c.contact.force() > 0.0 ? 2 : 1);
   }
@@ -259,7 +313,7 @@ TEST(HeldContact, EnergyIsConservedOnAStiffSpring) {
     p.linear_stiffness = 1e4;
     p.displacement = 0.02;
     spring::Spring top(p);
-    const TipMessage seen{1e-4, 0.0};
+    const TipMessage seen{1e-4, 0.0, 0.0, 1e-12, 1e-12};
     long trials = 0;
     const auto predict = [&] {
       const spring::Spring::State state = top.state();
@@ -273,18 +327,18 @@ TEST(HeldContact, EnergyIsConservedOnAStiffSpring) {
         return y;
       };
     };
-    HeldContact contact(Compliance(1e4, 1.0), p.mass, H, {1e-12, 1e-12});
+    HeldContact contact(Compliance(1e4, 1.0), p.mass);
     const auto energy = [&] {
       return top.kinetic_energy() + top.potential_energy() + contact.energy(top.displacement());
     };
-    contact.begin(seen, true, top.displacement(), predict());
+    contact.begin(seen, H, top.displacement(), predict());
     const double before = energy();
     const int steps = omegaH < 10.0 ? 100 : 10;
     for (int i = 0; i < steps; ++i) {
       spring::Inputs inputs;
       inputs.contact_force[0] = contact.force();
       top.step(H, inputs);
-      contact.advance(seen, top.displacement(), predict());
+      contact.advance(seen, H, top.displacement(), predict());
       EXPECT_NEAR(energy(), before, 1e-7 * before) << omegaH;  // IDA's over 100 … 1000 rad
     }
     EXPECT_LT(trials, 9 * (steps + 1)) << omegaH;
@@ -294,10 +348,10 @@ TEST(HeldContact, EnergyIsConservedOnAStiffSpring) {
 TEST(HeldContact, AForceOutOfRangeIsNoForce) {
   Collision c(Compliance(1e6, 1.5), 0.0, 1e-3);
   const double force = c.contact.force();
-  c.contact.begin({-1e300, 0.0}, true, 0.0, c.predict());
+  c.contact.begin({-1e300, 0.0, 0.0, 1e-6, 0.0}, c.H, 0.0, c.predict());
   EXPECT_FALSE(std::isfinite(c.contact.force()));
   const auto state = c.contact.state();
-  c.contact.begin(c.seen, true, 0.0, c.predict());
+  c.contact.begin(c.seen, c.H, 0.0, c.predict());
   EXPECT_NEAR(c.contact.force(), force, 1e-12 * force);
   c.contact.restore(state);
   EXPECT_EQ(numbers(c.contact.state()), numbers(state));
@@ -305,7 +359,7 @@ TEST(HeldContact, AForceOutOfRangeIsNoForce) {
 
 TEST(HeldContact, ATipThatLeavesTheRangeIsNoForce) {
   Collision c(Compliance(1e6, 1.5), 0.0, 1e3);
-  c.contact.begin({1e300, 1e306}, true, 0.0, c.predict());
+  c.contact.begin({1e300, 0.0, 1e306, 1e-6, 0.0}, c.H, 0.0, c.predict());
   EXPECT_FALSE(std::isfinite(c.contact.force()));
 }
 
@@ -324,14 +378,4 @@ TEST(HeldContact, ARestoredStateGoesOnBitByBit) {
     EXPECT_EQ(numbers(c.contact.state()), numbers(other.contact.state()));
   }
   EXPECT_GT(c.tip.v, 0.0);  // the collision was among these steps
-}
-
-TEST(HeldContact, ATipThatDoesNotYieldIsNamed) {
-  EXPECT_NO_THROW(HeldContact(Compliance(1e6, 1.5), 1.0, 1e-3, {1e-4, -1e-4}));
-  try {
-    HeldContact(Compliance(1e6, 1.5), 1.0, 1e-3, {0.0, 1e-4});
-    ADD_FAILURE();
-  } catch (const std::invalid_argument& e) {
-    EXPECT_NE(std::string(e.what()).find("tip_response = 0: must be > 0"), std::string::npos);
-  }
 }
