@@ -9,6 +9,7 @@ from .lazily import attached
 if TYPE_CHECKING:
     __version__: str
     from .api import RunStopped, Simulation, Trajectory, load, simulate
+    from .api_studies import converge, crosscheck, fit, sweep
     from .bodies.elements import MovingWall, PointMass, RigidWall, SpringDamper
     from .bodies.protocol import Body, Energies, Motion
     from .motion.events import Event
@@ -20,6 +21,7 @@ else:
         __name__,
         {
             "api": ("RunStopped", "Simulation", "Trajectory", "load", "simulate"),
+            "api_studies": ("converge", "crosscheck", "fit", "sweep"),
             "bodies.elements": ("MovingWall", "PointMass", "RigidWall", "SpringDamper"),
             "bodies.protocol": ("Body", "Energies", "Motion"),
             "motion.events": ("Event",),
@@ -51,9 +53,13 @@ __all__ = [
     "Stop",
     "Trajectory",
     "__version__",
+    "converge",
+    "crosscheck",
+    "fit",
     "load",
     "load_scene",
     "simulate",
+    "sweep",
     "with_changes",
 ]
 

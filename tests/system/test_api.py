@@ -218,3 +218,33 @@ def test_a_run_is_drawn_into_axes_of_the_callers():
     assert np.allclose(lines["spring top y"].get_ydata().min() / run.y.min(), 1e3)  # in mm
     with pytest.raises(ValueError, match="no picture 'moments' for axes"):
         run.plot("moments", ax=ax)
+
+
+def test_a_study_from_python_is_that_of_its_command(here):
+    pandas = pytest.importorskip("pandas")
+    seen = []
+    vary = {"spring.mass": [1, 2.5], "time.t_end": [0.01]}
+    found = springbeam.sweep("soft", vary, ["u_tip_min"], directory="kept", progress=seen.append)
+    printed("sweep", "soft", "--vary=spring.mass=1,2.5", "--vary=time.t_end=0.01", "--metric=u_tip_min", "--out=by",
+            "--workers=1", "--no-plots")  # fmt: skip
+    rows = pandas.read_csv("by/sweep.csv")
+    assert found.table["u_tip_min"].tolist() == rows["u_tip_min"].tolist()
+    assert (seen, found.ok, repr(found).splitlines()[0]) == ([1, 2], True, "runs      2 done")
+    again = springbeam.sweep("soft", vary, ["u_tip_min"], directory="kept", progress=seen.append)
+    assert (len(seen), again.table.equals(found.table)) == (2, True)  # nothing was computed again
+    assert "spring.mass" in found.plot().axes[0].get_xlabel()
+    with pytest.raises(SceneError, match=r"vary spring\.masss=1: "):
+        springbeam.sweep("soft", {"spring.masss": [1]})
+
+
+def test_other_studies_from_python(tmp_path):
+    scene = with_changes(SOFT, {"time.t_end": 0.02, "beam.n_elements": 4})
+    checked = springbeam.crosscheck(scene)
+    assert (checked.ok, checked.document["verdict"]) == (True, "agrees")
+    settled = springbeam.converge(scene, ["u_tip_end"], levels=3)
+    assert list(settled.document) == ["elements", "modes"]
+    run = simulate(scene)
+    np.savetxt(tmp_path / "y.csv", np.column_stack([run.time, run.y])[::4], delimiter=",", header="time,y", comments="")
+    fitted = springbeam.fit(scene, tmp_path / "y.csv", {"spring.linear_stiffness": "1:9"}, shift=0.0)
+    (key,) = fitted.document["keys"]
+    assert (key["key"], key["value"]) == ("spring.linear_stiffness", pytest.approx(3.0, rel=1e-4))

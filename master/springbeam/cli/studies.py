@@ -158,7 +158,7 @@ def carry_out(study: Study, scene: str | None, frame: Frame) -> Findings:
     with _going_on(records, study):
         computed = _computed(study, records, frame)
         found = study.findings(computed).written(records.path.parent, pictures=not frame.no_plots)
-    return replace(found, shown=[*study.remarks, *found.shown, *troubles(computed)])
+    return found.with_lines(study.remarks, troubles(computed))
 
 
 def _opened(study: Study, default: str, frame: Frame) -> Records:

@@ -5,14 +5,21 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from io import BytesIO
+from io import BytesIO, StringIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
 _DPI = 110
+#: Of printed findings [characters].
+_WIDTH = 120
 
 #: Columns of a row by name.
 Row = dict[str, Any]
@@ -24,9 +31,9 @@ def unseen() -> None:
     """Do nothing when a part is done: nobody watches."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Findings:
-    """The findings of a command or a study."""
+    """The findings of a command or a study; printed, they are what the command prints."""
 
     document: Any = None  #: for programs (``--json``)
     shown: Sequence[Any] = ()  #: tables and lines for a terminal
@@ -39,6 +46,39 @@ class Findings:
     tables: Mapping[str, Sequence[Row]] = field(default_factory=dict)
     texts: Mapping[str, str] = field(default_factory=dict)
     pictures: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
+
+    def with_lines(self, before: Sequence[str], after: Sequence[str]) -> Findings:
+        """Return the findings with more lines to show."""
+        return replace(self, shown=[*before, *self.shown, *after])
+
+    @property
+    def ok(self) -> bool:
+        """Whether the command would end with the exit code 0."""
+        return self.code == 0
+
+    @property
+    def table(self) -> DataFrame | Sequence[Row]:
+        """The first of `tables`, as a pandas DataFrame where pandas is installed."""
+        rows = next(iter(self.tables.values()), ())
+        try:
+            from pandas import DataFrame
+        except ImportError:
+            return rows
+        return DataFrame(rows)
+
+    def plot(self) -> Figure:
+        """Return the first of `pictures` as a matplotlib Figure. Raises ValueError if there is none."""
+        for draw in self.pictures.values():
+            figure: Figure = draw()
+            return figure
+        raise ValueError("there is nothing to draw")
+
+    def __repr__(self) -> str:
+        console = Console(file=StringIO(), width=_WIDTH, color_system=None)
+        for part in self.shown:
+            console.print(part, highlight=False, soft_wrap=True)
+        text: str = console.file.getvalue()  # type: ignore[attr-defined]
+        return text.rstrip()
 
     def written(self, directory: Path, *, pictures: bool) -> Findings:
         """Write tables, texts, and with ``pictures`` these into ``directory``; return the findings with the files."""
