@@ -1,7 +1,7 @@
 """Simple partners that need no FMU: a free mass, a mass on a linear spring and damper, an end that moves as given.
 
 They fit in either place. Each step of a mass is exact: the state with the polynomial force and the integrals is one
-linear system, s = (x, ẋ, F, Ḟ, F̈, ∫x, ∫∫x), ṡ = A s, stepped by exp(A H). Dissipation is the work of the forces
+linear system, s = (x, ẋ, F, Ḟ, F̈, ∫x, ∫∫x), ṡ = A s, stepped by exp(A H) s = s + A H φ₁(A H) s. Dissipation is the work of the forces
 minus the stored energy.
 """
 
@@ -105,7 +105,8 @@ class SpringDamper(EndLoaded):
         at_end = value((forces[0], forces[1], forces[2]), size)
         forces[0] += self._load + self._stiffness * self._rest
         start = np.array([*before[:2], *forces, 0.0, 0.0])
-        end = Motion(*(self._maps(size) @ start).tolist())
+        dx, dv, once, twice = (self._maps(size) @ start).tolist()
+        end = Motion(before.displacement + dx, before.velocity + dv, once, twice)
         if self.damping > 0.0:
             forces[0] -= self._stiffness * self._rest
             work = work_on((forces[0], forces[1], forces[2]), before, end, size)
@@ -114,14 +115,18 @@ class SpringDamper(EndLoaded):
         return end
 
     def _map(self, size: float) -> np.ndarray:
-        """Return the rows of exp(A H) of x, ẋ, ∫x, ∫∫x, shape (4, 7)."""
+        """Return the rows of exp(A H) − 1 = A H φ₁(A H) of x, ẋ, ∫x, ∫∫x, shape (4, 7).
+
+        Increments, because the rounding of exp(A H) itself would be the same error in each of many short steps.
+        """
         from scipy.linalg import expm  # takes a tenth of a second to load: only for such a body
 
         A = np.zeros((7, 7))
         A[0, 1] = A[2, 3] = A[3, 4] = A[5, 0] = A[6, 5] = 1.0
         A[1, :3] = -self._stiffness / self.mass, -self.damping / self.mass, 1.0 / self.mass
-        rows: np.ndarray = expm(A * size)[[0, 1, 5, 6]]
-        return rows
+        both = np.block([[A * size, np.eye(7)], [np.zeros((7, 14))]])
+        increments: np.ndarray = (A * size @ expm(both)[:7, 7:])[[0, 1, 5, 6]]
+        return increments
 
     def stiffness(self, displacement: Any) -> float:
         return self._stiffness

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from typing import Literal, NamedTuple
 
 from ..bodies.protocol import Ends
@@ -141,7 +142,7 @@ class Automaton:
         if not ties(self._interface):
             tied = self._interface.lasting
         elif self._is_at_equilibrium(at):
-            tied = common < 0.0 or (common == 0.0 and not self._rises_from_rest())
+            tied = common < 0.0 or (common == 0.0 and not self._stays_at_equilibrium())
         else:
             tied = low.displacement < self._interface.equilibrium
         # A top that stands on the foundation is driven into it, and strikes it at once; not by a tip without mass or at
@@ -205,12 +206,12 @@ class Automaton:
         psi = self._interface.equilibrium
         return abs(low.displacement - psi) <= 4.0 * at.together + 1e-12 * abs(psi)
 
-    def _rises_from_rest(self) -> bool:
-        """Whether a massless tip and the lower end, at rest together at Ψ, are pushed up."""
+    def _stays_at_equilibrium(self) -> bool:
+        """Whether ends at rest together at Ψ do not go below it: on a wall, or a massless tip is pushed up."""
         tip = self._interface.upper
         low = self._interface.lower
         psi = self._interface.equilibrium
-        return tip.massless and tip.holding_force(psi, 0.0) + low.holding_force(psi, 0.0) < 0.0
+        return low.mass == inf or (tip.massless and tip.holding_force(psi, 0.0) + low.holding_force(psi, 0.0) < 0.0)
 
     def _parting(self, held: Phase, at: Instant) -> Impact:
         """Return the impact that gives ends their common velocity, if those of steps differ by more than rounding.

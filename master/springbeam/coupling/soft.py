@@ -71,32 +71,33 @@ class SoftSolver(Booked, StepSolver):
     def aim(self, gap: Vector, a: Vector, descent: Matrix, size: float, start: Ends) -> Aim:
         tip, low = start
         x = list(map(neg, gap))
-        step = (low.displacement - tip.displacement, size, x, a, descent)
+        data = (low.displacement - tip.displacement, size, x, a, descent)
         last_size, flexibility = self.state.last_crossing
         found = None
         try:
             if self.degree > 0 and size == last_size:  # at degree 0 the law's slope costs no more than a third force
-                found = self._newton(*step, flexibility)
-            found = found or self._newton(*step) or self._stiffened(*step)
+                found = self._newton(*data, flexibility)
+            found = found or self._newton(*data) or self._stiffened(*data)
         except np.linalg.LinAlgError:
             pass
         if found is None:
             raise NotConverged(max(map(abs, x)), _MAX_NEWTON)
-        x, better = found
-        return list(map(neg, x)), list(map(sub, better, a)), better
+        moved, step = found
+        return list(map(neg, map(add, x, moved))), step, list(map(add, a, step))
 
     def _newton(
         self, start: float, size: float, x: Vector, a: Vector, descent: Matrix, flexibility: Matrix | None = None
     ) -> tuple[Vector, Vector] | None:
-        """Return the x and A(x) that law and bodies have in common, ``None`` if they are not found.
+        """Return by how much x and force are to change to where law and bodies meet, ``None`` if that is not found.
 
         Damped Newton iteration from ``x``, where the bodies are under ``a``, a correction being accepted where the next
         one would be shorter; the slope of the law is kept where that is much shorter (Deuflhard 2004, section 2.1).
-        ``descent`` is −E, ``flexibility`` a guess of (E + A′)⁻¹, good if it makes corrections shrink as much. Raises
-        numpy.linalg.LinAlgError.
+        ``descent`` is −E, ``flexibility`` a guess of (E + A′)⁻¹, good if it makes corrections shrink as much. The
+        unknown is the change of x: in a short step it is less than the rounding of x, and what it does to the force is
+        not. Raises numpy.linalg.LinAlgError.
         """
         force = self._projection.force
-        under_a = x
+        moved = [0.0] * len(x)
         of_law = force(start, size, x)
         missing = list(map(sub, a, of_law))  # −f
         guessed = flexibility is not None
@@ -107,30 +108,31 @@ class SoftSolver(Booked, StepSolver):
         for _ in range(_MAX_NEWTON):
             share = 1.0
             for _ in range(_MAX_DAMPING):
-                tried = list(map(add, x, change if share == 1.0 else [share * step for step in change]))
-                of_law = force(start, size, tried)
-                moved = times(descent, list(map(sub, tried, under_a)))
-                missing = [m - new + old for m, new, old in zip(moved, of_law, a, strict=True)]
+                tried = list(map(add, moved, change if share == 1.0 else [share * step for step in change]))
+                there = list(map(add, x, tried))
+                of_law = force(start, size, there)
+                pushed = times(descent, tried)
+                missing = [old + new - law for old, new, law in zip(a, pushed, of_law, strict=True)]
                 following = times(flexibility, missing)
                 left = max(map(abs, following))
-                scale = max(abs(start), *map(abs, tried))
-                if left <= (1.0 - 0.25 * share) * length or length <= _ROUNDING * scale:
+                scale = max(abs(start), *map(abs, there))
+                rounded = length <= _ROUNDING * scale
+                if left <= (1.0 - 0.25 * share) * length or rounded:
                     break
                 share *= 0.5
             else:
                 return None
-            x = tried
+            moved = tried
             slow = left > _SLOW * length
-            settled = left * left <= _SETTLED * scale * length or length <= _ROUNDING * scale
-            if settled and not (guessed and slow):
+            push = times(descent, following)
+            # The correction after the next would be left²/length, in position and in force.
+            exact = left * left <= _SETTLED * scale * length
+            exact &= left * max(map(abs, push)) <= _SETTLED * length * max(map(abs, [*of_law, *a]))
+            if (exact and not (guessed and slow)) or (rounded and left >= 0.5 * length):
                 self.state.last_crossing = (size, flexibility)
-                # The correction after the next would be left²/length; its force follows from the law's slope.
-                change = times(descent, following)
-                return list(map(add, x, following)), [
-                    c + m + d for c, m, d in zip(of_law, missing, change, strict=True)
-                ]
+                return list(map(add, moved, following)), list(map(add, pushed, push))
             if slow:
-                flexibility = self._flexibility(start, size, x, of_law, descent)
+                flexibility = self._flexibility(start, size, there, of_law, descent)
                 guessed = False
                 following = times(flexibility, missing)
                 left = max(map(abs, following))
@@ -149,16 +151,19 @@ class SoftSolver(Booked, StepSolver):
 
         The law softened by a factor s has its crossing where the law itself has one with E/s and a/s.
         """
-        x = list(map(sub, x, times(inverse(descent), a)))
-        a = [0.0] * len(a)
-        slope = self._projection.slope(start, size, x, self._projection.force(start, size, x))
+        softened = list(map(sub, x, times(inverse(descent), a)))
+        acting = [0.0] * len(a)
+        slope = self._projection.slope(start, size, softened, self._projection.force(start, size, softened))
         gain = max(abs(value) for row in slope for value in row) / max(abs(e) for row in descent for e in row)
         softness = min(1.0, 1.0 / gain) if gain > 0.0 else 1.0
         while True:
             harder = [[e / softness for e in row] for row in descent]
-            found = self._newton(start, size, x, [c / softness for c in a], harder)
-            if found is None or softness == 1.0:
-                return found
-            x = found[0]
-            a = [softness * c for c in found[1]]
+            found = self._newton(start, size, softened, [c / softness for c in acting], harder)
+            if found is None:
+                return None
+            moved, pushed = found
+            softened = list(map(add, softened, moved))
+            acting = [c + softness * push for c, push in zip(acting, pushed, strict=True)]
+            if softness == 1.0:
+                return list(map(sub, softened, x)), list(map(sub, acting, a))
             softness = min(1.0, _STIFFER * softness)

@@ -29,6 +29,7 @@ from operator import add, sub
 import numpy as np
 
 from ..bodies import force
+from ..motion.paths import EPS
 from ..bodies.protocol import NO_FORCE, SIZES_REMEMBERED, Body, Ends, Force, Motion, made_of
 from .protocol import Conditions, Counts, Coupling, NotConverged, Step
 from .small import Matrix, Vector, broyden, inverse, less, secant, times, transposed
@@ -83,7 +84,8 @@ class StepSolver(Coupling):
     degree
         Degree of the contact force.
     tolerance
-        Tolerance of the conditions, relative to the motion over the step, the larger of H·max(|u̇|, |ẏ|) and |Δu|.
+        Tolerance of the conditions, relative to the motion over the step: the larger of H·max(|u̇|, |ẏ|) and |Δu|, or what
+        the force moves the upper end by, if that is less.
     expected
         A displacement that is to be expected [m]: modes whose sum, the tip, is held at 0 are as large.
     """
@@ -148,7 +150,7 @@ class StepSolver(Coupling):
         for iteration in range(_MAX_ITERATIONS):
             if not norm < inf:
                 raise NotConverged(norm, iteration)
-            if norm <= enough:
+            if norm <= enough and (iteration or max(map(abs, step)) <= EPS * max(map(abs, a))):
                 if not predicted:
                     break
                 upper.rewind()
@@ -171,9 +173,8 @@ class StepSolver(Coupling):
             norm = max(map(abs, residual))
             if not norm > enough:
                 continue
-            enough = self._absolute_tolerance(start[0], lower_end, size, times(B, a))
-            if iteration >= _LATE:
-                enough = max(_NOISE * enough, _ROUNDING * self._expected)
+            late = iteration >= _LATE
+            enough = self._absolute_tolerance(start[0], lower_end, size, times(B, a), late=late)
             if norm <= enough:
                 continue
             if not predicted:
@@ -238,14 +239,22 @@ class StepSolver(Coupling):
             columns.append([(x - y) / delta for x, y in zip(r_changed, r, strict=True)])
         return transposed(columns)
 
-    def _absolute_tolerance(self, start: Motion, end: Motion, size: float, by_force: Vector) -> float:
-        """Return the tolerance [m]; ``start`` is the upper body's motion, ``end`` the lower one's."""
+    def _absolute_tolerance(self, start: Motion, end: Motion, size: float, by_force: Vector, *, late: bool) -> float:
+        """Return the tolerance [m].
+
+        ``start`` is the upper body's motion, ``end`` the lower one's; ``late`` says whether it allows for the rounding
+        of bodies.
+        """
         u, v, _, _ = start
         y, z, _, _ = end
+        forced = max(map(abs, by_force))
         change = max(size * max(v, -v, z, -z), abs(y - u))
         # The end is a sum of modes as large as it has ever been, and of what the force does; both are rounded.
-        rounding = _ROUNDING * max(self.state.reach, u, -u, y, -y, *map(abs, by_force))
-        return max(self._tolerance * change, rounding)
+        rounding = _ROUNDING * max(self.state.reach, u, -u, y, -y, forced)
+        if late:
+            return max(_NOISE * max(self._tolerance * change, rounding), _ROUNDING * self._expected)
+        # In a short step the force moves the ends less than their velocities do, and has to be as exact.
+        return max(self._tolerance * (min(change, forced) if forced else change), rounding)
 
 
 def _descent(B: Matrix, S: Matrix) -> Matrix:

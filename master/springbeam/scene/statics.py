@@ -146,11 +146,15 @@ def tip_reach(beam: Beam) -> float:
 def resting_height(spring: Spring, force: float) -> float | None:
     """Return the equilibrium [m] of the spring's top under an upward ``force`` [N], k1 x + k2 x³ = F.
 
-    Of several it is the stable one nearest to Ψ; ``None`` if there is none.
+    Of several it is the stable one nearest to Ψ, which is itself one where no force acts at any height; ``None`` if
+    there is none.
     """
     roots = np.roots([spring.cubic_stiffness, 0.0, spring.linear_stiffness, -force])
     heights = spring.unloaded + roots.real[roots.imag == 0.0]
-    stable = [y for y in heights.tolist() if spring.stiffness(y) > 0.0]
+    # Where the stiffness vanishes too, that of higher order decides.
+    stable = [y for y in heights.tolist() if (spring.stiffness(y), spring.cubic_stiffness) > (0.0, 0.0)]
+    if force == spring.linear_stiffness == spring.cubic_stiffness == 0.0:
+        return spring.equilibrium
     return min(stable, key=lambda y: abs(y - spring.equilibrium), default=None)
 
 
