@@ -56,7 +56,7 @@ def link(law, **keys):
 
 
 #: The phase in which ends touch, where that is not a tie.
-PHASES = {"above Ψ": "touch", "compliance": "touch", "rigid stop": "seated", "elastic stop": "touch"}
+PHASES = {"above Ψ": "touch", "wall": "touch", "compliance": "touch", "rigid stop": "seated", "elastic stop": "touch"}
 
 
 @pytest.mark.parametrize("name", scenes.group("touching"))
@@ -156,3 +156,16 @@ def test_a_beam_without_inertia_starts_where_it_rests():
     arm = 0.8 * (1.0 - np.linspace(0.0, 1.0, 21))
     np.testing.assert_allclose(run.bending_moment[0], C * arm - 5.0 * arm**2 / 2.0, atol=1e-10)
     np.testing.assert_allclose(run.shear_force[0], C - 5.0 * arm, atol=1e-10)
+
+
+@pytest.mark.parametrize("force", [0.0, -20.0])
+def test_a_cubic_spring_rests_where_its_force_vanishes(force):
+    """At 0, where it has no stiffness, and at the cube root of 20/6e9."""
+    run = run_in_memory(
+        scene_from_dict({
+            "time": {"t_end": 0.01, "initial_state": "static"},
+            "spring": {"mass": 1.0, "linear_stiffness": 0.0, "cubic_stiffness": 6e9, "external_force": force},
+        })
+    )  # fmt: skip
+    assert run.y[0] == pytest.approx(np.cbrt(force / 6e9), rel=1e-14)
+    assert np.ptp(run.y) <= 1e-14 * abs(run.y[0])

@@ -1,8 +1,8 @@
 """Simple partners that need no FMU: a free mass, a mass on a linear spring and damper, an end that moves as given.
 
 They fit in either place. Each step of a mass is exact: the state with the polynomial force and the integrals is one
-linear system, s = (x, ẋ, F, Ḟ, F̈, ∫x, ∫∫x), ṡ = A s, stepped by exp(A H) s = s + A H φ₁(A H) s. Dissipation is the work of the forces
-minus the stored energy.
+linear system, s = (x, ẋ, F, Ḟ, F̈, ∫x, ∫∫x), ṡ = A s, stepped by exp(A H) s = s + A H φ₁(A H) s. Dissipation is the work
+of the forces minus the stored energy.
 """
 
 from __future__ import annotations

@@ -142,7 +142,7 @@ class Automaton:
         if not ties(self._interface):
             tied = self._interface.lasting
         elif self._is_at_equilibrium(at):
-            tied = common < 0.0 or (common == 0.0 and not self._stays_at_equilibrium())
+            tied = common < 0.0 or (common == 0.0 and not (at.phase.seated or self._stays_at_equilibrium()))
         else:
             tied = low.displacement < self._interface.equilibrium
         # A top that stands on the foundation is driven into it, and strikes it at once; not by a tip without mass or at
@@ -187,7 +187,10 @@ class Automaton:
             # to no better than the tolerance, which brings it as much.
             dies_out |= 0.5 * (e * after) ** 2 * at.elapsed <= at.tolerance * (before - after)
         if (dies_out and e < 1.0) or speed == 0.0:
-            stays = Phase(Joint.TIED if interface.alone else at.phase.joint, seated=True)
+            # At Ψ or above, nothing is tied.
+            untied = ties(interface) and at.ends[1].displacement >= interface.equilibrium
+            joint = Joint.TOUCH if untied and at.phase.joint is Joint.TIED else at.phase.joint
+            stays = Phase(Joint.TIED if interface.alone else joint, seated=True)
             return Outcome(EventKind.SEATED, stays, foundation_impact(v, z, *masses, restitution=0.0))
         return Outcome(EventKind.STOP_IMPACT, at.phase, foundation_impact(v, z, *masses, restitution=e))
 
@@ -243,11 +246,6 @@ def lets_part(interface: Interface) -> bool:
 def ties(interface: Interface) -> bool:
     """the law `transmission`"""
     return isinstance(interface.law, Rigid) and interface.law.ties
-
-
-def only_pushes(interface: Interface) -> bool:
-    """the law `unilateral`"""
-    return lets_part(interface) and not ties(interface)
 
 
 def has_foundation(interface: Interface) -> bool:
@@ -327,9 +325,8 @@ _EITHER = (False, True)
 TRANSITIONS = (
     Transition(joins, Joint.FREE, _EITHER, gap_above_zero, EventKind.IMPACT, Automaton.meet),
     Transition(ties, Joint.TIED, _OFF, below_equilibrium, EventKind.RELEASE, Automaton.release),
-    Transition(ties, Joint.TOUCH, _EITHER, above_equilibrium, EventKind.RETIE, Automaton.tie),
-    Transition(lets_part, Joint.TOUCH, _OFF, contact_pushes, EventKind.SEPARATION, Automaton.part),
-    Transition(only_pushes, Joint.TOUCH, _ON, contact_pushes, EventKind.SEPARATION, Automaton.part),
+    Transition(ties, Joint.TOUCH, _OFF, above_equilibrium, EventKind.RETIE, Automaton.tie),
+    Transition(lets_part, Joint.TOUCH, _EITHER, contact_pushes, EventKind.SEPARATION, Automaton.part),
     Transition(has_foundation, None, _OFF, above_foundation, EventKind.STOP_IMPACT, Automaton.strike),
     Transition(carries_two_ends, None, _ON, foundation_pushes, EventKind.UNSEATED, Automaton.leave),
     Transition(carries_the_tip, None, _ON, contact_pushes, EventKind.SEPARATION, Automaton.part),

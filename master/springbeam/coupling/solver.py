@@ -29,8 +29,8 @@ from operator import add, sub
 import numpy as np
 
 from ..bodies import force
-from ..motion.paths import EPS
 from ..bodies.protocol import NO_FORCE, SIZES_REMEMBERED, Body, Ends, Force, Motion, made_of
+from ..motion.paths import EPS
 from .protocol import Conditions, Counts, Coupling, NotConverged, Step
 from .small import Matrix, Vector, broyden, inverse, less, secant, times, transposed
 
@@ -84,8 +84,8 @@ class StepSolver(Coupling):
     degree
         Degree of the contact force.
     tolerance
-        Tolerance of the conditions, relative to the motion over the step: the larger of H·max(|u̇|, |ẏ|) and |Δu|, or what
-        the force moves the upper end by, if that is less.
+        Tolerance of the conditions, relative to the motion over the step: the larger of H·max(|u̇|, |ẏ|) and |Δu|, or
+        what the force moves the upper end by, if that is less.
     expected
         A displacement that is to be expected [m]: modes whose sum, the tip, is held at 0 are as large.
     """

@@ -45,6 +45,7 @@ def errors(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return by how much the energy has changed at each of ``steps``, over the largest until then, and that [J].
 
+    The largest energy grows with each step by what the rounding of works that cancel may add to the residual.
     ``first`` is the first record of the run, shape (1,): it has the energy that should be kept. ``scale`` is the
     largest energy before ``steps`` [J], ``received`` as of `ledger`.
     """
@@ -55,8 +56,9 @@ def errors(
             initial = float(ledger(first, received)["e_total"][0])
         # Beyond its hilltop a softening spring has a negative potential, which may cancel its kinetic energy.
         of_spring = np.maximum(np.abs(found["e_spring"]), steps["spring_kinetic"])
-        size = np.maximum(np.abs(found["e_beam"]) + of_spring + found["e_contact"], _HELD * energy_of_force(steps))
-        largest = np.maximum.accumulate(np.maximum(size, max(scale, abs(initial))))
+        size = np.abs(found["e_beam"]) + of_spring + found["e_contact"]
+        rounding = np.cumsum(_HELD * energy_of_force(steps))
+        largest = rounding + np.maximum.accumulate(np.maximum(size - rounding, max(scale, abs(initial))))
         residual = found["e_total"] - initial
         return np.divide(residual, largest, out=np.zeros_like(residual), where=largest > 0.0), largest
 
