@@ -122,41 +122,6 @@ def test_directional_derivatives_are_those_of_the_outputs(case):
     assert sum(found) >= {"beam": 16, "spring": 12}[case.name]
 
 
-def test_a_direction_is_the_sum_of_its_inputs(case):
-    k = case.running(**COMMON[case.name])
-    output, *names = {
-        "beam": ("tip_acceleration", "tip_force", "tip_load"),
-        "spring": ("acceleration", "contact_force", "external_force"),
-    }[case.name]
-    (found,) = k.partials([output], *names, seed=(2.0, -3.0))
-    a, b = (k.partials([output], name)[0] for name in names)
-    assert found == 2.0 * a - 3.0 * b != 0.0
-    result = (ct.c_double * 1)(7.0)  # FMPy gives zeros, importers anything
-    seed = (ct.c_double * 1)(1.0)
-    arrays = (case.references(output), 1, case.references(names[0]), 1, seed, *k.counted(1), result, *k.counted(1))
-    assert k.call("GetDirectionalDerivative", *arrays) == 0
-    assert result[0] == a
-
-
-def test_derivatives_at_a_limit_of_a_parameter_are_one_sided(beam):
-    """The acceleration is linear in the damping, which cannot be below 0."""
-    slopes = []
-    for damping in (0.0, 1e-3):
-        k = beam.instance().enter(**{**COMMON["beam"], "alpha_b": damping})
-        slopes += k.partials(["tip_acceleration"], "alpha_b")
-    assert slopes[0] == pytest.approx(slopes[1], rel=1e-6) != 0.0
-
-
-@pytest.mark.parametrize("version", ["3.0"])
-def test_the_law_inside_follows_the_rate_of_the_tip(spring):
-    """C = k δ (1 + χ δ̇): ∂C/∂u̇ = −k δ χ."""
-    law = {"contact_law": 2, "compliance_stiffness": 100.0, "compliance_exponent": 1.0, "compliance_damping": 0.5}
-    k = spring.running(**law, displacement=0.1, tip_displacement=0.05)
-    k.derive("tip_displacement", 1, 0.2)
-    assert k.partials(["reaction"], "der(tip_displacement)") == [pytest.approx(-100.0 * 0.05 * 0.5)]
-    assert k.partials(["reaction"], "tip_velocity") == [0.0]
-
-
 @pytest.mark.parametrize("version", ["2.0"])
 def test_directional_derivatives_at_the_start_are_those_of_the_outputs(case):
     """In initialization mode every pair that InitialUnknowns declares, by parameters and inputs, if both are real."""
@@ -179,15 +144,3 @@ def test_directional_derivatives_at_the_start_are_those_of_the_outputs(case):
                 found += compare(k, outputs, name, change, own_change)
         k.free()
     assert found >= {"beam": 30, "spring": 40}[case.name]
-
-
-def test_the_potential_of_the_loads_changes_with_the_load_too(beam):
-    """d/dτ of −f(τ) ∫u dx, from a short step: −f' ∫u dx is in it."""
-    k = beam.running(initial_deflection_slope=0.3, initial_velocity_slope=0.2, gravity=1.0)
-    k.set("distributed_load", 2.0)
-    k.derive("distributed_load", 1, 5.0)
-    before = k.get("load_potential")
-    rate = k.derivative("load_potential", 1)
-    step = 1e-7
-    k.step(0.0, step)
-    assert (k.get("load_potential") - before) / step == pytest.approx(rate, rel=1e-5)

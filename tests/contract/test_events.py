@@ -117,44 +117,6 @@ def test_impacts_that_die_out_are_a_few_events_and_end_at_rest(spring):
     assert k.get("displacement") == pytest.approx(-0.1 + 0.1 * 0.3**2 / 2, rel=1e-9)
 
 
-@pytest.mark.parametrize(("start", "gap"), [(0.0, 1e-16), (1e4, 1e-13)], ids=["of the step", "of the time"])
-def test_no_step_ends_where_it_began(spring, start, gap):
-    """An impact within rounding of the step's start happens inside the step: ending there would be no progress."""
-    k = started(spring, **{**FALLING, "displacement": gap, "stop_position": 0.0}, start_time=start)
-    k.step(start, 0.2)
-    assert told(k) == (False, False, False)
-    assert (k.get("number_of_impacts"), k.reached()) == (1, start + 0.2)
-    # Thrown up at 1/2 m/s, under 2 m/s².
-    assert k.get("displacement") == pytest.approx(0.5 * 0.2 - 0.2**2, rel=1e-9)
-
-
-@pytest.mark.parametrize("speed", [1e-6, -1e-6], ids=["arrives", "leaves"])
-def test_a_slow_contact_is_told_once(spring, speed):
-    """The tool rounds the tip's place to where it was before the event, which is 5e-11 s of the way."""
-    free = {"linear_stiffness": 0.0, "displacement": 0.3, "contact_law": 2, "tip_displacement": 0.3 + 1e-3 * speed}
-    k = started(spring, **free)
-    time = 0.0
-    events = 0
-    while time < 2e-3:
-        k.derive("tip_displacement", 1, -speed)
-        k.step(time, 2e-3 - time)
-        time = k.reached()
-        if k.event.value:
-            events += 1
-            assert time == pytest.approx(1e-3, rel=1e-6)
-            handle(k)
-            k.set("tip_displacement", math.nextafter(0.3, math.copysign(1.0, speed)))
-    assert events == 1
-
-
-def test_a_held_force_asks_for_whole_steps(spring):
-    values = {"contact_law": 2, "tip_response": 1e-3, "tip_displacement": 10.0}
-    k = started(spring, **FALLING, **values)
-    k.step(0.0, 0.2)
-    assert told(k) == (False, False, False)
-    assert k.get("number_of_impacts") > 0
-
-
 def test_a_state_saved_in_event_mode_is_one_between_steps_where_there_is_no_event_mode(case):
     k = case.instance(events=True).start()
     plain = started(case, events=False)

@@ -93,59 +93,6 @@ def test_every_output_has_its_rate(case, variant):
     assert k.derivative(f"{path}_integral_2") == k.get(f"{path}_integral")
 
 
-def test_the_rate_of_the_acceleration_counts_all_rates_of_forces(spring):
-    k = spring.running(mass=2.0, linear_stiffness=0.0, gravity=9.81)
-    assert k.get("acceleration") == pytest.approx(-9.81)
-    rates = {"external_force": 3.0, "foundation_force": 5.0, "contact_force": 11.0, "base_acceleration": 7.0}
-    for name, rate in rates.items():
-        k.derive(name, 1, rate)
-    assert k.derivative("acceleration") == pytest.approx((3.0 + 5.0 - 11.0) / 2.0 - 7.0)
-    seated = spring.running(stop_enabled=True, stop_position=0.0, gravity=1.0)
-    seated.step(0.0, 0.1)
-    assert seated.get("stop_force", "stop_impulse") == [pytest.approx(1.0), 0.0]
-    seated.derive("external_force", 1, 3.0)
-    assert seated.derivative("acceleration") == 0.0
-
-
-@pytest.mark.parametrize(
-    "load",
-    [
-        *("tip_force", "distributed_load", "distributed_load_1", "distributed_load_2", "distributed_load_3"),
-        *(f"point_force[{i}]" for i in range(1, 5)),
-        *("tip_load", "base_acceleration"),
-    ],
-)
-def test_rates_of_what_follows_forces_at_once_count_rates_of_forces(beam, load):
-    k = beam.moving(section_height=0.1)
-    outputs = ["tip_velocity_forecast", "tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress"]
-    before = [k.derivative(output) for output in outputs]
-    k.derive(load, 1, 3.0)
-    for output, rate, partial in zip(outputs, before, k.partials(outputs, load), strict=True):
-        assert k.derivative(output) - rate == pytest.approx(3.0 * partial, rel=1e-6), output
-        # The forecast is of a tip without a force, and none of the moment comes from a force on the clamp.
-        assert partial != 0.0 or (load, output) == ("tip_force", "tip_velocity_forecast"), output
-
-
-def test_inputs_that_are_another_times_a_factor(case):
-    H = 0.2
-    f = (0.8, -3.0, 11.0)
-    for one, other, factor, values in VALUES["same"][case.name]:
-        a = case.moving(**values)
-        b = case.moving(**values)
-        for i in range(5):
-            polynomial(a, one, f)
-            polynomial(b, other, tuple(factor * x for x in f))
-            for k in (a, b):
-                k.step(i * H, H)
-        contact = other in ("tip_force", "contact_force")  # of which no work is booked
-        apart = {"load_potential", *(("load_work", "tip_velocity_forecast") if contact else ())}  # without a tip force
-        names = [name for name in case.outputs if name not in apart]
-        assert a.get(*names) == pytest.approx(b.get(*names), rel=1e-12, abs=1e-14), (one, other)
-        if contact:
-            assert b.get("load_work") == 0.0
-    assert a.get("load_work") != 0.0
-
-
 def test_contact_force_is_ignored_by_the_law_inside(spring):
     values = {"contact_law": 2, "displacement": 0.1}
     plain = spring.running(**values)

@@ -3,7 +3,6 @@
 import ctypes as ct
 import gc
 import re
-import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,6 @@ from springbeam.scene.files import tomllib
 
 
 OK = 0
-WARNING = 1
 ERROR = 3
 #: Parameters of the law that looks ahead.
 CALLS = tomllib.loads(Path(__file__).parents[1].joinpath("bad_inputs.toml").read_text(encoding="utf-8"))["calls"]
@@ -48,21 +46,6 @@ def test_only_co_simulation_is_provided(beam, version):
     assert "only co-simulation" in k.message
 
 
-@pytest.mark.parametrize(
-    "resources", [None, b"", b"file:///x/resources", b"file:////x", b"file:/x/with space/", b"nonsense"]
-)
-def test_resource_location_does_not_matter(case, resources):
-    k = case.instance(resources=resources)
-    k.start().step(0.0, 1e-3)
-
-
-def test_callbacks_may_be_null(case):
-    k = case.instance(callbacks=False)
-    assert k.try_step(0.0, 1e-3) == ERROR  # has a message, and nobody to tell it to
-    assert k.call("Reset") == OK
-    k.start().step(0.0, 1e-3)
-
-
 def test_debug_messages_only_when_asked_for(case):
     silent = case.instance()
     chatty = case.instance(logging=True)
@@ -74,24 +57,6 @@ def test_debug_messages_only_when_asked_for(case):
     assert chatty.call("SetDebugLogging", 1, 1, (ct.c_char_p * 1)(b"logStatusError")) == OK
     chatty.call("Terminate")
     assert len(chatty.messages) == 3
-
-
-NO_CATEGORY = "there is no log category 'logEverything'"
-
-
-def test_declared_log_categories_are_accepted(case):
-    k = case.instance()
-    root = ET.parse(case.folder / "modelDescription.xml").getroot()
-    names = [c.get("name", "").encode() for c in root.iter("Category")]
-    assert len(names) == 5
-    assert k.call("SetDebugLogging", 1, len(names), (ct.c_char_p * len(names))(*names)) == OK
-    assert k.call("SetDebugLogging", 1, 1, (ct.c_char_p * 1)(b"logEverything")) == OK
-    assert k.messages[-1] == (WARNING, "logStatusWarning", f"{case.spelt('SetDebugLogging')}: " + NO_CATEGORY)
-
-
-def test_types_platform_and_version(case, version):
-    assert case.slave.getVersion() == version
-    assert version == "3.0" or case.slave.getTypesPlatform() == "default"
 
 
 #: What a word of the table of bad inputs stands for in a call.
@@ -298,17 +263,3 @@ def test_memory_is_flat_over_many_instances(case):
 def test_every_output_is_real(case):
     """Tools that read all outputs by one call for reals could not load them otherwise."""
     assert {case.variables[name].type for name in case.named("output")} <= {"Real", "Float64"}
-
-
-@pytest.mark.parametrize("version", ["2.0"])
-def test_there_is_no_variable_after_the_last_one(case):
-    k = case.running()
-    beyond = 1 + max(variable.valueReference for variable in case.variables.values())
-    assert k.access("GetFloat64", (ct.c_uint * 1)(beyond), 1, (ct.c_double * 1)()) == ERROR
-    assert f"value reference {beyond} does not exist" in k.message
-
-
-def test_a_start_value_is_known_before_initialization(spring):
-    k = spring.instance()
-    k.set("displacement", 0.25)
-    assert k.get("displacement") == 0.25

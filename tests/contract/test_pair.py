@@ -296,17 +296,6 @@ def test_a_wrong_connection_is_warned_of_once(beam, spring, what):
     assert case.get("least", 1) <= pair.spring.get("warnings") <= case.get("most", 100)
 
 
-def test_the_first_force_does_not_depend_on_what_was_seen_before(spring):
-    forces = []
-    for seen in ([0.0], [0.02, 0.0]):
-        k = spring.running(contact_law=2, tip_response=1e-6, displacement=0.01)
-        for u in seen:
-            k.set("tip_displacement", u)
-        forces.append(k.get("reaction"))
-    assert forces[0] == pytest.approx(1e-2, rel=1e-3)  # λ δ³, λ = 1e4
-    assert forces[0] == pytest.approx(forces[1], rel=1e-12)
-
-
 @pytest.mark.parametrize("size", [1e-3, 1e-4])
 @pytest.mark.parametrize("first", ["beam", "spring"])
 def test_a_tool_that_steps_one_after_the_other_is_warned(beam, spring, first, size):
@@ -376,17 +365,6 @@ def test_a_right_pair_is_not_warned_of_its_loads(beam, spring, load, slope):
         pair.run(pair.time + pair.size)
     assert warnings(pair) == []
     assert [k.get("warnings") for k in (pair.beam, pair.spring)] == [0, 0]
-
-
-@pytest.mark.parametrize("version", ["2.0"])
-@pytest.mark.parametrize("size", [1e-3, 1e-2, 0.1])
-@pytest.mark.parametrize("bend", [0.01, 1.0, -0.1])
-def test_a_right_pair_is_not_warned_of_a_beam_that_turns_in_the_first_step(beam, spring, size, bend):
-    """A bent beam is released: the mean velocity over two steps, which stands for that of the first, is far from it."""
-    pair = Pair(beam, spring, size).start(initial_velocity_slope=0.0, initial_deflection_slope=bend)
-    pair.exchange()  # again: the force follows the tip
-    pair.run(20.0 * size)
-    assert warnings(pair) == []
 
 
 #: A light top on a coarse beam, in steps that are long beside the waves in it.

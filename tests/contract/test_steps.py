@@ -3,7 +3,6 @@
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from springbeam.scene.files import tomllib
@@ -92,15 +91,6 @@ def test_a_step_that_fails_twice_alike_ends_the_simulation(spring):
     assert not k.ends()
 
 
-@pytest.mark.parametrize("start", [0.0, 7e4])
-def test_steps_of_the_communication_step_are_made_at_late_times(spring, start):
-    """A time of 7e4 s is rounded by 7e-12 s, 1e-6 of a step of 1e-5 s."""
-    k = spring.running(**AHEAD, start_time=start)
-    times = start + 1e-5 * np.arange(2000)
-    for time, size in zip(times, np.diff(times), strict=False):
-        k.step(time, size)
-
-
 @pytest.mark.parametrize("tolerance", [0.1, 1e-4, 0.0, -1.0, math.nan, 1e-3])
 def test_a_loose_tolerance_of_the_importer_changes_nothing(case, tolerance):
     plain = case.moving()
@@ -108,19 +98,6 @@ def test_a_loose_tolerance_of_the_importer_changes_nothing(case, tolerance):
     for k in (plain, loose):
         k.step(0.0, 0.5)
     assert loose.outputs() == plain.outputs()
-
-
-def test_a_tighter_tolerance_of_the_importer_is_followed(spring):
-    # Softening Duffing from rest at 0.5: the period is 4K(m)/ω with ω² = k1 + k2 A²/2, m = −k2 A²/(2 ω²).
-    period = 3.650498199690303
-    values = {"linear_stiffness": 3.0, "cubic_stiffness": -0.2, "displacement": 0.5}
-    values |= {"relative_tolerance": 1e-4, "absolute_tolerance": 1e-12}
-    errors = []
-    for tolerance in (None, 1e-9):
-        k = spring.running(**values, tolerance=tolerance)
-        k.step(0.0, period)
-        errors.append(abs(k.get("displacement") - 0.5) + abs(k.get("velocity")))
-    assert errors[1] < errors[0] / 100
 
 
 # -- saved states: the same step repeated is the same to the last bit, here and in another instance -------------------

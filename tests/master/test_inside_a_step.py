@@ -6,8 +6,8 @@ from numpy.polynomial import Legendre, Polynomial
 
 from springbeam.bodies import force
 from springbeam.bodies.protocol import Motion
-from springbeam.motion.paths import Path, Place, sign_changes
-from springbeam.results.dense import _turning, inside
+from springbeam.motion.paths import Path, sign_changes
+from springbeam.results.dense import _turning
 from springbeam.results.records import STEP
 
 # -- The path of a position inside a step: quintics exactly, minima, zeros, the order of its error and of the cubic's
@@ -24,21 +24,6 @@ def through(p, size=SIZE):
     return Path.through(*samples, size, (float(q(1.0)), float(q0(1.0))))
 
 
-@pytest.mark.parametrize(("even", "odd"), [(0.0, -1.0), (0.7, 0.4), (0.1, 2.0)])
-def test_path_and_cubic_are_apart_by_no_more_than_they_say(even, odd):
-    """s²(1 − s)² [even + odd (2s − 1)] beside a cubic; one part alone is met."""
-    s = Polynomial((0.0, 1.0))
-    one = Polynomial((1.0,))
-    beside = s**2 * (one - s) ** 2 * (even * one + odd * (2.0 * s - one))
-    apart = np.abs(beside(np.linspace(0.0, 1.0, 2001))).max()
-    path = through(Polynomial((0.3, -1.0, 2.0, 0.5)) + beside)
-    assert path.beside_cubic >= apart * (1.0 - 1e-6)
-    if even * odd == 0.0:
-        assert path.beside_cubic == pytest.approx(apart, rel=1e-4, abs=1e-14)
-    moments = abs(beside.integ()(1.0)), abs(2.0 * beside.integ(2)(1.0))
-    assert path.moments_beside_cubic == pytest.approx(max(moments), rel=1e-9, abs=1e-15)
-
-
 def test_what_turns_a_mismatch_of_velocities_is_the_mass_times_the_acceleration_of_the_gap():
     """The gap of joined ends has degree 5 and is 0 at both ends of a step; Legendre polynomials show degree 3 of it."""
     s = Polynomial((0.0, 1.0))
@@ -49,38 +34,6 @@ def test_what_turns_a_mismatch_of_velocities_is_the_mass_times_the_acceleration_
     steps["u_tip_integral"], steps["u_tip_integral_2"] = SIZE * gap.integ()(1.0), SIZE**2 * gap.integ(2)(1.0)
     turning = Legendre.cast(0.7 / SIZE**2 * gap.deriv(2)(0.5 * s + 0.5))
     assert _turning(steps[:1], steps[1:])[:, 0] == pytest.approx(turning.coef, rel=1e-9)
-
-
-def test_the_path_between_two_places_of_a_step_is_that_of_the_step():
-    """A quintic from 0.2 to 0.9 s: means up to two places have those between them."""
-    p = Polynomial((0.3, -1.0, 2.0, 0.5, -3.0, 1.5))
-    first, last = (Place(t, (p(t), p.deriv()(t)), (p.integ()(t) / t, p.integ(2)(t) / t**2)) for t in (0.2, 0.9))
-    shares = np.linspace(0.0, 1.0, 7)
-    assert first.path_to(last).at(shares) == pytest.approx(p(0.2 + 0.7 * shares), rel=1e-11)
-
-
-@pytest.mark.parametrize(("end", "phase", "seen"), [("y", 1.0, 1.0), ("u_tip", 0.0, 1.0), ("u_tip", 1.0, 0.0)])
-def test_the_last_moment_tells_how_far_an_end_may_be_off_between_rows_but_of_a_tip_that_takes_another_path(
-    end, phase, seen
-):
-    """An end goes 1 m in a step of 1 s from rest to rest, and ∫∫ is 1e-5 m·s² beside the cubic's: the path is 420 times
-    that times s²(1 − s)²(1 − 2s) beside it, which is at most 1/(25 √5)."""
-    steps = np.zeros(2, STEP)
-    steps["phase"] = phase
-    steps["size"][1] = 1.0
-    steps[end][1] = 1.0
-    steps[f"{end}_after"][1] = 1.0
-    steps[f"{end}_integral"][1] = 0.5
-    steps[f"{end}_integral_2"][1] = 0.15 + 1e-5
-    assert inside(True, steps).error == pytest.approx(seen * 420e-5 / (25.0 * 5.0**0.5), rel=1e-7, abs=1e-15)
-
-
-@pytest.mark.parametrize(("even", "odd", "beside"), [(1.0, 0.0, 1.0 / 30.0), (0.0, 1.0, 1.0 / 210.0), (0.0, 0.0, 0.0)])
-def test_moments_are_those_beside_the_cubic(even, odd, beside):
-    """The mean of s²(1 − s)² is 1/30, as is twice its moment ∫(1 − s) … ds; that of (2s − 1) times it is −1/210."""
-    s = Polynomial((0.0, 1.0))
-    path = Polynomial((0.3, -1.0, 2.0, 7.0)) + s**2 * (1.0 - s) ** 2 * (even + odd * (2.0 * s - 1.0))
-    assert through(path).moments_beside_cubic == pytest.approx(beside, rel=1e-11, abs=1e-15)
 
 
 def test_of_two_falls_the_last_one_counts_and_a_dip_before_it_is_asked_for():
@@ -111,18 +64,6 @@ def test_sign_changes_are_the_roots_inside(size, inside, outside):
     for x, root in zip(found, inside, strict=True):
         rounding = 1e-15 * Polynomial(np.abs(p.coef))(size * root)
         assert x == pytest.approx(size * root, abs=rounding / abs(p.deriv()(size * root)), rel=1e-15)
-
-
-@pytest.mark.parametrize(
-    "p", [(1.0,), (1.0, -2.0, 1.0), (1.0, -2.0, 2.0), (0.0, 1.0), (0.0, 0.0, 1.0), (0.0,), (-5.0, 1.0)]
-)
-def test_no_sign_change_where_a_polynomial_only_touches_zero(p):
-    """Constant; double root; complex roots; roots at the ends themselves."""
-    assert sign_changes(p, 0.0, 5.0) == []
-
-
-def test_values_too_small_to_be_multiplied_have_signs():
-    assert sign_changes((1e-300, -4e-300), 0.0, 1.0) == [0.25]
 
 
 # -- the polynomial contact force of one step against numpy's polynomials and closed forms ----------------------------

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from references import integrated_anew
-from scenes import load_of, scene_from_dict, table
+from scenes import load_of, table
 
 from springbeam import simulate
 from springbeam.bodies import force
 from springbeam.run.loads import Signal
-from springbeam.scene import SceneError, load_scene, with_changes
+from springbeam.scene import load_scene, with_changes
 
 RECORD = np.column_stack([np.linspace(0.0, 0.05, 26), 3.0 * np.sin(200.0 * np.linspace(0.0, 0.05, 26))])
 SIGNALS = table("master/cases.toml")["signals"]
@@ -52,15 +52,6 @@ def test_the_projection_is_that_of_the_signal(name, start, size):
         tau = 0.5 * size * (NODES + 1.0)
         mine = 0.5 * size * WEIGHTS @ (np.array([force.value(f, x) for x in tau]) * (tau / size) ** power)
         assert mine == pytest.approx(exact, abs=2e-14 * size * abs(load.amplitude) * 3.0)
-
-
-@pytest.mark.parametrize("signal", ["harmonic", "half_sine", "step"])
-def test_where_a_load_jumps_its_value_is_that_after_the_jump(signal):
-    wave = {"frequency": 5.0, "phase": 1.0} if signal == "harmonic" else {}
-    load = load_of(on="tip", signal=signal, start=0.25, duration=0.125, amplitude=3.0, **wave)
-    before, at_start, at_end = load.value([np.nextafter(0.25, 0.0), 0.25, 0.375])
-    assert (before, at_end) == (0.0, 0.0)
-    assert at_start == pytest.approx({"harmonic": 3.0 * np.sin(1.0), "half_sine": 0.0, "step": 3.0}[signal])
 
 
 def test_pulses_have_the_shapes_and_the_velocity_changes_of_their_names():
@@ -105,40 +96,9 @@ def test_steps_end_where_a_load_jumps_or_bends_and_none_is_a_sliver():
     assert np.diff(run.time).min() >= min(gaps[gaps > 1e-12].min(), 0.25e-3)
 
 
-def test_fine_lines_of_a_table_end_no_step_but_its_first_and_its_last_do(tmp_path):
-    """100 lines, 0.1 ms apart from 10 ms on."""
-    times = 1e-4 * np.arange(100)
-    np.savetxt(tmp_path / "fine.csv", np.column_stack([times, np.cos(900.0 * times)]), delimiter=",")
-    given = {"on": "tip", "signal": "table", "amplitude": 1.0, "interpolation": "linear", "start": 0.01}
-    signal = Signal(load_of(file=str(tmp_path / "fine.csv"), **given))
-    last = signal.kinks[-1]
-    assert signal.next_kink(0.0095, 1e-3) == signal.kinks[0] == 0.01
-    assert signal.next_kink(0.0105, 1e-3) == last
-    assert signal.next_kink(0.01052, 3e-4) == signal.kinks[6]  # three of them in a step
-    assert signal.next_kink(last - 1.5e-4, 1e-3) == signal.kinks[-2]
-    assert signal.next_kink(last, 1e-3) == np.inf
-    spline = load_of(file=str(tmp_path / "fine.csv"), **given | {"interpolation": "cubic"})
-    assert spline.kinks == [0.01, last]  # it bends at no line
-
-
 def test_the_reference_integrates_loads_as_scipy_does(monkeypatch):
     run = integrated_anew(soft(*SIGNALS, t_end=0.06), monkeypatch, 0.06)
     assert np.abs(run.energy_residual).max() < 1e-11 * run.e_beam.max()
-
-
-def test_loads_are_changed_by_their_number_and_tables_lie_beside_the_scene(tmp_path):
-    folder = tmp_path / "scenes"
-    folder.mkdir()
-    text = "[time]\nt_end = 1.0\n[spring]\nmass = 1.0\nlinear_stiffness = 1.0\n"
-    text += '[[loads]]\non = "spring"\nsignal = "table"\nfile = "../record.csv"\n'
-    (folder / "one.toml").write_text(text + '[[loads]]\non = "base"\nsignal = "harmonic"\nfrequency = 3.0\n')
-    scene = load_scene(folder / "one.toml", ["loads.1.frequency=7", "loads.0.start=0.5"])
-    assert (scene.loads[1].frequency, scene.loads[0].start) == (7.0, 0.5)
-    assert scene.loads[0].value(0.52) == pytest.approx(3.0 * np.sin(4.0))
-    assert with_changes(scene, **{"loads.0": {"start": 0.0}}).loads[0].start == 0.0
-    assert scene_from_dict(scene.model_dump(exclude_none=True)) == scene
-    with pytest.raises(SceneError, match=r"\[loads\.2\]: no table of this scene; .*coupling, loads\.0, loads\.1$"):
-        load_scene(folder / "one.toml", ["loads.2.frequency=7"])
 
 
 def test_a_table_ends_with_its_last_line_and_a_ramp_stays():

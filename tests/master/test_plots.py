@@ -8,11 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
-from matplotlib.image import imread
-from runs import EVERY_EVENT, ODD_COLUMNS, SCENES, a_trajectory
+from runs import SCENES, a_trajectory
 
-from springbeam.pictures import plots
-from springbeam.pictures.diagrams import Diagram, draw_diagrams
 from springbeam.pictures.drawing import decimated
 from springbeam.pictures.plots import plot_run
 from springbeam.results.directory import PICTURES
@@ -43,17 +40,6 @@ def test_a_run_gets_the_pictures_of_what_it_has(tmp_path, unpainted, has, rows, 
     assert [path.name for path in written] == [file for name, file in PICTURES.items() if name not in missing]
 
 
-def test_odd_columns_are_drawn_without_a_warning(tmp_path, recwarn, monkeypatch):
-    monkeypatch.setattr(plots, "DPI", 40)
-    drawn = ("shapes_after_contact", "velocities_and_forces", "gap_and_energy")
-    for path in plot_run(a_trajectory(events=EVERY_EVENT, **ODD_COLUMNS), tmp_path, drawn):
-        assert imread(path)[..., :3].std() > 0.02  # not blank
-    assert [str(warning.message) for warning in recwarn] == []
-
-
-# -- what is in them ----------------------------------------------------------------------------------------------
-
-
 # -- thinning -----------------------------------------------------------------------------------------------------
 
 
@@ -73,11 +59,3 @@ def test_thinning_keeps_ends_order_and_the_extremes_of_every_column_of_pixels(va
         if len(span):
             kept = values[rows[np.isin(rows, span)]]
             assert (kept.min(), kept.max()) == (values[span].min(), values[span].max())
-
-
-def test_a_curve_on_logarithmic_axes_leaves_out_what_is_not_above_zero():
-    """matplotlib would draw it at the edge."""
-    curve = [[1.0, 2.0], [2.0, 0.0], [0.0, 3.0], [3.0, 4.0]]
-    (ax,) = draw_diagrams([Diagram("x", "y", {"a": curve})], "").axes
-    assert ax.lines[0].get_xydata().tolist() == [[1.0, 2.0], [3.0, 4.0]]
-    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bodies import pair_of, simulate
+from bodies import pair_of
 from references import reference
 from scenes import scene_from_dict
 
@@ -11,9 +11,7 @@ from springbeam.bodies.quasi_static import QuasiStaticBeam
 from springbeam.contact.events import Holding
 from springbeam.monolithic.hybrid_system import _statics
 from springbeam.monolithic.semi_discrete import assemble, constant_forces
-from springbeam.scene import Beam, load_scene, statics, with_changes
-from springbeam.scene.linearised import contact_energy
-from springbeam.scene.schemes import EnergyCoupling
+from springbeam.scene import Beam, statics
 from springbeam.scene.statics import SHAPE_POINTS
 
 BEAM = Beam.with_ones(
@@ -48,17 +46,6 @@ def test_statics_are_those_of_a_mesh_that_holds_them():
     np.testing.assert_allclose(statics.load_shape(BEAM, SHAPE_POINTS), sampler @ by_load, rtol=1e-11, atol=1e-15)
     shape = by_force / by_force[d.tip]
     assert statics.tip_inertia(BEAM) == pytest.approx(shape @ d.M @ shape, rel=1e-12)
-
-
-@pytest.mark.parametrize("reduced", [False, True])
-@pytest.mark.parametrize("degree", [1, 2, 3])
-def test_locking_is_the_stiffness_of_the_mesh_over_that_of_the_beam(degree, reduced):
-    mesh = {"element_degree": degree, "n_elements": 2, "shear_modulus": 4e3, "fidelity": "dynamic"}
-    mesh["reduced_integration"] = reduced
-    beam = BEAM.model_copy(update=mesh)
-    d = assemble(beam)
-    ratio = statics.tip_compliance(beam) / np.linalg.solve(d.K, d.tip_vector)[d.tip]
-    assert statics.locking(beam) == pytest.approx(ratio, rel=1e-11)
 
 
 @pytest.mark.parametrize("alpha", [1e-3, 4.0])
@@ -98,23 +85,6 @@ def scene(**tables):
     return scene_from_dict({table: {**data.get(table, {}), **tables.get(table, {})} for table in {**data, **tables}})
 
 
-@pytest.mark.parametrize(
-    "coupling",
-    [{"macro_step": 0.02, "degree": 0}, {"relative_tolerance": 1e-4, "degree": 2}],
-)
-def test_where_the_force_vanishes_as_the_spring_falls_through_its_equilibrium_the_ends_stay_joined(coupling):
-    """Without loads C = k u_tip vanishes at Ψ = 0: rounding decided whether the tip stayed up there, free."""
-    given = scene(beam={"distributed_load": 0.0}, time={"t_end": 10.0})
-    run = simulate(given.model_copy(update={"coupling": EnergyCoupling(**coupling)}))
-    omega = np.sqrt((3.0 + 1.0 / statics.tip_compliance(given.beam)) / 2.0)
-    assert {e.kind for e in run.events[1:]} <= {"release", "impact", "retie"}
-    # Joined, it is one oscillator; of degree 0, 500 steps of ω H = 0.084 lag by (ω H)³/12 each, and that is said.
-    off = np.max(np.abs(run.y + 0.5 / omega * np.sin(omega * run.time))) / (0.5 / omega)
-    lags = coupling == {"macro_step": 0.02, "degree": 0}
-    assert off < (0.03 if lags else 1e-3)
-    assert run.summary["resolved"] is not lags
-
-
 def test_what_holds_the_ends_is_the_force_of_the_reference_over_the_stiffness():
     """C/k and its rate, by the accelerations of the reference."""
     given = scene(stop={"position": -0.05}, beam={"alpha_b": 0.02})
@@ -126,16 +96,3 @@ def test_what_holds_the_ends_is_the_force_of_the_reference_over_the_stiffness():
     with pair_of(given) as pair:
         found = Holding(*pair.bodies)((None, Motion(y, z, 0.0, 0.0)))
     np.testing.assert_allclose(found, [compliance * force, z + alpha * acceleration], rtol=1e-9, atol=1e-12)
-
-
-def test_the_energy_at_contact_is_that_of_the_start_and_of_loads():
-    """½ ∫ρA (s₁x)² dx, ½ KAG L s₀², and 2 F²/k, F the tip force that bends a slender beam as far as the load."""
-    beam = {"approach": "elastic", "initial_deflection_slope": 0.01, "n_elements": 4}
-    load = {"on": "beam", "shape": [1.0, 2.0], "amplitude": 5.0}
-    scene = with_changes(load_scene("soft"), beam=beam, loads=[load])
-    own = scene.beam
-    start = own.density * own.area * own.initial_velocity_slope**2 * own.length**3 / 6.0
-    start += 0.5 * statics.shear_stiffness(own) * own.length * 0.01**2
-    force = 5.0 * own.length * ((0.5 - 0.125) + 2.0 * (3.0 / 8.0 - 0.1))  # ∫ (1 + 2ξ) ξ² (3 − ξ)/2 dξ
-    expected = start + 2.0 * force**2 * statics.tip_compliance(own)
-    assert contact_energy(scene) == pytest.approx(expected, rel=1e-12)

@@ -1,6 +1,5 @@
 """Records and result files: columns follow from records, a kill loses one block at most, nothing is overwritten."""
 
-import json
 import math
 import os
 import shutil
@@ -16,9 +15,8 @@ from runs import PAIR, SCENES, block
 from scenes import group
 
 from springbeam import simulate
-from springbeam.motion.events import EVENT_COLUMNS, Event
 from springbeam.results import recording
-from springbeam.results.columns import columns, first_not_finite
+from springbeam.results.columns import first_not_finite
 from springbeam.results.directory import (
     ANIMATIONS,
     PARQUET,
@@ -32,11 +30,8 @@ from springbeam.results.directory import (
 from springbeam.results.files import export, load_summary, load_trajectory, read_run
 from springbeam.results.recording import FileRecorder, MemoryRecorder
 from springbeam.results.records import STEP_COLUMNS
-from springbeam.results.trajectory import BODY_COLUMNS, COLUMNS
 from springbeam.run.log import Log
 from springbeam.run.outcome import RunStopped
-from springbeam.scene import with_changes
-from springbeam.studies.tables import write_parquet
 
 
 def filed(path, *blocks, scene=PAIR):
@@ -68,19 +63,6 @@ def test_columns_are_those_of_the_reference(name):
     for column in run.columns.keys() - {"time", "phase"}:
         error = np.abs(run[column][rows] - exact[column][there]).max()
         assert error <= 1e-5 * np.abs(exact[column]).max() + 1e-12, column
-
-
-def test_normal_compliance_above_another_body_counts_from_where_that_has_started():
-    """A file knows alone where that is."""
-    another = {"fmu": "another.fmu", "force": "F", "displacement": "x"}
-    scene = with_changes(
-        PAIR, beam={"approach": "elastic"}, spring=another, contact={"stiffness": 7.0, "exponent": 1.0}
-    )
-    steps, _, _ = block(20)
-    steps["y_after"][0] = -0.1
-    deep = np.maximum(-0.1 - steps["u_tip_after"][5:], 0.0)
-    assert deep.any()
-    assert columns(scene, steps[5:], steps[:1])["compliance_force"] == pytest.approx(7.0 * deep, rel=1e-14)
 
 
 @pytest.mark.parametrize("name", STEP_COLUMNS)
@@ -126,25 +108,6 @@ def test_memory_and_files_hold_the_same_and_the_rows_are_its_columns(tmp_path, s
     rows = read_run(RunDirectory(tmp_path / "run"))
     for name in run.columns:
         assert rows[name].tolist() == run[name].tolist()
-
-
-# -- files --------------------------------------------------------------------------------------------------------
-
-
-def test_files_are_plain_csv_and_json(tmp_path):
-    steps, _, shapes = block(2)
-    steps["u_tip_after"] = 1.0 / 3.0
-    steps["events"] = [0, 1]
-    filed(tmp_path / "run", (steps, [Event(0.1, "impact", y=0.5, z=-1.0, energy_loss=0.25, joint="tied")], shapes))
-    header, first, second, end = (tmp_path / "run" / "trajectory.csv").read_bytes().decode().split("\n")
-    assert header.split(",") == [*COLUMNS, *(name for name in BODY_COLUMNS if name != "bending_stress")]
-    assert (float(first.split(",")[1]), end, "\r" in second) == (1.0 / 3.0, "", False)
-    events = (tmp_path / "run" / "events.csv").read_text().splitlines()
-    assert events == [",".join(EVENT_COLUMNS), "0.1,impact,0.5,-1.0,,,0.0,0.0,0.25,tied,false"]
-    summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
-    assert (summary["macro_steps"], summary["scene"]["spring"]["cubic_stiffness"]) == (3, -0.2)
-    assert sorted(p.name for p in (tmp_path / "run").iterdir()) == WRITTEN
-    assert (tmp_path / "run" / "steps.bin").read_bytes() == steps.tobytes()
 
 
 # -- killed -------------------------------------------------------------------------------------------------------
@@ -219,26 +182,6 @@ def test_rows_are_written_again_from_the_records(tmp_path):
     os.truncate(tmp_path / "run" / "events.csv", 100)
     with pytest.raises(ResultsUnreadable, match=r"events\.csv: 100 bytes, \d+ bytes were written$"):
         export(tmp_path / "run", "csv")
-
-
-def test_a_run_that_goes_on_is_exported_up_to_its_last_block(tmp_path):
-    recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path / "run"))
-    assert len(recorder.trajectory()) == 0
-    with pytest.raises(ResultsUnreadable, match=r"steps\.bin: no records"):
-        export(tmp_path / "run", "csv")
-    recorder.keep(*block(40))
-    export(tmp_path / "run", "csv")
-    assert len((tmp_path / "run" / "trajectory.csv").read_text().splitlines()) == 41
-    recorder.finish({"status": "done"})
-    assert len(load_trajectory(tmp_path / "run")) == 40
-
-
-def test_texts_of_a_table_stay_texts_in_parquet(tmp_path):
-    """Also those that look like times; a number may be infinite, or missing."""
-    rows = [{"case": "2020-01-01", "error": 1.0, "none": None}, {"case": "2020-01-02", "error": np.inf}]
-    table = parquet.read_table(write_parquet(tmp_path / "table.parquet", rows))
-    assert table.to_pylist() == [row | {"none": None} for row in rows]
-    assert str(table.schema.field("none").type) == "double"
 
 
 @pytest.mark.parametrize("scene", [PAIR, SCENES["spring"]])

@@ -3,16 +3,13 @@
 import exact
 import numpy as np
 import pytest
-from commands import printed
 from exact import coupled, laws
 from exact.alone import clamped_free_frequencies
-from references import dips
-from scenes import kinds, named, soft
+from scenes import kinds, soft
 
 from springbeam.monolithic import event_driven
-from springbeam.monolithic.exponential import LinearForm
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
-from springbeam.scene import Beam, load_scene, with_changes
+from springbeam.scene import Beam, with_changes
 
 
 def linear(**tables):
@@ -35,40 +32,6 @@ def test_soft_agrees_with_extended_precision():
     for event, (time, velocity) in zip(result.events[1:], EXTENDED_PRECISION, strict=True):
         assert event.time == pytest.approx(time, abs=3e-14)
         assert (event.z, event.v_tip) == pytest.approx((velocity, velocity), abs=2e-13)
-
-
-def test_rows_cost_no_steps_and_lie_on_the_motion_of_a_run_that_ends_there():
-    """Steps are as long as the motion allows, and rows lie inside them."""
-    scene = soft(20, beam={"alpha_b": 1e-3}, spring={"damping": 0.1})
-    times = np.linspace(0.0, 0.2, 401)
-    few, many = (event_driven.integrate(scene, sample_times=some, t_end=0.2) for some in (times[[0, -1]], times))
-    assert many.summary["counts"] == few.summary["counts"]
-    assert many.summary["counts"]["steps"] < 0.7 * len(times)
-    for row in (37, 383):  # before and after the events
-        last = event_driven.integrate(scene, sample_times=[0.0, times[row]], t_end=times[row])
-        for name, column in last.columns.items():
-            if name not in ("phase", "time"):
-                scale = max(np.max(np.abs(many[name])), np.max(many.e_total) * (name == "energy_residual"))
-                assert abs(column[-1] - many[name][row]) <= 1e-11 * scale, name
-
-
-@pytest.mark.parametrize(
-    ("name", "t_end", "most"),
-    [("soft", 0.2, (40, 240, 10)), ("bumper", 0.1, (260, 2400, 32))],
-)
-def test_a_reference_takes_few_steps_iterations_and_weights(name, t_end, most, monkeypatch, tmp_path):
-    """They had been 205, 1216 and 18, and 1403, 9877 and 50, with 12 Gauss points and Brent's method for events."""
-    monkeypatch.chdir(tmp_path)
-    printed("new", "bumper")
-    evaluated = []
-    forces = LinearForm.forces
-    monkeypatch.setattr(LinearForm, "forces", lambda self, ends: evaluated.append(1) or forces(self, ends))
-    scene = load_scene("soft" if name == "soft" else "bumper.toml", [f"time.t_end={t_end}"])
-    equations = event_driven.Equations(scene)
-    run = event_driven.integrate(equations)
-    weights = sum(form.weights.cache_info().misses for form in equations.forms.values())
-    assert np.all(np.array((run.summary["counts"]["steps"], len(evaluated), weights)) <= most)
-    assert run.summary["largest_relative_energy_residual"] < 1e-13
 
 
 LAWS = [exact.compliant_impact, exact.hunt_crossley, exact.link, exact.tie]
@@ -107,30 +70,11 @@ def test_a_spring_that_runs_away_is_a_failure_of_the_reference():
         event_driven.integrate(unchecked, sample_times=[0.0])
 
 
-@pytest.mark.parametrize(("speed", "kinds_then"), [(1.0, ["stop_impact"]), (-1.0, [])])
-def test_a_tip_that_starts_on_the_stop_strikes_it_only_downward(speed, kinds_then):
-    beam = {"n_elements": 8, "initial_deflection_slope": 0.0, "initial_velocity_slope": -speed, "approach": "elastic"}
-    scene = with_changes(load_scene("beam-on-stop"), beam=beam, stop={"position": 0.0})
-    assert kinds(event_driven.integrate(scene, sample_times=[0.0], t_end=1e-6)) == kinds_then
-
-
-def test_a_dip_between_nodes_is_not_missed():
-    """After 8 impacts it dips 7 μm past the foundation."""
-    scene, times = dips(0.7, 1.0)
-    assert [event.time for event in event_driven.integrate(scene).events] == pytest.approx(times, abs=1e-8)
-
-
 # -- its beam -------------------------------------------------------------------------------------------------------
 
 
 def beam(bending=1.0, shear=1.0, **changes):
     return Beam.with_ones(young_modulus=bending, shear_modulus=shear, **changes)
-
-
-def test_ends_that_meet_at_the_equilibrium_but_for_the_rounding_of_the_time_are_tied():
-    """They are 1.8e-20 m above it and go on by 0.7 m/s; above it they would part at once, as the tip pulls."""
-    scene = named("meets at the equilibrium")
-    assert kinds(event_driven.integrate(scene, sample_times=[0.0])) == ["impact"]
 
 
 @pytest.mark.parametrize(("degree", "n"), [(1, 40), (2, 16), (3, 8), (4, 5)])
@@ -159,15 +103,6 @@ def test_a_beam_of_few_modes_starts_and_answers_static_forces_as_that_of_all(n_m
         expected, found = (m.basis @ (getattr(m, force) / m.omega**2) for m in (every, few))
         np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
     np.testing.assert_allclose(few.basis @ few.slope_shape, assemble(given).slope_shape, atol=1e-12)
-
-
-def test_a_slender_beam_of_many_modes_starts_as_it_is_given():
-    """A static shape that the modes span but for 1e-10 takes nothing of the start u = x, of which they lack 1e-3."""
-    scales = {"length": 1.0, "area": 1e-4, "second_moment_of_area": 1e-9, "density": 1.0}
-    given = beam(1.0, 0.4, **scales, n_elements=60, element_degree=3, n_modes=150)
-    found = modal_beam(given)
-    deflections = (found.basis @ found.slope_shape)[1::2]
-    np.testing.assert_allclose(deflections, assemble(given).slope_shape[1::2], atol=1e-12)
 
 
 @pytest.mark.parametrize(("metre", "second"), [(1e-9, 1.0), (1.0, 1e-9), (1e3, 1.0)])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bodies import pair_of
 
-from springbeam.motion.events import Event, EventKind
+from springbeam.motion.events import Event
 from springbeam.results.dense import inside
 from springbeam.results.records import STEP
 from springbeam.results.totals import totals
@@ -45,18 +45,6 @@ def parabola(t):
     return 12.0 * t * (1.0 - t), 12.0 - 24.0 * t, -24.0
 
 
-def test_what_events_take_is_of_the_stop_or_of_the_ends_that_meet():
-    """1, 2, 4 … 64 J by the events of each kind: strokes on the stop and seating take 2 + 32 J, the others 93."""
-    events = [Event(0.1 * k, kind, energy_loss=2.0**k) for k, kind in enumerate(EventKind)]
-    steps = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 1.0, 11))
-    numbers = found(steps, *events)
-    assert (numbers["loss_stop"], numbers["loss_impact"]) == (34.0, 93.0)
-    assert (numbers["stop_strokes"], numbers["last_impact_time"]) == (2, 0.5)  # the seating, of all
-    assert found(steps, *events[2:])["stop_strokes"] == 1
-    assert found(steps, events[0])["last_impact_time"] == 0.0
-    assert "last_impact_time" not in found(steps, *events[2:5])
-
-
 @pytest.mark.parametrize("window", [1e-3, 0.5, 0.97])
 @pytest.mark.parametrize("ends", [[0.0, 1.0], [0.0, 0.31, 0.33, 0.6, 1.0]])
 def test_a_window_need_not_begin_or_end_at_a_row(ends, window):
@@ -82,18 +70,6 @@ def test_durations_and_rebound():
     assert "rebound_velocity" not in found(steps, events[0], apart=False)
     assert numbers["bounce_time"] == pytest.approx(0.8, rel=1e-15)
     assert "bounce_time" not in found(steps[:6], *events[:5])  # it flies where the run ends
-
-
-def test_a_tip_that_strikes_the_stop_itself():
-    scene = with_changes(SCENE, spring=None)
-    steps = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 1.0, 11))
-    steps["foundation_force"][5:7] = steps["contact_force"][5:7] = 3.0
-    numbers = found(
-        steps, Event(0.2, "stop_impact", v_tip=0.7, impulse_contact=0.5, impulse_foundation=0.5), scene=scene
-    )
-    assert numbers["foundation_impulse"] == pytest.approx(0.5 + 3.0 * 0.2, rel=1e-14)
-    assert numbers["contact_impulse"] == numbers["foundation_impulse"]
-    assert numbers["rebound_velocity"] == 0.7
 
 
 @pytest.mark.parametrize("ends", [[0.0, 1.0], [0.0, 0.45, 1.0]])
@@ -125,15 +101,6 @@ def moving(ends, path):
         return once(b), once.integ(lbnd=a)(b)
 
     return steps_with(lambda t: (0.0, 0.0, 0.0), ends, path, path.deriv(), integrals)
-
-
-def test_of_windows_with_one_mean_the_first_is_told():
-    """Whatever rounding makes of a force that is constant from 0.3 on, in steps that are no binary fractions."""
-    force = 0.7
-    ends = np.unique(np.append(0.3, np.linspace(0.0, 1.7, 38)))
-    numbers = found(steps_with(lambda t: (force if t >= 0.3 else 0.0, 0.0, 0.0), ends), window=0.19)
-    assert numbers["contact_force_max"] == pytest.approx(force, rel=1e-12)
-    assert numbers["contact_force_max_time"] == pytest.approx(0.3, rel=1e-12)
 
 
 def test_the_window_is_a_fiftieth_of_the_slowest_period():

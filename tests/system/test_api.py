@@ -6,27 +6,12 @@ import numpy as np
 import pytest
 import tomli_w
 from bodies import DuffingBody, beam_body
-from commands import printed
 
 import springbeam
 from springbeam import RunStopped, SceneError, Simulation, load_scene, simulate, with_changes
 from springbeam.scene import scene_from_dict
 
 SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2}, coupling={"macro_step": 1e-3, "degree": 2})
-
-
-def test_rows_at_an_interval_are_those_of_at(here):
-    assert 0.072 / 3e-3 < 24.0
-    printed("run", "soft", "--set=time.t_end=0.072", "--out=rows", "--no-plots", "--output-interval=3e-3")
-    printed("run", "soft", "--set=time.t_end=0.072", "--out=all", "--no-plots")
-    every = springbeam.load("all")
-    expected = every.at(np.minimum(3e-3 * np.arange(25), 0.072))
-    rows = np.genfromtxt("rows/trajectory.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
-    assert list(rows.dtype.names) == list(every.columns)
-    for name in every.columns:
-        assert np.array_equal(rows[name], expected[name]), name
-    # The run itself is there as well.
-    assert np.array_equal(springbeam.load("rows").time, every.time)
 
 
 # -- handed on ------------------------------------------------------------------------------------------------------
@@ -144,13 +129,6 @@ def test_a_scene_may_be_a_name_a_file_or_tables(tmp_path):
         assert simulation.scene == load_scene("duffing")
     with pytest.raises(SceneError, match="sofft: no such file, and no shipped scene; did you mean soft"):
         simulate("sofft")
-
-
-def test_numbers_of_numpy_are_numbers():
-    load = {"on": "beam", "shape": np.array([1.0, -0.5]), "amplitude": np.arange(3)[2]}
-    scene = with_changes(load_scene("soft"), beam={"n_elements": np.int32(7)}, loads=[load])
-    assert (scene.beam.n_elements, type(scene.beam.n_elements)) == (7, int)
-    assert (scene.loads[0].shape, scene.loads[0].amplitude) == ((1.0, -0.5), 2.0)
 
 
 def test_a_simulation_gives_its_fmus_back_once_and_steps_no_more():

@@ -6,7 +6,7 @@ import pytest
 import scenes
 from faulty import installed
 
-from springbeam import load_scene, simulate, with_changes
+from springbeam import simulate
 from springbeam.bodies.fmu import release
 
 SET_SLOPES = "fmi2SetRealInputDerivatives"
@@ -47,22 +47,3 @@ def test_flight_costs_one_step_of_each_fmu(counted, name):
         made = [calls[body, f"fmi2{function}"] for function in ("DoStep", "GetFMUstate", "SetFMUstate", "SetReal")]
         assert made == [n, n + 1, 0, n + 1 + (name == "loads" and body == "beam")]
         assert calls[body, SET_SLOPES] == (10 if (name, body) == ("loads", "beam") else 0)
-
-
-@pytest.mark.parametrize(("H", "degree"), [(2.5e-4, 0), (1e-3, 0), (1e-3, 2)])
-def test_a_tied_step_costs_two_steps_of_each_body(counted, H, degree):
-    """One to see what is left of the gap, one to close it; what a unit of each coefficient does is measured once for
-    each size of step: H/8 after the impact, what is left of H, and H."""
-    coupling = {"macro_step": H, "degree": degree}
-    run, calls = counted(with_changes(load_scene("soft"), coupling=coupling, time={"t_end": 0.071}))
-    summary = run.summary
-    of_impact = 1  # a trial step for the force after it
-    for body in ("beam", "spring"):
-        assert [summary[f"{body}_{what}"] for what in ("steps", "rollbacks")] == [
-            calls[body, f"fmi2{function}"] for function in ("DoStep", "SetFMUstate")
-        ]
-        assert (
-            summary[f"{body}_steps"] <= 2 * summary["macro_steps"] + 3 * (degree + 1) + 1
-        )  # a trial step after the impact
-    # Each correction of the force is a step of the spring; to measure its response takes d + 2.
-    assert 0 <= summary["spring_steps"] - summary["macro_steps"] - summary["iterations"] <= degree + 2 + of_impact

@@ -55,6 +55,3 @@ def test_few_are_kept_and_the_oldest_is_freed(monkeypatch):
     release()
     assert len(closed) == len(springs)
     assert not any(one.faultless for one in closed)
-
-
-# -- either version of FMI

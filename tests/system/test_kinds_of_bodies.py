@@ -141,13 +141,6 @@ def test_a_body_that_ignores_what_a_degree_needs_is_run_with_degree_0_and_refuse
     assert again.motion()[:2] == (y, -0.3)
 
 
-def test_a_trial_step_tells_the_acceleration_wherever_the_body_is():
-    """k1 = 3 N/m and k2 = 0.5 N/m³ at 0.3 m, of 2 kg."""
-    body = DuffingBody(2.0, 3.0, 0.5, y=0.3, z=-1.0)
-    assert body.trial_acceleration(0.0, 0.1) == pytest.approx(-(3.0 * 0.3 + 0.5 * 0.3**3) / 2.0, rel=1e-3)
-    assert body.motion()[:2] == (0.3, -1.0)
-
-
 def test_the_damper_of_an_element_takes_what_mass_and_spring_lose_wherever_its_rest_is():
     body = SpringDamper(2.0, 80.0, 0.6, rest=0.3, displacement=0.1, velocity=-1.0, external_force=5.0)
     at_start = sum(body.energies())

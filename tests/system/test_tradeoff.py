@@ -1,30 +1,12 @@
 """The trade between error and cost, on the FMUs: what is swept, judged and named."""
 
-import numpy as np
 import pytest
-from commands import HANGS
 from references import reference
 from scenes import kinds, soft
 
-from springbeam.results.distance import motion
-from springbeam.scene import load_scene, with_changes
 from springbeam.studies import tradeoff
-from springbeam.studies.design import with_keys
 from springbeam.studies.metrics import costs
 from springbeam.studies.tradeoff import Tradeoff, cheapest, pareto
-
-
-def test_a_curve_between_few_points_is_judged_too(monkeypatch):
-    """Between them one step of the cubic start of a scheme is worse than at them: 16 ms, 4 steps."""
-    monkeypatch.setattr(tradeoff, "_LIMIT", HANGS)  # on a busy machine, too, nothing is given up
-    study = Tradeoff.of(soft(), until=0.06, repeats=1)
-    coarse = next(case for case in study.cases().values() if case["family"] == "energy 2")
-    scene = with_keys(study.scene, coarse)
-    run = tradeoff.run_in_memory(scene)
-    exact = reference(scene, sample_times=run.time)
-    rows = np.searchsorted(exact.time, run.time)
-    at_points = motion(run.columns, {name: exact[name][rows] for name in ("u_tip", "y")})
-    assert study.record(coarse)["error_motion"] > 3.0 * at_points
 
 
 def test_what_a_configuration_costs_and_where_it_errs_is_that_of_its_run():
@@ -78,10 +60,3 @@ def test_every_axis_is_swept_that_the_law_has(law, there, absent):
     families = {case["family"] for case in study.cases().values()}
     assert ENERGY | {"energy 2 adaptive"} | there <= families
     assert absent not in families
-
-
-@pytest.mark.usefixtures("kept_references")
-def test_bounces_that_die_out_end_no_comparison():
-    """The last of them are microseconds apart: another one comes first if the initial velocity changes a little."""
-    scene = with_changes(load_scene("beam-on-stop"), beam={"n_elements": 4})
-    assert Tradeoff.of(scene).scene.time.t_end == 1.0

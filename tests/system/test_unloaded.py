@@ -13,8 +13,6 @@ from springbeam import SceneError, load_scene, simulate, with_changes
 from springbeam.motion.events import EventKind
 from springbeam.paper import co_simulation, monolithic
 from springbeam.scene import scene_from_dict
-from springbeam.scene.linearised import spring_frequency, spring_stiffness, well_depth
-from springbeam.scene.statics import resting_height
 
 RAISED = 0.375  # m; exact in binary, as the heights below
 ALONE = {
@@ -100,33 +98,6 @@ def test_algorithm_1_has_the_same_spring(program):
     np.testing.assert_allclose(
         moved["e_spring"] - k1 / 2.0 * Y0**2, loaded["e_spring"] - k1 * Y0 * loaded["y"], atol=1e-12
     )
-
-
-def test_a_preloaded_spring_rests_on_its_stop_with_its_force():
-    spring = {"mass": 0.5, "linear_stiffness": 40.0, "cubic_stiffness": 256.0, "unloaded": -0.125}
-    run = simulate(scene_from_dict(ALONE | {"spring": spring, "stop": {"position": 0.0}}))
-    assert set(run.foundation_force[1:]) == {40.0 * 0.125 + 256.0 * 0.125**3}
-    assert np.ptp(run.y) == 0.0
-
-
-def test_the_frequency_of_a_spring_is_the_root_of_its_stiffness_over_its_mass():
-    slow = with_changes(scene_from_dict(ALONE), spring={"linear_stiffness": 0.125, "cubic_stiffness": 0.0})
-    assert spring_frequency(slow) == pytest.approx(0.5, rel=1e-14)
-
-
-def test_what_is_known_before_a_run_moves_with_the_spring():
-    for k2, load in ((900.0, 0.0), (-100.0, 0.3)):
-        scene = with_changes(scene_from_dict(ALONE), spring={"cubic_stiffness": k2, "external_force": load})
-        high = raised(scene)
-        assert spring_stiffness(high) == pytest.approx(spring_stiffness(scene), rel=1e-14)
-        assert spring_frequency(with_changes(high, stop=None)) == pytest.approx(
-            spring_frequency(with_changes(scene, stop=None)), rel=1e-14
-        )
-        assert resting_height(high.spring, load) - RAISED == pytest.approx(
-            resting_height(scene.spring, load), rel=1e-12
-        )
-        if k2 < 0.0:
-            assert well_depth(high) == pytest.approx(well_depth(scene), rel=1e-12)
 
 
 # -- a gap ---------------------------------------------------------------------------------------------------------
