@@ -10,7 +10,6 @@ from springbeam.scene.files import tomllib
 # -- fmi2DoStep: which steps are refused, and what a refused step leaves behind ---------------------------------------
 
 
-OK = 0
 DISCARD = 2
 ERROR = 3
 
@@ -41,7 +40,6 @@ def test_no_step_past_the_stop_time_nor_from_another_time(case):
     assert "past the stop time 0.3" in k.message
 
 
-AHEAD = {"contact_law": 2, "tip_response": 1e-4}
 VALUES = tomllib.loads(Path(__file__).with_name("values.toml").read_text(encoding="utf-8"))
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import tomli_w
 from bodies import DuffingBody, beam_body
+from commands import printed
 
 import springbeam
 from springbeam import RunStopped, SceneError, Simulation, load_scene, simulate, with_changes
