@@ -20,6 +20,7 @@ import subprocess
 import sys
 import sysconfig
 import venv
+from collections import Counter
 from pathlib import Path
 
 import coverage
@@ -169,22 +170,36 @@ class Copy:
         (self.root / path).write_bytes((ROOT / path).read_bytes())
 
 
-def passing(data, path, line):
-    """Return the tests that pass a line, those that pass the fewest lines first."""
-    sizes = data.setdefault("sizes", {})
-    measured = data["coverage"]
-    if not sizes:
-        for file in measured.measured_files():
-            for names in measured.contexts_by_lineno(file).values():
-                for name in names:
-                    sizes[name] = sizes.get(name, 0) + 1
-    (file,) = [file for file in measured.measured_files() if file.endswith(f"/{path}")] or [None]
-    lines = measured.contexts_by_lineno(file) if file else {}
-    found = {name.partition("|")[0] for name in lines.get(line, ()) if name}
-    return sorted(found, key=lambda name: sizes.get(f"{name}|run", 0))
+class Coverage:
+    """Which tests pass a line, of those that there are."""
+
+    def __init__(self, there, file):
+        if not file.exists():
+            there.run(there.python, "-m", "pytest", "-q", "-n", "2", "--cov", "--cov-context=test", "--cov-report=")
+        self.data = coverage.CoverageData(str(file))
+        self.data.read()
+        collect = [
+            there.python,
+            "-m",
+            "pytest",
+            "--collect-only",
+            "-q",
+            "tests/master",
+            "tests/system",
+            "tests/verdicts",
+        ]
+        self.there = set(subprocess.run(collect, cwd=there.root, capture_output=True, text=True).stdout.splitlines())
+        contexts = [self.data.contexts_by_lineno(file).values() for file in self.data.measured_files()]
+        self.sizes = Counter(name for lines in contexts for names in lines for name in names)
+
+    def passing(self, path, line):
+        """Return the tests that pass a line, those that pass the fewest lines first."""
+        files = [file for file in self.data.measured_files() if file.endswith(f"/{path}")]
+        found = {name.partition("|")[0] for file in files for name in self.data.contexts_by_lineno(file).get(line, ())}
+        return [name for name in sorted(found, key=lambda name: self.sizes[f"{name}|run"]) if name in self.there]
 
 
-def found_by(there, data, path, line, native):
+def found_by(there, covered, path, line, native):
     """Return what finds the fault that is planted in the copy; "" if nothing does."""
     if native:
         if not there.build():
@@ -195,7 +210,7 @@ def found_by(there, data, path, line, native):
             if not there.tests(folder):
                 return folder
         return ""
-    tests = passing(data, path, line)
+    tests = covered.passing(path, line)
     if not tests and not there.tests("tests/master", "tests/system"):  # run at import, or in other processes
         return "all tests"
     for begin, end in ((0, 40), (40, 200), (200, None)):
@@ -220,15 +235,10 @@ def main():
     for native in kinds:
         share = drawn(native, options.faults // len(kinds), random.Random(options.seed))
         faults += [(native, *fault) for fault in share]
-    there = data = None
+    there = covered = None
     if not options.list:
         there = Copy(options.folder)
-        file = options.coverage or there.root / ".coverage"
-        if False in kinds and not file.exists():
-            there.run(there.python, "-m", "pytest", "-q", "-n", "2", "--cov", "--cov-context=test", "--cov-report=")
-        measured = coverage.CoverageData(str(file))
-        measured.read()
-        data = {"coverage": measured}
+        covered = Coverage(there, options.coverage or there.root / ".coverage") if False in kinds else None
     missed = []
     for native, path, line, span, other in faults:
         text = (ROOT / path).read_bytes()
@@ -237,7 +247,7 @@ def main():
             print(what)
             continue
         there.planted(path, span, other)
-        by = found_by(there, data, path, line, native)
+        by = found_by(there, covered, path, line, native)
         there.mended(path)
         print(f"{by or 'NOT FOUND'}: {what}", flush=True)
         missed += [what] * (not by)

@@ -18,7 +18,6 @@ OK = 0
 ERROR = 3
 #: Parameters of the law that looks ahead.
 CALLS = tomllib.loads(Path(__file__).parents[1].joinpath("bad_inputs.toml").read_text(encoding="utf-8"))["calls"]
-AHEAD = {"contact_law": 2, "tip_response": 1e-4}
 
 
 @pytest.mark.parametrize(
@@ -33,17 +32,6 @@ def test_instantiation_is_refused_with_a_reason(case, options, why):
     k = case.instance(**options)
     assert not k.slave.component
     assert why in k.message
-
-
-def test_only_co_simulation_is_provided(beam, version):
-    k = beam.instance() if version == "3.0" else beam.instance(kind=0)
-    if version == "3.0":
-        token = beam.description.guid.encode()
-        made = beam.slave.fmi3InstantiateModelExchange(b"test", token, None, False, False, None, k.logger)
-    else:
-        made = k.slave.component
-    assert not made
-    assert "only co-simulation" in k.message
 
 
 def test_debug_messages_only_when_asked_for(case):
@@ -164,20 +152,6 @@ def test_reset_starts_all_over(case):
             used.start()
         used.step(0.0, 0.02)
         assert used.outputs() == fresh.outputs()
-
-
-def test_parameters_that_are_changed_after_outputs_were_read_count(case):
-    first = {"beam": {"gravity": 0.1, "tip_load_coefficient": 2.0}, "spring": AHEAD}[case.name]
-    k = case.instance().enter(**first, **case.parameters)
-    k.outputs()
-    for name in first:
-        k.set(name, float(case.variables[name].start))
-    k.slave.exitInitializationMode()
-    plain = case.moving()
-    for one in (k, plain):
-        one.step(0.0, 0.02)
-    names = case.outputs + case.named("local")
-    assert k.get(*names) == plain.get(*names)
 
 
 @pytest.mark.parametrize("version", ["3.0"])

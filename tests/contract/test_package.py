@@ -37,18 +37,6 @@ def test_static_model_is_the_packed_one_and_fmpy_reports_nothing(case, tmp_path)
     assert without_list == printed.read_text(encoding="utf-8")
 
 
-def test_sources_that_are_named_are_packed(case):
-    # That they compile is for tests/interop/test_compile.py. Without the source of SUNDIALS the spring's are not named.
-    sources = case.folder / "sources"
-    own = {p.name for p in sources.rglob("*.cpp")}
-    surface = f"fmi{case.version[0]}_slave.cpp"
-    assert own >= {f"{case.name}_fmu.cpp", surface, "instance.cpp", f"{case.name}.cpp"}
-    named = {n for b in case.description.buildConfigurations for s in b.sourceFileSets for n in s.sourceFiles}
-    if case.name == "beam" or (sources / "ida").exists():
-        assert {Path(n).name for n in named if n.endswith(".cpp")} == own
-    assert [n for n in named if not (sources / n).is_file()] == []
-
-
 def test_binary_needs_only_libc_and_libm_and_binds_its_own_symbols_first(case):
     dynamic = ran("readelf", "-d", case.binary)
     needed = set(re.findall(r"\(NEEDED\).*\[(.*)\]", dynamic))

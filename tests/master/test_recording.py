@@ -27,7 +27,7 @@ from springbeam.results.directory import (
     ResultsUnreadable,
     RunDirectory,
 )
-from springbeam.results.files import export, load_summary, load_trajectory, read_run
+from springbeam.results.files import export, load_summary, load_trajectory
 from springbeam.results.recording import FileRecorder, MemoryRecorder
 from springbeam.results.records import STEP_COLUMNS
 from springbeam.run.log import Log
@@ -87,27 +87,6 @@ def all_of(run):
     parts = (*(run.shapes or ()), () if run.steps is None else run.steps)
     rows = [(name, values.tolist()) for name, values in run.columns.items()]
     return rows, run.events, [np.asarray(part).tobytes() for part in parts]
-
-
-@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
-def test_memory_and_files_hold_the_same_and_the_rows_are_its_columns(tmp_path, scene):
-    kept = [block(300, scene), block(77, scene, 4.0, 300)]
-    kept[0][0]["z_after"][:4] = -0.0, 5e-324, 1.7e308, 1.0 / 3.0
-    memory = MemoryRecorder(scene)
-    files = FileRecorder(scene, RunDirectory.create(tmp_path / "run"))
-    for recorder in (memory, files):
-        for steps, events, shapes in kept:
-            recorder.keep(steps, events, shapes)
-        recorder.finish({"status": "done"})
-    run = memory.trajectory()
-    loaded = load_trajectory(tmp_path / "run")
-    assert all_of(run) == all_of(loaded)
-    assert (len(run), len(run.events), run.summary["status"]) == (377, 38, "done")
-    assert loaded.scene == scene
-    (tmp_path / "run" / "steps.bin").unlink()
-    rows = read_run(RunDirectory(tmp_path / "run"))
-    for name in run.columns:
-        assert rows[name].tolist() == run[name].tolist()
 
 
 # -- killed -------------------------------------------------------------------------------------------------------

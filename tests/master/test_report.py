@@ -111,16 +111,6 @@ def test_curves_are_the_columns_bit_for_bit_in_single_precision():
 # -- motion -------------------------------------------------------------------------------------------------------
 
 
-def test_frames_are_the_recorded_shapes_with_the_spring_of_the_same_time():
-    run = a_trajectory()
-    times = run.time[::3]
-    sparse = dataclasses.replace(run, shape_table=run.shape_table[::3])
-    motion = shown(sparse).data["motion"]
-    assert motion["time"] == pytest.approx(times, rel=1e-8)
-    assert np.array(motion["deflection"]) == pytest.approx(sparse.shapes[1], rel=1e-8)
-    assert motion["y"] == pytest.approx(run.y[::3], rel=1e-8)
-
-
 # -- what is wrong with them --------------------------------------------------------------------------------------
 
 

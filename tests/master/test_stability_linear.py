@@ -1,38 +1,16 @@
 """Amplification matrices: exact propagators, the schemes against their solvers, known constants."""
 
-from functools import lru_cache
-
 import numpy as np
 import pytest
-from bodies import DuffingBody, ModalBody, solve, unit_beam
 from scipy.linalg import expm
 
-from springbeam.coupling.exchange import Exchange
-from springbeam.coupling.soft import SoftSolver
-from springbeam.coupling.solver import StepSolver
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import load_scene, with_changes
-from springbeam.scene.laws import Link
 from springbeam.scene.statics import tip_inertia
 from springbeam.studies.predict import (
-    LinearBody,
-    LinearPair,
-    amplification,
     impulse_integrals,
     predict,
-    spectral_radius,
 )
-
-EXCHANGES = [("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)]
-
-
-@lru_cache(maxsize=8)
-def pair(n=4, mass=1.0, stiffness=0.0, k=3.0, damping=0.0):
-    """An undamped unit beam, EI = KAG = 100, and a linear spring."""
-    beam = unit_beam(n)
-    modes = LinearBody(beam.omega**2, np.zeros_like(beam.omega), beam.b)
-    spring = LinearBody(np.array([k / mass]), np.zeros(1), np.array([mass**-0.5]))
-    return LinearPair(modes, spring, stiffness, damping)
 
 
 def omega_max(p):
@@ -68,54 +46,6 @@ def test_integrals_of_the_impulse_response(omega, c, h, bound):
 
 
 # -- schemes --------------------------------------------------------------------------------------------------------
-
-
-def solved(p, scheme, degree, h):
-    """The amplification matrix column by column, by the solvers of a run on bodies exact to rounding.
-
-    A closed contact is a link.
-    """
-    r = len(p.beam.b)
-    mass = p.spring.mass
-    columns = []
-    for unit in np.eye(2 * r + 2):
-        beam = ModalBody(np.sqrt(p.beam.omega2), p.beam.b, unit[:r], unit[r : 2 * r])
-        spring = DuffingBody(mass, float(p.spring.omega2[0]) * mass, 0.0, *(unit[2 * r :] * mass**-0.5))
-        law = Link(p.stiffness, p.damping)
-        if not p.soft:
-            coupling = StepSolver(degree, 1e-13)
-        elif scheme == "energy":
-            coupling = SoftSolver(law, degree, 1e-14)
-        else:
-            coupling = Exchange(law, scheme == "gauss_seidel", degree)
-        solve(coupling, h, beam, spring)
-        columns.append(np.concatenate([beam.a, beam.v, np.array([spring.y, spring.z]) * mass**0.5]))
-    return np.array(columns).T
-
-
-def radius(matrix):
-    return np.abs(np.linalg.eigvals(matrix)).max()
-
-
-@pytest.mark.parametrize(("scheme", "degree"), EXCHANGES)
-@pytest.mark.parametrize(("mass", "stiffness", "damping", "turn"), [(100.0, 1e4, 0.0, 3.0), (0.5, 0.0, 2.0, 0.5)])
-def test_the_matrix_is_that_of_the_solvers(scheme, degree, mass, stiffness, damping, turn):
-    """Column by column; the solvers' tolerances are 1e-13 of a motion. C = k p + c ṗ, also without k."""
-    p = pair(2, mass, stiffness, damping=damping)
-    h = turn / omega_max(p)
-    ours = amplification(p, scheme, degree, h)
-    theirs = solved(p, scheme, degree, h)
-    assert np.abs(ours - theirs).max() < 1e-9 * np.abs(ours).max()
-    assert spectral_radius(p, scheme, degree, h) == pytest.approx(radius(theirs), rel=1e-8)
-
-
-@pytest.mark.parametrize("degree", [0, 1, 2])
-@pytest.mark.parametrize(("stiffness", "turn"), [(0.0, 3.0), (1e4, 30.0)])
-def test_energy_is_stable_at_any_step_so_that_nothing_is_predicted(degree, stiffness, turn):
-    """The matrix of its solvers has no eigenvalue outside of the unit circle, for light and heavy springs."""
-    for mass in (0.01, 100.0):
-        p = pair(2, mass, stiffness)
-        assert radius(solved(p, "energy", degree, turn / omega_max(p))) == pytest.approx(1.0, abs=1e-9)
 
 
 # -- scenes ---------------------------------------------------------------------------------------------------------
@@ -156,23 +86,3 @@ def test_a_scene_is_told_by_the_numbers_of_hand_calculation():
     assert p["frequencies"] == pytest.approx(omega[:3] / (2.0 * np.pi), rel=1e-14)
     assert p["frequencies"][0] == pytest.approx(told["frequency"], rel=1e-3)  # which has no mesh
     assert (p["modes"], p["resolved_modes"], p["static_shapes"]) == (5, 3, 3)
-
-
-def test_a_motion_that_is_not_resolved_is_told_with_what_would_resolve_it():
-    """The lowest mode turns 12.7 rad/s, a load of 50 Hz 314 rad/s."""
-    load = {"on": "tip", "signal": "harmonic", "frequency": 50.0, "amplitude": 1e-3}
-    given = {"beam": {"n_elements": 16}, "loads": [load], "coupling": {"macro_step": 0.1}}
-    notes = predict(with_changes(load_scene("soft"), **given))["notes"]
-    told = [note for note in notes if note.startswith("the motion is not resolved: ")]
-    assert [" turns 31.4 rad " in told[0], "; H <= 0.00318 s " in told[0]] == [True, True]
-    assert [" lowest mode turns 1.27 rad " in told[1], "; H <= 0.0785 s " in told[1]] == [True, True]
-
-
-def test_a_length_in_mm_for_m_is_said_plainly():
-    """The damping of such a contact takes 1.8e8/s: the smallest step tried was unstable, which
-    had been a traceback of brentq."""
-    given = {"scheme": "gauss_seidel", "degree": 1}
-    found = predict(with_changes(load_scene("vibro-impact"), beam={"length": 1000.0}, coupling=given))
-    assert any("[beam] length = 1000.0" in note and "is a length in mm?" in note for note in found["notes"])
-    assert 0.0 < found["exchange"]["critical_step"] < found["macro_step"]
-    assert found["exchange"]["spectral_radius"] > 1.0 + found["exchange"]["threshold"]

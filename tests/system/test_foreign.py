@@ -5,7 +5,6 @@ import importlib
 import os
 import signal
 import threading
-from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from time import sleep
@@ -15,7 +14,7 @@ import oscillator
 import pytest
 import scenes
 import tomli_w
-from commands import HANGS, command, printed, refused
+from commands import HANGS, command, printed
 from scenes import kinds
 
 from springbeam import RunStopped, SceneError, SpringDamper, simulate, with_changes
@@ -315,13 +314,6 @@ def test_a_slope_that_an_fmu_does_not_follow_is_not_used(fmu):
     assert any("a force that grows over a step is not followed" in warning for warning in run.summary["warnings"])
 
 
-def test_a_guess_is_set(fmu):
-    before = 'name="x0" valueReference="14" causality="'
-    edit = (f'{before}parameter" variability="fixed"', f'{before}local" variability="continuous" initial="approx"')
-    spring = {"parameters": {"m": M2, "k": 0.0, "x0": -0.5}}
-    assert simulate(pair(fmu(edits=(edit,)), spring=spring)).y[0] == -0.5
-
-
 #: Units of an FMU that counts in mm, ms and kN, its masses in kg: SI units of each.
 _MM = 'm="1" factor="0.001"'
 _MS = 's="1" factor="0.001"'
@@ -364,11 +356,6 @@ def test_units_that_an_fmu_declares_are_converted(fmu, tmp_path):
     assert run["e_spring"] == pytest.approx(simulate(pair(fmu())).e_spring, rel=1e-9, abs=1e-12)
 
 
-def test_si_units_are_known_by_their_names(fmu):
-    path = fmu(edits=oscillator.in_units("s", {"ix": "m.s", "F": "kg.m/s^2"}, {}))
-    assert error(simulate(pair(path)), linked) < 1e-9
-
-
 def test_the_body_that_the_page_builds_by_python_fmu_is_the_element(tmp_path, monkeypatch):
     """docs/own_fmu.md says how close it is, 1e-12 m: Runge-Kutta steps of order 4 at H = 1e-3 s."""
     monkeypatch.syspath_prepend(Path(__file__).parents[2] / "docs")
@@ -406,35 +393,6 @@ def hanging(monkeypatch):
     monkeypatch.setattr(isolated, "monotonic", lambda: clock() + 3600.0 * hangs())
     monkeypatch.setattr(Connection, "poll", polled)
     return hangs
-
-
-def test_a_process_waits_for_the_next_body_of_its_file(fmu, monkeypatch):
-    """The one that has waited longest makes room for another.
-
-    One that has crashed does not wait, nor one that may have one instance only.
-    """
-    monkeypatch.setattr(isolated, "_MOST_IDLE", 1)
-    monkeypatch.setattr(isolated.FmuProcess, "_idle", [])
-
-    def used(path, lie="none"):
-        """Make a step of a body and return the process it was in."""
-        spec = pair(path, spring={"parameters": {"lie": oscillator.LIES[lie]}}).lower
-        body = ForeignBody(spec, False, (0.0, 2.0), None)
-        process = body._port._process
-        with suppress(FmuError):
-            body.advance(1.5, 0.1, (0.0, 0.0, 0.0))
-        body.close()
-        return process
-
-    first = used(fmu())
-    assert used(fmu()) is first
-    another = used(fmu("another"))
-    assert first._process.poll() is not None
-    assert used(fmu("another"), "late crash") is another
-    assert used(fmu("another")) is not another
-    guid = ('guid="oscillator"', 'guid="once"')  # the second instance in a process fails
-    once = ('modelIdentifier="oscillator"', 'modelIdentifier="oscillator" canBeInstantiatedOnlyOncePerProcess="true"')
-    assert used(fmu(edits=(guid, once))) is not used(fmu(edits=(guid, once)))
 
 
 def test_ctrl_c_names_an_fmu_that_does_not_return(fmu, monkeypatch, hanging):
@@ -525,14 +483,3 @@ def test_events_are_those_of_the_element(fmu):
     assert [e.time for e in run.events] == pytest.approx([e.time for e in exact.events], abs=5e-9)
     assert exact.summary["max_energy_residual"] < 1e-11
     assert run.summary["max_interface_residual"] < 1e-12
-
-
-def test_commands(fmu, tmp_path, unpainted):
-    names = dict.fromkeys(("integral", "integral_2", "impulse", *ENERGIES))
-    scene = pair(fmu(), spring=names, contact={"damping": 0.0}, coupling={"degree": 0}, time={"t_end": 0.2})
-    file = tmp_path / "linked.toml"
-    file.write_text(tomli_w.dumps(scene.model_dump(exclude_none=True)), encoding="utf-8")
-    assert "the scene can be run" in printed("doctor", file)
-    printed("run", file, "--accuracy", "1e-2", "--out", tmp_path / "run", "--quiet")
-    printed("report", tmp_path / "run")
-    assert "no reference knows this body" in refused("crosscheck", file)

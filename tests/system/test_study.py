@@ -3,11 +3,9 @@
 import json
 import re
 
-import pytest
 from commands import Interrupt, command, printed, swept
 from worked import Deadly
 
-from springbeam.results.directory import ResultsExist, ResultsInUse
 from springbeam.scene import load_scene
 from springbeam.studies import sweep
 from springbeam.studies.study import FILE, Records
@@ -34,27 +32,6 @@ def test_only_cases_without_a_record_are_computed(tmp_path):
         assert study.computed(records, report=seen.append) == whole
     assert len(seen) == 2
     assert (tmp_path / FILE).read_bytes() == b"".join(lines)
-
-
-def test_another_study_is_not_mixed_in(tmp_path):
-    with Records(plan(), tmp_path / "s") as records:
-        plan().computed(records)
-        with pytest.raises(ResultsInUse), Records(plan(), tmp_path / "s"):
-            pass
-    other = plan(masses="1,3")
-    with pytest.raises(ResultsExist, match="another study"):
-        Records(other, tmp_path / "s")
-    with Records(other, tmp_path / "s", replace=True):  # results stay until there are new ones
-        assert len(Records(plan(), tmp_path / "s").by_name) == len(plan().cases())
-    (tmp_path / "s" / "sweep.png").touch()
-    with Records(other, tmp_path / "s", replace=True) as records:
-        other.computed(records)
-    assert not (tmp_path / "s" / "sweep.png").exists()  # of the one before
-    assert len(Records(other, tmp_path / "s").by_name) == len(other.cases())
-    (tmp_path / "t").mkdir()
-    (tmp_path / "t" / "thesis.txt").write_text("mine")
-    with pytest.raises(ResultsExist, match="not empty"):
-        Records(plan(), tmp_path / "t")
 
 
 def test_a_killed_worker_loses_its_own_case_alone_and_only_if_it_dies_again(tmp_path, monkeypatch):

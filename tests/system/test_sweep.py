@@ -7,7 +7,7 @@ from runs import a_trajectory
 
 from springbeam.motion.events import Event, EventKind
 from springbeam.run.runner import run_in_memory
-from springbeam.scene import load_scene, scene_from_dict, with_changes
+from springbeam.scene import load_scene, with_changes
 from springbeam.studies import sweep
 from springbeam.studies.design import design, parse_axis, with_keys
 from springbeam.studies.metrics import METRICS as METRICS_THERE_ARE
@@ -105,24 +105,3 @@ def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
         assert rows["y_min"][k] == run.y.min()
         assert rows["energy_residual"][k] == run.summary["max_energy_residual"]
         assert rows["first_stop_impact"][k] == next(e.time for e in run.events if e.kind == "stop_impact")
-
-
-def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_doubled_period():
-    """A damped oscillator: A sin(2πft) at phase 0 is −A sin φ, its peak A; the bumper doubles the period at 45 Hz."""
-    drive = {"on": "spring", "signal": "harmonic", "frequency": 2.0, "amplitude": 3.0, "start": 0.05}
-    spring = {"mass": 1.0, "linear_stiffness": 40.0, "damping": 4.0}
-    scene = scene_from_dict(
-        {"time": {"t_end": 30.0}, "spring": spring, "coupling": {"macro_step": 0.02}, "loads": [drive]}
-    )
-    found = sweep.Sweep(scene=scene, vary=(), metric=("stroboscopic", "settled_y")).record({})
-    w = 4.0 * np.pi
-    exact = 3.0 / (40.0 - w * w + 4.0j * w)
-    assert len(found["stroboscopic"]) == 20
-    assert found["stroboscopic"] == pytest.approx([exact.imag] * 20, abs=1e-9)
-    assert found["settled_y"] == pytest.approx(abs(exact), rel=8e-3)  # of rows: (ωH)²/8 of it
-    todo = sweep.Sweep(
-        scene=load_scene("vibro-impact"), vary=("loads.0.frequency=35,45",), metric=("stroboscopic", "u_tip_max")
-    )
-    rows = todo.computed().values()
-    once, doubled = (np.unique(np.round(row["stroboscopic"], 5)) for row in rows)
-    assert (len(once), len(doubled)) == (1, 2)

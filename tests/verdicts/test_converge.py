@@ -17,12 +17,6 @@ def test_a_sequence_of_one_order_gives_it_and_its_limit(order, sizes):
     assert found.error == pytest.approx(0.1 * sizes[-1] ** -order, rel=1e-6)
 
 
-def test_what_hardly_converges_has_no_limit():
-    for order, hardly in ((0.4, True), (0.6, False)):
-        assert (extrapolated([n**-order for n in (1, 2, 4)], (1, 2, 4)).limit is None) is hardly
-    assert extrapolated([1.0, 2.0, 1.5], (1, 2, 4)) == extrapolated([2.0, 1.5], (1, 2)) == (-0.5, None, None, None)
-
-
 def test_errors_are_from_the_limit_and_as_given_is_the_mesh_of_the_scene():
     """1 m + (20/n)² m by 20, 40 and 80 elements; all numbers of modes leave 7 m."""
     scene = with_changes(load_scene("soft"), beam={"n_elements": 20})
@@ -33,22 +27,6 @@ def test_errors_are_from_the_limit_and_as_given_is_the_mesh_of_the_scene():
     found = judged(scene, rows, ("u_tip_end",))
     errors = [row["error_u_tip_end"] for row in found.tables["converge"]]
     assert errors[:3] == pytest.approx([1.0, 0.25, 0.0625], rel=1e-9)
-
-
-def test_beyond_all_modes_there_is_nothing():
-    """24 of 24 modes are the mesh's own solution. Its "error" was extrapolated from 6 and 12."""
-    values = (1.0, 1.5, 1.75)
-    sizes = (6, 12, 24)
-    assert extrapolated(values, sizes).limit == pytest.approx(2.0)
-    assert extrapolated(values, sizes, complete=True) == (0.25, None, 1.75, 0.0)
-    for elements, error in ((12, 0.0), (24, 0.25)):  # of 24 modes, of 48
-        scene = with_changes(load_scene("soft"), beam={"n_elements": elements, "n_modes": 24})
-        rows = [
-            {**mesh, "u_tip_end": value, "cost_wall_time": 1.0}
-            for mesh, value in zip(meshes(scene, 3).values(), 2 * values, strict=True)
-        ]
-        found = judged(scene, rows, ("u_tip_end",)).document["modes"]["settled"]["u_tip_end"]
-        assert found["error"] == pytest.approx(error)
 
 
 def test_linear_elements_converge_by_order_two(tmp_path):
