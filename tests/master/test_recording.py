@@ -5,6 +5,7 @@ import os
 import shutil
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from springbeam.results.directory import (
     PARQUET,
     PICTURES,
     REPORT,
+    TABLES,
     ResultsExist,
     ResultsInUse,
     ResultsUnreadable,
@@ -29,7 +31,7 @@ from springbeam.results.directory import (
 )
 from springbeam.results.files import export, load_summary, load_trajectory
 from springbeam.results.recording import FileRecorder, MemoryRecorder
-from springbeam.results.records import STEP_COLUMNS
+from springbeam.results.records import EVENT, STEP_COLUMNS
 from springbeam.run.log import Log
 from springbeam.run.outcome import RunStopped
 
@@ -89,6 +91,16 @@ def all_of(run):
     return rows, run.events, [np.asarray(part).tobytes() for part in parts]
 
 
+def test_a_run_without_records_is_kept_by_its_columns(tmp_path):
+    """That of a reference, or of Algorithm 1."""
+    steps, events, shapes = block(30)
+    run = MemoryRecorder(PAIR)
+    run.keep(steps, events, shapes)
+    made = replace(run.trajectory(), steps=None)
+    assert all_of(load_trajectory(recording.save(made, tmp_path / "run", replace=False))) == all_of(made)
+    assert [file.name for file in export(tmp_path / "run", "csv")] == [*TABLES]
+
+
 # -- killed -------------------------------------------------------------------------------------------------------
 
 
@@ -103,8 +115,7 @@ def test_a_kill_at_any_byte_leaves_all_blocks_but_the_last(tmp_path, monkeypatch
 
     monkeypatch.setattr(recording, "_append", noted)
     recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path / "whole"))
-    begun = sum(map(len, recorder._headers.values()))  # before these are written the directory has no summary
-    done = {begun: 0}  #: records by the bytes that are written with them
+    done = {0: 0}  #: records by the bytes that are written with them
     for rows, begin, t_end in ((5, 0, 0.1), (4, 5, 0.2), (12, 9, 0.9)):
         recorder.keep(*block(rows, t_end=t_end, begin=begin))
         done[sum(len(content) for _, content in writes)] = begin + rows
@@ -112,8 +123,8 @@ def test_a_kill_at_any_byte_leaves_all_blocks_but_the_last(tmp_path, monkeypatch
     whole = load_trajectory(tmp_path / "whole")
     killed = Path(shutil.copytree(tmp_path / "whole", tmp_path / "killed"))
     borders = np.cumsum([len(content) for _, content in writes])
-    for at in (*borders[borders >= begun], *np.random.default_rng(1).integers(begun, max(done), size=60)):
-        files = {path.name: b"" for path in recorder._headers}
+    for at in (*borders, *np.random.default_rng(1).integers(0, max(done), size=60)):
+        files = dict.fromkeys(("shapes.bin", "events.bin", "steps.bin"), b"")
         left = at
         for name, content in writes:
             files[name] += content[:left]
@@ -133,33 +144,32 @@ def test_a_kill_at_any_byte_leaves_all_blocks_but_the_last(tmp_path, monkeypatch
 
 @pytest.mark.parametrize(
     ("name", "cut"),
-    [("steps.bin", 1), ("steps.bin", 10_000), ("trajectory.csv", 40), ("shapes.csv", 1), ("events.csv", 1)],
+    [("steps.bin", 1), ("steps.bin", 10_000), ("shapes.bin", 1), ("events.bin", 1)],
 )
 def test_a_run_that_is_done_and_lacks_a_part_does_not_pass_as_whole(tmp_path, name, cut):
     filed(tmp_path / "run")
     path = tmp_path / "run" / name
     size = path.stat().st_size
     os.truncate(path, max(size - cut, 0))
-    said = rf"{name}: {max(size - cut, 0)} bytes, {size} bytes were written"
-    if name == "trajectory.csv":
-        said += "; springbeam export .* writes it again"
-    with pytest.raises(ResultsUnreadable, match=said):
+    with pytest.raises(ResultsUnreadable, match=rf"{name}: {max(size - cut, 0)} bytes, {size} bytes were written"):
         load_trajectory(tmp_path / "run")
     path.unlink()
     with pytest.raises(ResultsUnreadable, match=rf"{name}: missing"):
         load_trajectory(tmp_path / "run")
 
 
-def test_rows_are_written_again_from_the_records(tmp_path):
+def test_tables_are_written_again_from_the_arrays(tmp_path):
     filed(tmp_path / "run")
-    path = tmp_path / "run" / "trajectory.csv"
-    whole = path.read_bytes()
-    os.truncate(path, 1000)
-    assert export(tmp_path / "run", "csv") == [path]
-    assert path.read_bytes() == whole
-    # Other files cannot be made anew.
-    os.truncate(tmp_path / "run" / "events.csv", 100)
-    with pytest.raises(ResultsUnreadable, match=r"events\.csv: 100 bytes, \d+ bytes were written$"):
+    paths = [tmp_path / "run" / name for name in TABLES]
+    whole = [path.read_bytes() for path in paths]
+    for path in paths:
+        path.unlink()
+    assert all_of(load_trajectory(tmp_path / "run"))
+    assert export(tmp_path / "run", "csv") == paths
+    assert [path.read_bytes() for path in paths] == whole
+    # The arrays cannot be made anew.
+    os.truncate(tmp_path / "run" / "events.bin", 100)
+    with pytest.raises(ResultsUnreadable, match=r"events\.bin: 100 bytes, \d+ bytes were written$"):
         export(tmp_path / "run", "csv")
 
 
@@ -180,10 +190,9 @@ def test_tables_are_exported_as_parquet(tmp_path, scene):
 DAMAGE = {
     "nan in the records": ("steps.bin", lambda content: np.full(len(STEP_COLUMNS), np.nan).tobytes() + content),
     "records out of order": ("steps.bin", lambda content: content[52_800:] + content[:52_800]),
-    "too few events": ("events.csv", lambda content: b"\n".join(content.split(b"\n")[:-3]) + b"\n"),
-    "a word for a number": ("events.csv", lambda content: content.replace(b"0.5", b"five", 1)),
-    "another column of shapes": ("shapes.csv", lambda content: content.replace(b"u_0", b"w_0", 1)),
-    "a row of shapes too long": ("shapes.csv", lambda content: content.replace(b"\n0.0,", b"\n0.0,0.5,", 1)),
+    "too few events": ("events.bin", lambda content: content[: -3 * EVENT.itemsize]),
+    "an event that is none": ("events.bin", lambda content: content.replace("impact".encode("utf-32-le"), b"?" * 24)),
+    "nan in the shapes": ("shapes.bin", lambda content: np.full(64, np.nan).tobytes() + content[512:]),
     "half a summary": ("summary.json", lambda content: content[:-20]),
 }
 
@@ -203,7 +212,7 @@ def test_damage_of_a_run_that_goes_on_is_named_by_file(tmp_path, damage):
 # -- directories --------------------------------------------------------------------------------------------------
 
 
-WRITTEN = ["events.csv", "shapes.csv", "steps.bin", "summary.json", "trajectory.csv"]
+WRITTEN = sorted([*TABLES, "events.bin", "shapes.bin", "steps.bin", "summary.json"])
 RESULT_FILES = [*WRITTEN, PARQUET[0], PICTURES["positions"], REPORT, ANIMATIONS[0]]
 
 

@@ -75,6 +75,6 @@ def test_a_run_without_room_ends_with_3_and_leaves_what_there_was_room_for(tmp_p
     trajectory = load_trajectory(directory)
     assert trajectory.summary["status"] == "stopped"
     assert "File too large" in trajectory.summary["cause"]
-    cut = {name: (directory / name).read_bytes() for name in ("steps.bin", "shapes.csv")}
+    cut = {name: (directory / name).read_bytes() for name in ("steps.bin", "shapes.bin")}
     assert max(map(len, cut.values())) == limit  # of whichever grows faster
     assert all((long / name).read_bytes().startswith(content) for name, content in cut.items())

@@ -87,10 +87,10 @@ def export(
     directory: RunArgument,
     form: Annotated[
         Literal["csv", "parquet"],
-        typer.Option("--format", help="csv: trajectory.csv anew. parquet: rows, events and shapes."),
+        typer.Option("--format", help="Of the tables: rows, events and shapes."),
     ] = "csv",
 ) -> Findings:
-    """Write the tables of a run from its records (steps.bin), also of a run that was killed or is not finished.
+    """Write the tables of a run from its arrays, also of a run that was killed or is not finished.
 
     Example: springbeam export results/soft --format parquet
     """

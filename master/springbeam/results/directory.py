@@ -1,8 +1,7 @@
 """A run directory: its files, the claim on it, and the errors of one that cannot be read.
 
-It holds ``steps.bin`` (the records of the run), ``events.csv``, ``shapes.csv`` (the beam's deflection at
-`SHAPE_POINTS`), ``trajectory.csv`` (a row per accepted step), ``summary.json`` and pictures. ``files`` writes and reads
-each of them.
+Three arrays are the run, ``steps.bin``, ``events.bin`` and ``shapes.bin`` (`springbeam.results.records`); its scene is
+in ``summary.json``. Tables and pictures are made of them, and not read again. ``files`` writes and reads them.
 """
 
 from __future__ import annotations
@@ -31,7 +30,8 @@ PICTURES = {
     "moments": "g_moments.png",
 }
 OVERVIEW = "overview"
-#: What `springbeam export --format parquet` leaves there.
+#: The tables: rows, events and shapes, as CSV, and as `springbeam export --format parquet` leaves them there.
+TABLES = ("trajectory.csv", "events.csv", "shapes.csv")
 PARQUET = ("trajectory.parquet", "events.parquet", "shapes.parquet")
 #: What `springbeam report` and `springbeam animate` may leave there.
 REPORT = "report.html"
@@ -56,22 +56,22 @@ class RunDirectory:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self.steps = self.path / "steps.bin"
-        self.events = self.path / "events.csv"
-        self.shapes = self.path / "shapes.csv"
-        self.trajectory = self.path / "trajectory.csv"
+        self.events = self.path / "events.bin"
+        self.shapes = self.path / "shapes.bin"
+        self.rows = self.path / "rows.npz"  #: of a run without records: that of a reference, or of Algorithm 1
         self.summary = self.path / "summary.json"
         self._claim: finalize[..., RunDirectory] | None = None
         self._made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
 
     def results(self) -> list[Path]:
         """Return the result files that exist, and the files made from them."""
-        files = (self.summary, self.trajectory, self.events, self.shapes, self.steps)
-        made = (self.path / name for name in (*PARQUET, *PICTURES.values(), REPORT, *ANIMATIONS))
+        files = (self.summary, self.events, self.shapes, self.steps, self.rows)
+        made = (self.path / name for name in (*TABLES, *PARQUET, *PICTURES.values(), REPORT, *ANIMATIONS))
         return [file for file in (*files, *made) if file.exists()]
 
     def sizes(self) -> dict[str, int]:
         """Return the sizes of the files that hold the run [bytes], of those that exist."""
-        files = (self.steps, self.events, self.shapes, self.trajectory)
+        files = (self.steps, self.events, self.shapes, self.rows)
         return {file.name: file.stat().st_size for file in files if file.exists()}
 
     def claim(self) -> None:

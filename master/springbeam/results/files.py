@@ -1,7 +1,6 @@
-"""The files of a run directory, each written and read here: records, tables as CSV, the summary as JSON.
+"""The files of a run directory, each written and read here: three arrays, the summary as JSON, and tables made of them.
 
-``steps.bin`` (the records), ``events.csv`` and ``shapes.csv`` grow as a run goes, and can be read also when it was
-killed. ``trajectory.csv`` and ``summary.json`` are replaced at once or not at all.
+The arrays grow as a run goes, and can be read also when it was killed. The others are replaced at once or not at all.
 """
 
 from __future__ import annotations
@@ -14,46 +13,79 @@ from math import inf
 from pathlib import Path
 from typing import Any, BinaryIO, Literal
 
-import msgspec
 import numpy as np
 from pydantic_core import to_json
 
-from ..motion.events import EVENT_COLUMNS, Event
+from ..motion.events import Event
 from ..scene import scene_from_dict
 from .columns import trajectory_of
-from .directory import PARQUET, ResultsUnreadable, RunDirectory
+from .directory import PARQUET, TABLES, ResultsUnreadable, RunDirectory
 from .document import as_json
-from .records import STEP, steps_of
-from .trajectory import PHASES, SHAPE_COLUMNS, Trajectory
+from .records import EVENT, SHAPE, STEP, array_of, events_as_array, events_of
+from .trajectory import SHAPE_COLUMNS, Trajectory
+
+#: Records that are written together, to bound the memory for a long run.
+_TOGETHER = 4096
 
 # -- written -----------------------------------------------------------------------------------------------------------
 
 
 def lines(rows: Iterable[Sequence[Any]]) -> bytes:
-    """Return numbers and plain words as lines of CSV; JSON writes numbers as the shortest text that reads back."""
-    text = to_json(list(rows))[2:-2].replace(b"],[", b"\n").replace(b'"', b"")
-    return text + b"\n" if text else b""
+    """Return numbers and plain words as lines of CSV, NaN left empty.
+
+    JSON writes numbers as the shortest text that reads back.
+    """
+    text = to_json(list(rows), inf_nan_mode="null")[2:-2].replace(b"],[", b"\n")
+    return text.replace(b'"', b"").replace(b"null", b"") + b"\n" if text else b""
 
 
-def event_lines(events: Iterable[Event]) -> bytes:
-    """Return ``events`` as lines of ``events.csv``; values of absent bodies are empty."""
-    rows = ([getattr(event, name) for name in EVENT_COLUMNS] for event in events)
-    return lines(["" if v is None else v if isinstance(v, str | bool) else float(v) for v in row] for row in rows)
+def tables_of(run: Trajectory) -> list[np.ndarray]:
+    """Return the tables of a run beside its rows: its events and, with a beam, its shapes."""
+    found = [events_as_array(run.events)]
+    if run.shape_table is not None:
+        found.append(np.ascontiguousarray(run.shape_table).view(SHAPE)[:, 0])
+    return found
 
 
-def write_rows(run: RunDirectory, blocks: Iterable[Mapping[str, np.ndarray]]) -> None:
-    """Replace ``trajectory.csv`` by columns, block after block. Raises OSError; the file is then as before."""
-    with replaced(run.trajectory) as file:
-        for number, columns in enumerate(blocks):
-            if number == 0:
-                file.write(lines([list(columns)]))
-            file.write(lines(zip(*(values.tolist() for values in columns.values()), strict=True)))
+def write_tables(run: RunDirectory, tables: Iterable[Iterable[Mapping[str, np.ndarray]]]) -> list[Path]:
+    """Write rows, events and shapes of a run as CSV, each in blocks of columns, and return their files.
+
+    Raises OSError; a table that was there is then as before.
+    """
+    files = []
+    for name, blocks in zip(TABLES, tables, strict=False):
+        files.append(run.path / name)
+        with replaced(files[-1]) as file:
+            for number, columns in enumerate(blocks):
+                if number == 0:
+                    file.write(lines([[*columns]]))
+                file.write(lines(zip(*(values.tolist() for values in columns.values()), strict=True)))
+    return files
+
+
+def mapped(path: Path, kind: np.dtype) -> np.ndarray:
+    """Return the whole records of a file of this run, without reading them."""
+    whole = path.stat().st_size // kind.itemsize if path.exists() else 0
+    return np.memmap(path, kind, mode="r", shape=whole) if whole else np.empty(0, kind)
+
+
+def chunks(records: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+    """Yield records by column, some thousand at a time."""
+    for some in np.array_split(records, len(records) // _TOGETHER + 1):
+        yield {name: some[name] for name in records.dtype.names or ()}
 
 
 def write_summary(run: RunDirectory, summary: Mapping[str, Any]) -> None:
     """Replace ``summary.json``. Raises OSError; the file is then as before."""
     with replaced(run.summary) as file:
         file.write(as_json(summary) + b"\n")
+
+
+def write_columns(run: RunDirectory, columns: Mapping[str, np.ndarray]) -> None:
+    """Write the columns of a run that has no records. Raises OSError."""
+    with replaced(run.rows) as file:
+        arrays: Any = dict(columns)
+        np.savez(file, **arrays)
 
 
 @contextmanager
@@ -82,19 +114,13 @@ def load_trajectory(directory: str | Path) -> Trajectory:
         If a file is missing, was cut, or is not what a run writes.
     """
     run = RunDirectory(directory)
-    refuse_cut(run, load_summary(run.path).get("files", {}))
-    return read_run(run)
-
-
-def refuse_cut(run: RunDirectory, written: Mapping[str, int]) -> None:
-    """Raise ResultsUnreadable if a file is missing or shorter than it was ``written`` [bytes]."""
     found = run.sizes()
-    for name, size in written.items():
+    for name, size in load_summary(run.path).get("files", {}).items():
         there = found.get(name, -1)
         if there < size:
-            remedy = f"; springbeam export {run.path} writes it again" if name == run.trajectory.name else ""
             said = "missing" if there < 0 else f"{there} bytes"
-            raise ResultsUnreadable(f"{run.path / name}: {said}, {size} bytes were written{remedy}")
+            raise ResultsUnreadable(f"{run.path / name}: {said}, {size} bytes were written")
+    return read_run(run)
 
 
 def read_run(run: RunDirectory) -> Trajectory:
@@ -102,25 +128,40 @@ def read_run(run: RunDirectory) -> Trajectory:
     summary = load_summary(run.path)
     summary.pop("files", None)  # of the directory, not of the run
     scene = scene_from_dict(summary["scene"], source=f"{run.summary}: scene")
-    try:
-        steps = steps_of(run.steps.read_bytes() if run.steps.exists() else b"")
-    except (OSError, ValueError) as error:
-        raise ResultsUnreadable(f"{run.steps}: {error}") from error
-    events = load_events(run.path)
-    shapes = None
-    if run.shapes.exists():
-        shapes = _read_table(run.shapes, SHAPE_COLUMNS).view("f8").reshape(-1, len(SHAPE_COLUMNS))
-    if len(steps) == 0 and run.trajectory.exists():  # it left no records: a reference
-        table = _read_table(run.trajectory)
-        columns = {name: np.ascontiguousarray(table[name]) for name in table.dtype.names or ()}
-        return Trajectory(scene, columns, events, summary=summary, shape_table=shapes)
+    steps = _array(run.steps, STEP)
+    rows = _array(run.events, EVENT)
+    table = _array(run.shapes, SHAPE)
+    shapes = table.view("f8").reshape(-1, len(SHAPE_COLUMNS)) if run.shapes.exists() else None
+    if run.rows.exists():
+        with np.load(run.rows) as columns:
+            return Trajectory(scene, dict(columns), _events(run, rows), shapes, summary)
     # A run that was killed may have written what belongs to records that it has not.
     last, known = (steps["time"][-1], int(steps["events"][-1])) if len(steps) else (-inf, 0)
-    if known > len(events):
-        raise ResultsUnreadable(f"{run.events}: {len(events)} events, {known} belong to {run.steps.name}")
+    if known > len(rows):
+        raise ResultsUnreadable(f"{run.events}: {len(rows)} events, {known} belong to {run.steps.name}")
     if shapes is not None:
         shapes = shapes[shapes[:, 0] <= last]
-    return trajectory_of(scene, steps, events[:known], shapes, summary)
+    return trajectory_of(scene, steps, _events(run, rows[:known]), shapes, summary)
+
+
+def _array(path: Path, kind: np.dtype) -> np.ndarray:
+    try:
+        return array_of(path.read_bytes() if path.exists() else b"", kind)
+    except (OSError, ValueError) as error:
+        raise ResultsUnreadable(f"{path}: {error}") from error
+
+
+def load_events(directory: str | Path) -> list[Event]:
+    """Read the events of a run directory. Raises ResultsUnreadable."""
+    run = RunDirectory(directory)
+    return _events(run, _array(run.events, EVENT))
+
+
+def _events(run: RunDirectory, rows: np.ndarray) -> list[Event]:
+    try:
+        return events_of(rows)
+    except ValueError as error:
+        raise ResultsUnreadable(f"{run.events}: {error}") from error
 
 
 def load_summary(directory: str | Path) -> dict[str, Any]:
@@ -137,87 +178,29 @@ def load_summary(directory: str | Path) -> dict[str, Any]:
     return summary
 
 
-def load_events(directory: str | Path) -> list[Event]:
-    """Read ``events.csv`` of a run directory. Raises ResultsUnreadable."""
-    path = RunDirectory(directory).events
-    events = []
-    for number, line in enumerate(_complete_lines(path, EVENT_COLUMNS)[1:], start=2):
-        try:
-            fields = zip(EVENT_COLUMNS, line.split(","), strict=True)
-            events.append(msgspec.convert({name: text for name, text in fields if text}, Event, strict=False))
-        except ValueError as error:
-            raise ResultsUnreadable(f"{path}: line {number}: not an event: {line[:60]!r}: {error}") from None
-    return events
-
-
-def _complete_lines(path: Path, columns: Sequence[str] = ()) -> list[str]:
-    """Return the lines that end in a newline, at least the header, which must be ``columns`` if given.
-
-    A byte that is no text makes its line unreadable, not the file.
-    """
-    try:
-        found = path.read_bytes().decode(errors="replace").split("\n")[:-1]
-    except OSError as error:
-        raise ResultsUnreadable(f"{path}: {error.strerror}") from error
-    if not found:
-        raise ResultsUnreadable(f"{path}: empty")
-    if columns and found[0] != ",".join(columns):
-        raise ResultsUnreadable(f"{path}: line 1: not the columns of {path.name}")
-    return found
-
-
-def _read_table(path: Path, columns: Sequence[str] = ()) -> np.ndarray:
-    """Return the rows of a file, shape (n,), as records of its columns."""
-    header, *rows = _complete_lines(path, columns)
-    if not header.startswith("time,"):
-        raise ResultsUnreadable(f"{path}: line 1: no column time")
-    kinds = np.dtype([(name, "U8" if name == "phase" else "f8") for name in header.split(",")])
-    try:
-        table = np.loadtxt(rows, kinds, delimiter=",", comments=None, ndmin=1) if rows else np.empty(0, kinds)
-    except ValueError as error:
-        why, _, _ = str(error).partition(";")  # the rest is for callers of numpy
-        raise ResultsUnreadable(f"{path}: after the header: {why}") from None
-    for name in kinds.names or ():
-        good = np.isin(table[name], PHASES) if name == "phase" else np.isfinite(table[name])
-        if not good.all():
-            kind = f"no phase; phases are {', '.join(PHASES)}" if name == "phase" else "not finite"
-            raise ResultsUnreadable(f"{path}: {name} = {table[name][~good][0]}: {kind}")
-    return table
-
-
-# -- written from what was read ----------------------------------------------------------------------------------------
+# -- exported ----------------------------------------------------------------------------------------------------------
 
 
 def export(directory: str | Path, form: Literal["csv", "parquet"]) -> list[Path]:
-    """Write the tables of a run anew and return their files: ``trajectory.csv``, or all tables as Parquet.
+    """Write the tables of a run anew, as CSV or Parquet, and return their files.
 
     The run may go on meanwhile, or have been killed.
 
     Raises
     ------
     ResultsUnreadable
-        If the run left no records, or another file than ``trajectory.csv`` was cut.
+        If the run has made no step yet, or a file was cut.
     """
     run = RunDirectory(directory)
-    summary = load_summary(run.path)
-    written = summary.get("files", {})
-    refuse_cut(run, {name: size for name, size in written.items() if name != run.trajectory.name})
-    trajectory = read_run(run)
-    if run.sizes().get(run.steps.name, 0) < STEP.itemsize:
-        raise ResultsUnreadable(f"{run.steps}: no records in it: of a reference, or of a run that has made no step yet")
+    trajectory = load_trajectory(directory)
+    if len(trajectory) == 0:
+        raise ResultsUnreadable(f"{run.steps}: no records in it: the run has made no step yet")
     if form == "csv":
-        write_rows(run, [trajectory.columns])
-        if written:
-            write_summary(run, {**summary, "files": run.sizes()})
-        return [run.trajectory]
-    from pyarrow import Table, bool_, float64, parquet, schema, string, table  # it takes its time to load
+        return write_tables(run, [[trajectory.columns], *map(chunks, tables_of(trajectory))])
+    from pyarrow import array, parquet, table  # it takes its time to load
 
-    of_words = {"kind": string(), "joint": string(), "seated": bool_()}
-    kinds = schema([(name, of_words.get(name, float64())) for name in EVENT_COLUMNS])
-    tables = [table(trajectory.columns), Table.from_pylist([vars(event) for event in trajectory.events], kinds)]
-    if trajectory.shape_table is not None:
-        tables.append(table(dict(zip(SHAPE_COLUMNS, trajectory.shape_table.T, strict=True))))
+    tables = [trajectory.columns, *({name: t[name] for name in t.dtype.names or ()} for t in tables_of(trajectory))]
     files = [run.path / name for name in PARQUET[: len(tables)]]
-    for file, rows in zip(files, tables, strict=True):
-        parquet.write_table(rows, file)
+    for file, columns in zip(files, tables, strict=True):
+        parquet.write_table(table({name: array(values, from_pandas=True) for name, values in columns.items()}), file)
     return files

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ..motion.events import EVENT_COLUMNS, Event
+from ..motion.events import Event
 from ..scene import Scene
 from .columns import blocks, trajectory_of
 from .dense import at_multiples
 from .directory import RunDirectory
-from .files import event_lines, lines, load_events, read_run, write_rows, write_summary
-from .records import STEP
+from .files import chunks, load_events, mapped, read_run, write_columns, write_summary, write_tables
+from .records import EVENT, SHAPE, STEP, events_as_array
 from .trajectory import SHAPE_COLUMNS, Trajectory
 
 
@@ -79,7 +79,7 @@ class FileRecorder(AbstractContextManager["FileRecorder"]):
     """Write a run into a `RunDirectory`, so that memory does not grow with the run.
 
     Records are appended a block at a time, after their events and shapes: a run that is killed loses no more than one
-    block, and ``summary.json`` has the scene from the start. Rows are made from the records at the end. Results of an
+    block, and ``summary.json`` has the scene from the start. Tables are made from the arrays at the end. Results of an
     earlier run are removed when this one has something to record.
 
     As a context it closes the files.
@@ -98,11 +98,8 @@ class FileRecorder(AbstractContextManager["FileRecorder"]):
         self.scene = scene
         self.directory = directory
         self.interval = interval
-        #: The first line of each file that grows, in the order in which they do.
-        self._headers = {directory.events: lines([EVENT_COLUMNS]), directory.steps: b""}
-        if scene.beam is not None:
-            self._headers = {directory.shapes: lines([SHAPE_COLUMNS]), **self._headers}
-        #: Each hands what is written to the system at once, so that a killed run has it.
+        #: In the order in which they grow. Each hands what is written to the system at once, so that a killed run has
+        #: it.
         self._files: dict[Path, FileIO] = {}
 
     def __exit__(self, *_: object) -> None:
@@ -121,16 +118,12 @@ class FileRecorder(AbstractContextManager["FileRecorder"]):
     def keep(self, steps: np.ndarray, events: Sequence[Event], shapes: np.ndarray) -> None:
         """See `MemoryRecorder.keep`. Raises OSError."""
         self._begin()
-        directory = self.directory
-        if directory.shapes in self._files:
-            _append(self._files[directory.shapes], lines(shapes.tolist()))
-        _append(self._files[directory.events], event_lines(events))
-        _append(self._files[directory.steps], steps.tobytes())
+        contents = (shapes, events_as_array(events), steps)
+        for file, content in zip(self._files.values(), contents[-len(self._files) :], strict=True):
+            _append(file, content.tobytes())
 
     def steps(self) -> np.ndarray:
-        path = self.directory.steps
-        whole = path.stat().st_size // STEP.itemsize if self.begun else 0
-        return np.memmap(path, STEP, mode="r", shape=whole) if whole else np.empty(0, STEP)
+        return mapped(self.directory.steps, STEP) if self.begun else np.empty(0, STEP)
 
     def events(self) -> list[Event]:
         return load_events(self.directory.path) if self.begun else []
@@ -144,20 +137,24 @@ class FileRecorder(AbstractContextManager["FileRecorder"]):
         steps = np.empty(0, STEP) if run.steps is None else run.steps
         shapes = np.empty((0, len(SHAPE_COLUMNS))) if run.shape_table is None else run.shape_table
         self.keep(steps, run.events, shapes)
-        self.finish(run.summary, run.columns if run.steps is None else None)
+        if run.steps is None:
+            write_columns(self.directory, run.columns)
+        self.finish(run.summary)
 
-    def finish(self, summary: Mapping[str, Any], columns: Mapping[str, np.ndarray] | None = None) -> None:
-        """See `MemoryRecorder.finish`; ``columns`` are those of a run without records. Raises OSError."""
+    def finish(self, summary: Mapping[str, Any]) -> None:
+        """See `MemoryRecorder.finish`. Raises OSError."""
         self._begin()
+        directory = self.directory
         steps = self.steps()
-        rows: Iterable[Mapping[str, np.ndarray]] = blocks(self.scene, steps) if columns is None else [columns]
-        if self.interval is not None and len(steps):
+        rows: Iterable[Mapping[str, np.ndarray]] = blocks(self.scene, steps)
+        if directory.rows.exists():
+            rows = [self.trajectory().columns]
+        elif self.interval is not None and len(steps):
             rows = [at_multiples(self.trajectory(), self.interval).columns]
         self._close_files()
-        try:
-            write_rows(self.directory, rows)
-        finally:  # also where the disk has no room for them
-            write_summary(self.directory, _with_scene({**summary, "files": self.directory.sizes()}, self.scene))
+        write_summary(directory, _with_scene({**summary, "files": directory.sizes()}, self.scene))
+        shapes = [chunks(mapped(directory.shapes, SHAPE))] * (self.scene.beam is not None)
+        write_tables(directory, [rows, chunks(mapped(directory.events, EVENT)), *shapes])
 
     def close(self) -> None:
         """Close the files, and let other processes use the directory."""
@@ -174,9 +171,9 @@ class FileRecorder(AbstractContextManager["FileRecorder"]):
             return
         for file in self.directory.results():
             file.unlink()
-        self._files = {path: path.open("ab", buffering=0) for path in self._headers}
-        for path, header in self._headers.items():
-            _append(self._files[path], header)
+        directory = self.directory
+        arrays = [*([] if self.scene.beam is None else [directory.shapes]), directory.events, directory.steps]
+        self._files = {path: path.open("ab", buffering=0) for path in arrays}
         # Last: where there is a summary, there is a run that can be loaded.
         write_summary(self.directory, _with_scene({"status": "running"}, self.scene))
 

@@ -1,15 +1,20 @@
-"""The record of a step, from which columns, totals and dense output follow.
+"""The three arrays that are a run: events, shapes, and records, from which columns, totals and dense output follow.
 
-A run is a sequence of these records, of fixed size, one per accepted step. Between two rows the motion follows from the
+There is a record, of fixed size, per accepted step. Between two rows the motion follows from the
 state after the event of the row before, the end of the step and its two moments, the force from the step's polynomial.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from math import nan
 from struct import Struct
+from typing import Any
 
 import numpy as np
+
+from ..motion.events import EVENT_COLUMNS, Event
+from .trajectory import SHAPE_COLUMNS
 
 #: Numbers of a record in the order of the file ``steps.bin``.
 STEP_COLUMNS = (
@@ -48,6 +53,11 @@ BEAM_REPORTS = 1
 SPRING_REPORTS = 2
 #: Little-endian doubles, on every machine.
 STEP = np.dtype([(name, "<f8") for name in STEP_COLUMNS])
+#: Fields of an event that are NaN where its body is absent; and an event.
+_OF_BODIES = ("y", "z", "u_tip", "v_tip")
+EVENT = np.dtype([(n, {"kind": "<U11", "joint": "<U5", "seated": "?"}.get(n, "<f8")) for n in EVENT_COLUMNS])
+#: A shape of the beam.
+SHAPE = np.dtype([(name, "<f8") for name in SHAPE_COLUMNS])
 #: Bytes of a record from its numbers.
 packed = Struct(f"<{len(STEP_COLUMNS)}d").pack
 #: The column ``phase`` by the number in a record: how the ends are joined, and 3 more while the lower end is seated.
@@ -75,20 +85,34 @@ class Rows:
 Records = np.ndarray | Rows
 
 
-def steps_of(content: bytes | bytearray) -> np.ndarray:
-    """Return the records in ``content``, an incomplete last one left out. Raises ValueError for one not finite."""
-    steps: np.ndarray = np.frombuffer(content, STEP, len(content) // STEP.itemsize).copy()
-    finite = np.isfinite(steps.view("<f8").reshape(len(steps), len(STEP_COLUMNS)))
-    if not finite.all():
-        row, column = np.argwhere(~finite)[0].tolist()
-        said = f"{STEP_COLUMNS[column]} = {steps[row][column]} in the step to t = {steps['time'][row]!s} s"
-        raise ValueError(f"{said}: not finite")
-    if (
-        not np.isin(steps["phase"], range(len(PHASE_NAMES))).all()
-        or (np.diff(steps["events"], prepend=0.0) < 0.0).any()
+def array_of(content: bytes, kind: np.dtype) -> np.ndarray:
+    """Return the records in ``content``, an incomplete last one left out; ``kind`` is `STEP`, `EVENT` or `SHAPE`.
+
+    Raises ValueError for one that has a number that is not finite, or is no such record.
+    """
+    rows: np.ndarray = np.frombuffer(content, kind, len(content) // kind.itemsize).copy()
+    for name in kind.names or ():
+        if kind[name].kind == "f" and not (kind is EVENT and name in _OF_BODIES):
+            wrong = ~np.isfinite(rows[name])
+            if wrong.any():
+                row = rows[int(np.argmax(wrong))]
+                raise ValueError(f"{name} = {row[name]} at t = {row['time']!s} s: not finite")
+    if kind is STEP and (
+        not np.isin(rows["phase"], range(len(PHASE_NAMES))).all() or (np.diff(rows["events"], prepend=0.0) < 0.0).any()
     ):
         raise ValueError("not records of steps")
-    return steps
+    return rows
+
+
+def events_as_array(events: Iterable[Event]) -> np.ndarray:
+    """Return events as an array of `EVENT`."""
+    return np.array([tuple(nan if v is None else v for v in vars(event).values()) for event in events], EVENT)
+
+
+def events_of(rows: np.ndarray) -> list[Event]:
+    """Return the events of an array of `EVENT`. Raises ValueError for a word that is no kind and no joint."""
+    values: list[list[Any]] = [[None if value != value else value for value in row] for row in rows.tolist()]
+    return [Event(*row) for row in values]
 
 
 def joined(steps: Records) -> np.ndarray:
