@@ -72,37 +72,6 @@ def test_durations_and_rebound():
     assert "bounce_time" not in found(steps[:6], *events[:5])  # it flies where the run ends
 
 
-@pytest.mark.parametrize("ends", [[0.0, 1.0], [0.0, 0.45, 1.0]])
-def test_the_deepest_place_is_between_the_rows(ends):
-    """u = −1 + (t − 0.46)², of which the polynomial of a step keeps everything."""
-    numbers = found(moving(ends, np.polynomial.Polynomial([-1.0 + 0.46**2, -0.92, 1.0])))
-    assert numbers["deepest_tip"] == pytest.approx(-1.0, abs=1e-13)
-    assert numbers["deepest_tip_time"] == pytest.approx(0.46, abs=1e-6)  # where u is flat to 1e-12 m
-
-
-def test_the_deepest_place_may_follow_an_event():
-    """At 0.5 the tip is thrown down from −1: it goes on as −1 − (t − ½) + 2 (t − ½)², lowest at 0.75."""
-    before = np.polynomial.Polynomial([-2.0, 2.0])
-    after = np.polynomial.Polynomial([0.0, -3.0, 2.0])
-    steps = np.append(moving([0.0, 0.5], before), moving([0.5, 1.0], after)[1:])
-    steps["v_tip_after"][1] = -1.0
-    numbers = found(steps, Event(0.5, "separation", y=-2.0, z=0.0, u_tip=-1.0, v_tip=-1.0))
-    assert numbers["deepest_tip"] == -2.0
-    numbers = found(moving([0.5, 1.0], after), Event(0.5, "separation", y=-2.0, z=0.0, u_tip=-1.0, v_tip=-1.0))
-    assert numbers["deepest_tip"] == pytest.approx(-1.125, abs=1e-13)
-    assert numbers["deepest_tip_time"] == pytest.approx(0.75, abs=1e-6)
-
-
-def moving(ends, path):
-    """Steps between ``ends`` of a tip on ``path``, a polynomial."""
-
-    def integrals(a, b):
-        once = path.integ(lbnd=a)
-        return once(b), once.integ(lbnd=a)(b)
-
-    return steps_with(lambda t: (0.0, 0.0, 0.0), ends, path, path.deriv(), integrals)
-
-
 def test_the_window_is_a_fiftieth_of_the_slowest_period():
     def window_of(scene):
         with pair_of(scene) as pair:

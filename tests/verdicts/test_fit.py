@@ -2,7 +2,6 @@
 
 import json
 import re
-from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,10 +14,9 @@ from hypothesis import strategies as st
 from scenes import scene_from_dict
 from scipy.stats import t as student
 
-from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
+from springbeam import SceneError, load_scene, simulate, with_changes
 from springbeam.scene import as_scene
-from springbeam.signals.measured import Measured, at_shift, read_measured, residuals
-from springbeam.studies import accuracy
+from springbeam.signals.measured import read_measured, residuals
 from springbeam.studies.fit import study as fit
 
 TRUE = {"spring.linear_stiffness": 800.0, "spring.damping": 1.2}
@@ -141,18 +139,6 @@ def test_a_file_without_a_column_of_the_run_is_refused(tmp_path, text, why):
         read_measured(path, OSCILLATOR)
 
 
-def test_the_derivative_by_the_clock_is_that_of_one_side_where_a_velocity_jumps():
-    """1e-7 s before an impact, at it and after it, it is the acceleration on that side; across it, 8e6 m/s²."""
-    run = simulate(load_scene("soft", ["time.t_end=0.3"]))
-    impact = run.events[-1].time
-    times = impact + np.array([-1e-7, 0.0, 1e-7])
-    found = at_shift(run, Measured(times, {"v_tip": np.zeros(3)}, []), 0.0)
-    sides = [run.at(impact + np.array(two))["v_tip"] for two in ((-2e-6, -1e-6), (1e-6, 2e-6))]
-    before, after = (float(np.diff(two)[0]) / 1e-6 for two in sides)
-    assert abs(found.off["v_tip"][1] - found.off["v_tip"][0]) > 0.5
-    assert found.slope["v_tip"] == pytest.approx([before, after, after], rel=0.03)
-
-
 def test_the_command_compare_takes_a_measurement(here):
     simulate(OSCILLATOR).save("run")
     written(here / "m.csv", "time [s],position [mm]", TIMES + 0.2, 1e3 * exact())
@@ -192,31 +178,6 @@ def test_a_clock_that_the_data_does_not_tell_is_named(tmp_path):
     place, speed = fitted(path, begins, scene, shift=5e-3)["keys"]
     assert place["value"] == pytest.approx(5e-3, rel=1e-6)
     assert speed["value"] == pytest.approx(0.4, rel=1e-6)
-
-
-def test_a_trial_that_cannot_be_run_turns_the_search_back(tmp_path, monkeypatch):
-    """The first run of a search: after those all over the ranges, and two for the first derivatives."""
-    right = fit.simulate_to
-    runs = count()
-
-    def stops_once(scene, time):
-        if next(runs) == 18:
-            raise RunStopped("diverges", 0.1)
-        return right(scene, time)
-
-    monkeypatch.setattr(fit, "simulate_to", stops_once)
-    found = fitted(written(tmp_path / "m.csv", "time,y", TIMES, exact()), shift=0.0)
-    (error,) = [row["error"] for row in found["runs"] if row["error"]]
-    assert "diverges" in error
-    assert {row["key"]: row["value"] for row in found["keys"]} == pytest.approx(TRUE, rel=1e-6)
-
-
-def test_curves_weigh_by_what_is_left_of_them(tmp_path):
-    """A second curve of noise alone hardly moves what the first one tells; weighed by its spread, by 1 %."""
-    noise = np.random.default_rng(1).normal(0.0, 0.5, len(TIMES))
-    path = written(tmp_path / "m.csv", "time,y,z", TIMES, exact(), noise)
-    (stiffness,) = fitted(path, ["spring.linear_stiffness=790"], shift=0.0)["keys"]
-    assert stiffness["value"] == pytest.approx(800.0, rel=1e-3)
 
 
 def test_intervals_are_those_of_linear_least_squares(tmp_path):
@@ -304,20 +265,6 @@ def test_a_wrong_minimum_is_left_and_never_certified(here):
     assert any("the curves do not agree" in why for why in json.loads(only.stdout)["undetermined"])
 
 
-def test_a_search_follows_a_valley_to_its_end(tmp_path):
-    """Along stiffness over mass the curves hardly change: 2.738 and 0.882 leave 1e-4 of their spread.
-
-    That was certified, by derivatives of another place; the way on from there took 206 runs.
-    """
-    scene = load_scene("duffing", COARSE)
-    run = simulate(with_changes(scene, spring={"linear_stiffness": 3.1}))
-    path = written(tmp_path / "m.csv", "time,y", run.time, run["y"])
-    found = fitted(path, ["spring.linear_stiffness=3.5", "spring.mass=0.9"], scene)
-    assert found["undetermined"] == []
-    assert [row["value"] for row in found["keys"]] == pytest.approx([3.1, 1.0, 0.0], rel=1e-6, abs=1e-6)
-    assert len(found["runs"]) <= 80
-
-
 def test_a_search_along_a_valley_ends_where_the_range_does(tmp_path):
     """The data show only the ratio of stiffness, 3.1, to mass, 1; the search goes on along the limit of stiffness."""
     scene = load_scene("duffing", COARSE)
@@ -327,15 +274,6 @@ def test_a_search_along_a_valley_ends_where_the_range_does(tmp_path):
     assert [row["value"] for row in found["keys"]] == pytest.approx([2.9, 2.9 / 3.1], rel=2e-3)
     assert all(" may be anything from " in why for why in found["undetermined"])
     assert len(found["runs"]) <= 50
-
-
-def test_of_equal_shifts_of_the_clock_the_smallest_is_found(tmp_path):
-    """A motion that repeats itself fits as well a period later or earlier: -3.59 s was found."""
-    scene = load_scene("duffing", COARSE)
-    run = simulate(with_changes(scene, spring={"linear_stiffness": 3.1}))
-    path = written(tmp_path / "m.csv", "time,y", run.time, noisy(run["y"], 0.02))
-    *_, shift = fitted(path, ["spring.linear_stiffness=3.5"], scene)["keys"]
-    assert abs(shift["value"]) < 0.05
 
 
 def test_a_rest_that_is_no_error_of_the_run_is_no_noise_however_small(tmp_path):
@@ -370,17 +308,6 @@ def test_noise_that_remembers_its_past_is_known_by_a_repeated_measurement(tmp_pa
     assert known["undetermined"] == []
     (key,) = known["keys"]
     assert key["low"] < 800.0 < key["high"]
-
-
-@pytest.mark.parametrize(("most", "inside"), [(800.5, False), (830.0, True)])
-def test_an_interval_that_reaches_the_end_of_the_range_determines_nothing(tmp_path, most, inside):
-    """The right value is within the range each time, at its edge; its interval is some 3 to each side."""
-    path = written(tmp_path / "m.csv", "time,y", TIMES, noisy(exact()))
-    found = fitted(path, [f"spring.linear_stiffness=700:{most}"], shift=0.0)
-    (key,) = found["keys"]
-    assert (found["undetermined"] == []) == inside
-    assert inside or "reaches the end of the range from 700 to 800.5" in found["undetermined"][0]
-    assert key["low"] < 800.5
 
 
 def test_values_that_fit_as_well_are_named(tmp_path):
@@ -432,73 +359,6 @@ def test_what_is_called_determined_is_right(stiffness, damping, guess, late, sha
         for row in found["keys"]:
             right = {**{f"spring.{name}": value for name, value in drawn.items()}, "shift": -late}[row["key"]]
             assert abs(row["value"] - right) <= 2.0 * max(row["high"] - row["value"], row["value"] - row["low"])
-
-
-def test_a_laser_record_is_fitted_in_forty_runs(tmp_path):
-    """Two keys, a free clock, 2 % noise: a steel beam on its bumper, as a vibrometer sees its tip."""
-    scene = load_scene("steel-bumper", ["time.t_end=0.06"])
-    times = np.linspace(0.01, 0.055, 401)
-    path = written(tmp_path / "m.csv", "time,u_tip", times + 0.0123, noisy(simulate(scene).at(times)["u_tip"]))
-    found = fitted(path, ["beam.young_modulus=1.8e11", "spring.linear_stiffness=3e4"], scene)
-    assert found["undetermined"] == []
-    assert len(found["runs"]) <= 40
-    for row, right in zip(found["keys"], (2.1e11, 2e4, -0.0123), strict=True):
-        assert abs(row["value"] - right) <= row["high"] - row["low"]
-
-
-def test_a_velocity_that_jumps_is_fitted_in_fifty_runs_of_which_none_is_made_twice(tmp_path, monkeypatch):
-    """A laser sees impacts; it took 170 runs, 12 of them twice, since the first search stopped beside its minimum.
-
-    A run ends where the data do, but for those that show which shift of the clock fits at all.
-    """
-    made = []
-    right = fit.simulate_to
-    monkeypatch.setattr(fit, "simulate_to", lambda scene, time: made.append((scene, time)) or right(scene, time))
-    scene = load_scene("soft", ["coupling.macro_step=5e-4"])
-    times = np.linspace(0.0, 0.3, 3001)
-    path = written(tmp_path / "m.csv", "time,v_tip", times + 0.01, noisy(simulate(scene).at(times)["v_tip"], seed=1))
-    found = fitted(path, ["spring.linear_stiffness=2.9", "spring.mass=1.05"], scene)
-    assert found["undetermined"] == []
-    for row, true in zip(found["keys"], (3.0, 1.0, -0.01), strict=True):
-        assert row["low"] < true < row["high"]
-    assert len(made) <= 50
-    longest = {}
-    for one, time in made:
-        keys = (one.spring.linear_stiffness, one.spring.mass, one.coupling.H)
-        assert time > longest.get(keys, 0.0)
-        longest[keys] = time
-    assert sum(time == 0.6 for _, time in made) <= 16 + 2  # starts, the search at another shift, the minimum
-
-
-def test_the_clock_of_a_search_begins_where_it_was_however_far_it_may_move(tmp_path):
-    """From the middle between its limits it went to another minimum, 0.038 s away, and a fit took 266 runs for 46."""
-    scene = load_scene("soft", ["coupling.macro_step=1e-3"])
-    times = np.linspace(0.05, 0.5, 400)
-    path = written(tmp_path / "m.csv", "time,z", times, noisy(simulate(scene).at(times)["z"]))
-    study = fit.Fit(scene=scene, file=path, vary=("spring.mass=1",))
-    begun = study.record({"spring.mass": 1.0})
-    clock = [begun["shift"] + further for further in (-1e-3, 0.0, 0.08)]
-    found = study.record({"spring.mass": 1.0, "clock": clock, "points": begun["points"]})
-    assert found["shift"] == pytest.approx(begun["shift"], abs=1e-9)
-    clock[1] += 0.04
-    assert abs(study.record({"spring.mass": 1.0, "clock": clock, "points": begun["points"]})["shift"]) > 0.01
-
-
-def test_a_search_keeps_the_macro_step_that_is_picked_where_it_begins(tmp_path, monkeypatch):
-    """It was picked for each of its runs by three to five pilots, also for two whose keys differ by 1e-6.
-
-    Steps are picked for the 16 starts and for the tenfold accuracy by which the minimum is judged.
-    """
-    picked = []
-    right = accuracy.pick
-    monkeypatch.setattr(accuracy, "pick", lambda scene: picked.append(scene.accuracy) or right(scene))
-    path = written(tmp_path / "m.csv", "time,y", TIMES, noisy(exact()))
-    found = fitted(path, scene=with_changes(OSCILLATOR, accuracy=1e-4), shift=0.0)
-    assert picked == [*[1e-4] * 16, 1e-5]
-    assert len(found["runs"]) > 17 + 6
-    assert found["undetermined"] == []
-    for row in found["keys"]:
-        assert abs(row["value"] - TRUE[row["key"]]) <= row["high"] - row["low"]
 
 
 @pytest.mark.parametrize(("kind", "stiffness"), [("element", 80.0), ("fmu", 80.0), ("element", 200.0)])
