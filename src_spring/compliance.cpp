@@ -32,14 +32,26 @@ double Compliance::continued_slope(double depth) const {
 }
 
 Compliance::Effect Compliance::continued(double depth, double rate) const {
-  const double elastic = continued_elastic(depth), factor = damping_factor(rate);
-  return {elastic * factor, elastic * (factor - 1.0) * rate};
+  const double elastic = continued_elastic(depth);
+  const double force = c_ > 0.0 ? std::max(0.0, elastic + c_ * rate) : elastic * damping_factor(rate);
+  return {force, (force - elastic) * rate};
 }
 
 Compliance::Slopes Compliance::slopes(double depth, double rate) const {
   const double elastic = continued_elastic(depth), slope = continued_slope(depth), factor = damping_factor(rate);
+  if (c_ > 0.0) {
+    if (elastic + c_ * rate <= 0.0) return {0.0, 0.0, -slope * rate, -elastic};
+    return {slope, c_, 0.0, 2.0 * c_ * rate};
+  }
   const double by_rate = factor > 0.0 ? elastic * chi_ : 0.0;
   return {slope * factor, by_rate, slope * (factor - 1.0) * rate, elastic * (factor - 1.0) + by_rate * rate};
+}
+
+bool Compliance::keeps_side(double depth, double rate, double change, double change_of_rate) const {
+  if (chi_ > 0.0) return 2.0 * change_of_rate < std::abs(1.0 / chi_ + rate);
+  if (rate > change_of_rate) return true;
+  const double force = continued_elastic(depth) + c_ * rate, slope = continued_slope(std::abs(depth) + change);
+  return 2.0 * (slope * change + c_ * change_of_rate) < std::abs(force);
 }
 
 double Compliance::elastic_coefficient(Along& along, std::size_t n, const Series& depth) const {
@@ -67,7 +79,9 @@ void Compliance::extend(Along& along, std::size_t n, const Series& depth, double
   elastic[n] = elastic_coefficient(along, n, depth);
   if (!damped()) return;
   const auto rate = [&](std::size_t k) { return static_cast<double>(k + 1) * depth[k + 1] / size; };
-  if (damping_factor(rate(0)) > 0.0) {
+  if (c_ > 0.0) {
+    damping[n] = elastic[0] + c_ * rate(0) > 0.0 ? c_ * rate(n) : -elastic[n];
+  } else if (damping_factor(rate(0)) > 0.0) {
     damping[n] = 0.0;
     for (std::size_t k = 0; k <= n; ++k) damping[n] += chi_ * elastic[k] * rate(n - k);
   } else {

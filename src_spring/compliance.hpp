@@ -1,6 +1,7 @@
 // Normal compliance with a moving obstacle, δ = y − u_tip (Ahn & Tate, section 2; docs/model.md), damped as Hunt and
 // Crossley have it:
-//     C = λ δ₊^p (1 + χ δ̇)₊,   stored Φ = λ δ₊^{p+1}/(p+1),   dissipated (C − λ δ₊^p) δ̇ ≥ 0.
+//     C = λ δ₊^p (1 + χ δ̇)₊,   stored Φ = λ δ₊^{p+1}/(p+1),   dissipated (C − λ δ₊^p) δ̇ ≥ 0,
+// or by a damper c beside it: C = (λ δ^p + c δ̇)₊ for δ > 0, which begins with a jump.
 #pragma once
 
 #include <algorithm>
@@ -14,21 +15,23 @@ class Compliance {
  public:
   static constexpr std::size_t highest_power = 4;  ///< p up to which extend() multiplies powers
 
-  /// λ [N/m^p], p, χ [s/m]
-  Compliance(double stiffness, double exponent, double damping = 0.0)
-      : lambda_(stiffness), p_(exponent), chi_(damping) {}
+  /// λ [N/m^p], p, χ [s/m], c [N·s/m]; one of the last two is 0
+  Compliance(double stiffness, double exponent, double damping = 0.0, double viscosity = 0.0)
+      : lambda_(stiffness), p_(exponent), chi_(damping), c_(viscosity) {}
 
   double stiffness() const { return lambda_; }
   double exponent() const { return p_; }
   double damping() const { return chi_; }
+  double viscosity() const { return c_; }
 
   double elastic(double depth) const;  ///< λ δ₊^p [N]
   double energy(double depth) const;   ///< Φ [J]
-  bool damped() const { return chi_ > 0.0; }
-  double release_speed() const { return 1.0 / chi_; }  ///< −δ̇ from which on damping leaves no force [m/s]
+  bool damped() const { return chi_ > 0.0 || c_ > 0.0; }
+  /// Whether damping neither begins nor ceases to leave no force while depth and rate change by less than this.
+  bool keeps_side(double depth, double rate, double change, double change_of_rate) const;
   /// (1 + χ δ̇)₊
   double damping_factor(double rate) const { return std::max(0.0, 1.0 + chi_ * rate); }
-  double force(double depth, double rate) const { return elastic(depth) * damping_factor(rate); }  ///< C [N]
+  double force(double depth, double rate) const { return depth > 0.0 ? continued(depth, rate).force : 0.0; }  ///< C [N]
 
   /// The law while touching, continued smoothly to δ < 0: for internal steps that go past
   /// the opening (the event is then located and what lies beyond is dropped).
@@ -61,7 +64,7 @@ class Compliance {
   double continued_slope(double depth) const;
   double elastic_coefficient(Along& along, std::size_t n, const Series& depth) const;
 
-  double lambda_, p_, chi_;
+  double lambda_, p_, chi_, c_;
 };
 
 }  // namespace spring

@@ -27,13 +27,19 @@ Polynomial load_of(const Parameters& parameters, const Inputs& inputs) {
   return load;
 }
 
+Compliance contact_of(const Parameters& p) {
+  const bool voigt = p.contact_law == ContactLaw::kelvin_voigt;
+  return {p.compliance_stiffness, p.compliance_exponent, voigt ? 0.0 : p.compliance_damping,
+          voigt ? p.contact_damping : 0.0};
+}
+
 EquationOfMotion::EquationOfMotion(const Parameters& parameters)
     : mass_(parameters.mass),
       damping_(parameters.damping),
       k1_(parameters.linear_stiffness),
       k2_(parameters.cubic_stiffness),
       unloaded_(parameters.unloaded),
-      compliance_(parameters.compliance_stiffness, parameters.compliance_exponent, parameters.compliance_damping) {}
+      compliance_(contact_of(parameters)) {}
 
 double EquationOfMotion::acceleration(double y, double z, double force, double contact) const {
   return (force - damping_ * z - spring_force(y) - contact) / mass_;

@@ -39,6 +39,9 @@ struct Expansion {
 /// f_s − m a [N]
 Polynomial load_of(const Parameters& parameters, const Inputs& inputs);
 
+/// The law inside.
+Compliance contact_of(const Parameters& parameters);
+
 class EquationOfMotion {
  public:
   explicit EquationOfMotion(const Parameters& parameters);

@@ -101,7 +101,7 @@ bool Flight::analytic(const Expansion& motion) const {
     if (k > 1) change_of_rate += static_cast<double>(k) * std::abs(depth[k]) / size_;
   }
   const bool smooth_power = law.polynomial() || change <= part_of_depth * start_.depth;
-  return smooth_power && (!law.damped() || 2.0 * change_of_rate < std::abs(law.release_speed() + depth[1] / size_));
+  return smooth_power && (!law.damped() || law.keeps_side(start_.depth, depth[1] / size_, change, change_of_rate));
 }
 
 /// The series ends where the first coefficient that it leaves out is small, and the equation of motion at the part's

@@ -209,7 +209,10 @@ HeldContact::Mean HeldContact::mean(double start, double end) const {
     rounding = 4.0 * epsilon * std::max(before, after) / std::abs(rise);
   }
   const double damping = factor > 0.0 && rise != 0.0 ? (factor - 1.0) / rise * force : 0.0;  // C χ/H
-  return {factor * force, factor * by_end + damping, factor * rounding, (factor - 1.0) * force};
+  const double c = law_.viscosity() / now_.size, viscous = c * (std::max(end, 0.0) - std::max(start, 0.0));
+  if (factor * force + viscous <= 0.0) return {0.0, 0.0, 0.0, -force};
+  return {factor * force + viscous, factor * by_end + damping + (end > 0.0 ? c : 0.0), factor * rounding,
+          (factor - 1.0) * force + viscous};
 }
 
 }  // namespace spring

@@ -1,9 +1,10 @@
 // Normal compliance for tools that exchange values only between steps. Over a step of size H the contact force is held
 // constant, for both bodies alike (action = reaction), at the value that does the work of the law:
 //     C = [Φ(δ⁺) − Φ(δ)]/(δ⁺ − δ) · [1 + χ (δ⁺ − δ)/H]₊,   δ = y − u_tip,   Φ(δ) = λ δ₊^{p+1}/(p+1)
-// (docs/coupling.md). For χ = 0 it dissipates nothing, else C (δ⁺ − δ) − [Φ(δ⁺) − Φ(δ)] ≥ 0.
-// It is sent at the step's start, before the tip's displacement there arrives: the last message is a step older. That
-// is enough, because the beam is linear: it predicts its tip without a force, u + 2H w two steps ahead, and
+// (docs/coupling.md); with a damper c instead, ([Φ(δ⁺) − Φ(δ)]/(δ⁺ − δ) + c (δ⁺₊ − δ₊)/H)₊. For χ = c = 0 it dissipates
+// nothing, else C (δ⁺ − δ) − [Φ(δ⁺) − Φ(δ)] ≥ 0. It is sent at the step's start, before the tip's displacement there
+// arrives: the last message is a step older. That is enough, because the beam is linear: it predicts its tip without a
+// force, u + 2H w two steps ahead, and
 //     u_tip⁺ = u + 2H w + C₋ r₂ + C r₁,
 // C₋ the force meanwhile, r₁ and r₂ what 1 N held over a step adds to u_tip at its end and a step later.
 // That is so for steps of one size. In the first step, and until two steps after a change of size, the prediction is an

@@ -53,7 +53,7 @@ FlightEnd IntegratedFlight::reached(Event event) const {
 void IntegratedFlight::launch() {
   const double H = start_.size, z = start_.z;
   const Compliance& law = equation_.compliance();
-  const auto contact = [&](double deep, double rate) { return touching_ ? law.force(deep, rate) : 0.0; };
+  const auto contact = [&](double deep, double rate) { return touching_ ? law.continued(deep, rate).force : 0.0; };
   const double rate = depth_rate(H * z, 0.0), force = contact(start_.depth, rate), F = loads_.force[0];
   const double a = start_.released ? 0.0 : equation_.acceleration(start_.y, z, F, force);
 

@@ -6,7 +6,7 @@
 
 namespace spring {
 
-enum class ContactLaw { external = 1, normal_compliance = 2 };
+enum class ContactLaw { external = 1, normal_compliance = 2, kelvin_voigt = 3 };
 
 /// SI units.
 struct Parameters {
@@ -20,14 +20,15 @@ struct Parameters {
   ContactLaw contact_law = ContactLaw::external;
   double compliance_stiffness = 1.0e4;  ///< λ_nc [N/m^p]
   double compliance_exponent = 3.0;     ///< p [–] ≥ 1
-  double compliance_damping = 0.0;      ///< χ [s/m]
+  double compliance_damping = 0.0;      ///< χ [s/m], of normal_compliance
+  double contact_damping = 0.0;         ///< c [N·s/m], of kelvin_voigt
   bool stop_enabled = false;
   double stop_position = -1.0;  ///< φ [m]
   double restitution = 1.0;     ///< e in [0, 1]
   double relative_tolerance = 1e-12;
   double absolute_tolerance = 1e-14;
 
-  bool compliant() const { return contact_law == ContactLaw::normal_compliance; }
+  bool compliant() const { return contact_law != ContactLaw::external; }
   /// |y − y₀| at the maximum of a softening spring's potential, √(k1/|k2|) [m]; infinity for any other.
   double hilltop() const;
 };
@@ -38,7 +39,7 @@ struct Inputs {
   Polynomial foundation_force{};   ///< N ≥ 0 [N], upward; used when the stop inside is not enabled
   Polynomial external_force{};     ///< f_s [N]
   Polynomial base_acceleration{};  ///< a of the foundation [m/s²]: y is relative to it, so that it acts as −m a
-  Polynomial tip_displacement{};   ///< u_tip [m]; read by normal_compliance only
+  Polynomial tip_displacement{};   ///< u_tip [m]; read by a law inside only
 
   bool operator==(const Inputs& other) const {
     return contact_force == other.contact_force && foundation_force == other.foundation_force &&

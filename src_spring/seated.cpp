@@ -22,8 +22,9 @@ struct Stretch {
 
 /// N over s. Its derivative of order k is, where the tip presses,
 ///     P⁽ᵏ⁾ + λ Q_k δ^{p−k},   Q_0 = 1 + χ δ̇,   Q_{k+1} = Q_k′ δ + (p − k) Q_k δ′,
-/// with P = −F + k1 (y − y₀) + k2 (y − y₀)³ of degree 2. So the third one is 0 where the polynomial Q_3 is, whatever p
-/// is: between these places the second derivative is monotone and has one zero at most, and so on down to N itself.
+/// and a damper adds c δ̇; with P = −F + k1 (y − y₀) + k2 (y − y₀)³ of degree 2. So the third one is 0 where the
+/// polynomial Q_3 is, whatever p is: between these places the second derivative is monotone and has one zero at most,
+/// and so on down to N itself.
 class HoldingForce {
  public:
   HoldingForce(const EquationOfMotion& equation, double y, double depth, const Loads& loads, double size)
@@ -58,6 +59,7 @@ class HoldingForce {
     cut({depth_[1], 2.0 * depth_[2]}, 1);
     cut(factors_[0], 1);
     std::sort(cuts.begin(), cuts.end());
+    if (law_.viscosity() > 0.0) cut_by_damper(cuts);
     std::vector<Stretch> parts;
     for (std::size_t i = 1; i < cuts.size(); ++i)
       if (cuts[i] > cuts[i - 1]) parts.push_back({cuts[i - 1], cuts[i], contact((cuts[i - 1] + cuts[i]) / 2) > 0.0});
@@ -93,14 +95,30 @@ class HoldingForce {
   }
 
  private:
+  /// Adds where the force of a damper is as large as the elastic one.
+  void cut_by_damper(std::vector<double>& cuts) const {
+    constexpr int samples = 16;  // between two of the other cuts, where depth and rate are monotone
+    const auto pulls = [this](double s) { return law_.elastic(depth(s)) + law_.viscosity() * rate(s) < 0.0; };
+    const std::size_t known = cuts.size();
+    for (std::size_t i = 1; i < known; ++i)
+      for (int k = 0; k < samples; ++k) {
+        const double step = (cuts[i] - cuts[i - 1]) / samples, low = cuts[i - 1] + k * step, high = low + step;
+        const bool at_low = pulls(low);
+        if (pulls(high) != at_low)
+          cuts.push_back(last_before(low, high, 2.0 * epsilon, [&](double s) { return pulls(s) != at_low; }));
+      }
+    std::sort(cuts.begin(), cuts.end());
+  }
+
   /// What has the sign of the derivative of order k: nothing in it grows without bound at δ = 0. N counts as negative
   /// only where it is so by more than its rounding.
   double derivative_sign(int k, double s, bool pressed) const {
     const double force = value(load_, s);
-    const double plain = k == 0 ? spring_force_ - force : k == 1 ? -spring::rate(load_, s) : -load_[2];
+    double plain = k == 0 ? spring_force_ - force : k == 1 ? -spring::rate(load_, s) : -load_[2];
     double sum = plain;
     double contact = 0.0;
     if (pressed) {
+      if (k < 2) plain += law_.viscosity() * (k == 0 ? rate(s) : 2.0 * depth_[2] / size_);
       const double over = law_.exponent() - k, deep = std::max(depth(s), 0.0);
       const auto& Q = factors_[static_cast<std::size_t>(k)];
       contact = law_.stiffness() * sum_of_powers(Q, s, 0, k + 1) * std::pow(deep, std::max(over, 0.0));

@@ -27,10 +27,11 @@ fmi::Table fmi::make_table() {
       "above a rigid foundation";
   t.stop_time = 0.6;
   t.ends_steps_early = true;
-  t.choices.push_back({"ContactLaw",
-                       "source of the contact force",
-                       {"external, the input contact_force",
-                        "normal_compliance, computed here from tip_displacement and tip_velocity"}});
+  t.choices.push_back(
+      {"ContactLaw",
+       "source of the contact force",
+       {"external, the input contact_force", "normal_compliance, computed here from tip_displacement and tip_velocity",
+        "kelvin_voigt, a unilateral spring and damper, computed here as well"}});
 
   fmi::TableBuilder<SpringModel> add(t);
   const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {
@@ -48,18 +49,24 @@ fmi::Table fmi::make_table() {
             "and the spring force is 0 at unloaded");
   parameter("gravity", "m/s2", &FmuParameters::gravity,
             "gravitational acceleration g, downward: adds the force -mass*g, whose work is part of load_work");
-  parameter("contact_law", "", &Parameters::contact_law,
-            "1 = external (input contact_force), 2 = normal compliance, computed by this FMU")
-      .range(1, 2)
+  parameter(
+      "contact_law", "", &Parameters::contact_law,
+      "1 = external (input contact_force), 2 = normal compliance, 3 = unilateral spring and damper, both computed "
+      "by this FMU")
+      .range(1, 3)
       .choice = "ContactLaw";
   parameter("compliance_stiffness", "", &Parameters::compliance_stiffness,
-            "lambda in C = lambda*max(0, d)^p*max(0, 1 + chi*d') [N/m^p], d = y - u_tip")
+            "lambda in C = lambda*max(0, d)^p*max(0, 1 + chi*d') [N/m^p], d = y - u_tip, of contact_law = 2; in "
+            "max(0, lambda*d^p + c*d') for d > 0 of contact_law = 3")
       .at_least(0)
       .typical(1e4);
   parameter("compliance_exponent", "", &Parameters::compliance_exponent, "exponent p in the contact law").range(1, 100);
   parameter(
       "compliance_damping", "s/m", &Parameters::compliance_damping,
-      "damping chi of the contact law (Hunt and Crossley); the energy that it dissipates is part of dissipated_energy")
+      "damping chi of contact_law = 2 (Hunt and Crossley); the energy that it dissipates is part of dissipated_energy")
+      .at_least(0);
+  parameter("contact_damping", "N.s/m", &Parameters::contact_damping,
+            "damping c of contact_law = 3, as compliance_damping")
       .at_least(0);
   parameter("stop_enabled", "", &Parameters::stop_enabled, "whether this FMU has the rigid foundation, with impacts");
   parameter("stop_position", "m", &Parameters::stop_position, "position phi of the foundation");
@@ -77,7 +84,7 @@ fmi::Table fmi::make_table() {
   };
   input("contact_force", "N", &spring::Inputs::contact_force,
         "contact force C, positive presses the spring down; its derivatives of order 1 and 2 hold for the next step "
-        "only: C(tau) = C + C' tau + C'' tau^2/2; ignored when contact_law = 2");
+        "only: C(tau) = C + C' tau + C'' tau^2/2; ignored when contact_law > 1");
   input("foundation_force", "N", &spring::Inputs::foundation_force,
         "foundation force N, positive upward; derivatives as for contact_force; ignored when stop_enabled");
   add.impulse("impulse", "N.s", "upward impulse, applied at the start of the next step, then 0 again",
@@ -88,14 +95,14 @@ fmi::Table fmi::make_table() {
         "acceleration a of the foundation, upward; all displacements are relative to it, so that it acts as a force of "
         "-mass*a; derivatives as for contact_force");
   add.input("tip_displacement", "m",
-            "displacement of the beam's tip, used when contact_law = 2; extrapolated over the step with its "
+            "displacement of the beam's tip, used when contact_law > 1; extrapolated over the step with its "
             "derivatives or, where the first is 0, with tip_velocity",
             [](SpringModel& m, const fmi::Polynomial& value) {
               m.tip_displacement = value;
               m.tip_is_set = true;
             });
   add.input("tip_velocity", "m/s",
-            "velocity of the beam's tip, used when contact_law = 2 and the derivative of tip_displacement is 0; its "
+            "velocity of the beam's tip, used when contact_law > 1 and the derivative of tip_displacement is 0; its "
             "derivative of order 1 is the tip's acceleration, that of order 2 is not used",
             [](SpringModel& m, const fmi::Polynomial& value) {
               m.tip_velocity = value;
@@ -105,7 +112,7 @@ fmi::Table fmi::make_table() {
             "tip_velocity_forecast of the beam, used when tip_response > 0; its derivatives are not used",
             &SpringModel::forecast);
   add.input("tip_response", "m/N",
-            "tip_response of the beam. If > 0 and contact_law = 2, the tip is predicted, and reaction is constant over "
+            "tip_response of the beam. If > 0 and contact_law > 1, the tip is predicted, and reaction is constant over "
             "each step at the value that does the work of the contact law: no step size adds energy. If 0, the contact "
             "law acts with the extrapolated tip. Its derivatives are not used",
             &SpringModel::response)
@@ -117,13 +124,13 @@ fmi::Table fmi::make_table() {
   add.exact_start(&SpringModel::parameters, &FmuParameters::displacement);
   add.output("velocity", "m/s", "velocity z of the top", of(&Spring::velocity), of(&Spring::acceleration));
   add.exact_start(&SpringModel::parameters, &FmuParameters::velocity);
-  const std::vector<std::string> motion{"contact_law", "compliance_stiffness", "compliance_exponent",
-                                        "compliance_damping", "displacement", "tip_displacement", "tip_velocity",
-                                        // with tip_response > 0, of which the first is predicted:
-                                        "tip_response", "tip_velocity_forecast", "velocity", "mass", "damping",
-                                        "linear_stiffness", "cubic_stiffness", "unloaded", "external_force",
-                                        "base_acceleration", "foundation_force", "stop_enabled", "stop_position",
-                                        "restitution", "gravity"};
+  const std::vector<std::string> motion{
+      "contact_law", "compliance_stiffness", "compliance_exponent", "compliance_damping", "contact_damping",
+      "displacement", "tip_displacement", "tip_velocity",
+      // with tip_response > 0, of which the first is predicted:
+      "tip_response", "tip_velocity_forecast", "velocity", "mass", "damping", "linear_stiffness", "cubic_stiffness",
+      "unloaded", "external_force", "base_acceleration", "foundation_force", "stop_enabled", "stop_position",
+      "restitution", "gravity"};
   using M = const SpringModel&;
   add.output("displacement_integral", "m.s", "integral of displacement over the last step",
              of(&Spring::displacement_integral), of(&Spring::displacement));

@@ -40,7 +40,7 @@ class SpringModel final : public fmi::Model {
     if (tolerance > 0.0) p.relative_tolerance = std::min(p.relative_tolerance, tolerance);
     spring_.emplace(p);  // checks the parameters
     trials_.emplace(*spring_);
-    held_.emplace(spring::Compliance(p.compliance_stiffness, p.compliance_exponent, p.compliance_damping), p.mass);
+    held_.emplace(spring::contact_of(p), p.mass);
     rhythm_ = {};
   }
 

@@ -137,7 +137,7 @@ def test_directional_derivatives_at_the_start_are_those_of_the_outputs(case):
                 continue
             outputs = [o for o in case.outputs if name in pairs.get(o, ()) and o not in skipped]
             value = k.get(name)
-            edge = name in {"alpha_b", "restitution", "compliance_damping", "tip_response"}
+            edge = name in {"alpha_b", "restitution", "compliance_damping", "contact_damping", "tip_response"}
             if outputs and (not edge or value not in (0.0, 1.0)):
                 change = 1e-4 * max(abs(value), 1e-2)
                 own_change = 1e-6 * (abs(value) or float(case.variables[name].nominal or 1.0))

@@ -112,6 +112,7 @@ def test_pair_that_looks_ahead_does_not_depend_on_the_order_of_reading(beam, spr
         {"distributed_load": -0.7, "tip_load_coefficient": -0.3},
         {"external_force": -2.0},
         {"compliance_damping": 0.5},
+        {"contact_law": 3, "contact_damping": 5.0},
     ],
     ids=str,
 )

@@ -207,12 +207,45 @@ INSTANTIATE_TEST_SUITE_P(Laws, DampedRebound,
                          testing::Combine(testing::Values(1e2, 1e6), testing::Values(1.0, 1.5, 2.2, 3.0),
                                           testing::Values(0.01, 0.5, 20.0)));
 
-// The tip leaves, faster than 1/χ from some time on: no force then, though they overlap, and never an adhesion. Against
-// classical Runge–Kutta steps in extended precision.
-TEST(SpringCompliance, DampingNeverPulls) {
-  const double lambda = 1e4, chi = 2.0, k = 30.0;
+// A free mass against a tip at rest under C = (λδ + cδ̇)₊: a damped oscillator until C = 0 at ω_d t = π − 2φ, sin φ = ζ,
+// where it has −v e^{−(π−2φ) tan φ} (Schwager & Pöschel 2007); then it goes on at that speed.
+TEST(SpringCompliance, KelvinVoigtPartsWithItsRestitution) {
+  const double lambda = 1e4, v = 0.5, gap = 0.013, mass = 1.3, omega = std::sqrt(lambda / mass);
+  for (const double zeta : {1e-3, 0.1, 0.5, 0.9}) {
+    Parameters p = compliant(lambda, 1.0);
+    p.contact_law = spring::ContactLaw::kelvin_voigt;
+    p.contact_damping = 2.0 * zeta * mass * omega;
+    p.compliance_damping = 7.0;  // of the other law
+    p.linear_stiffness = 0.0;
+    p.mass = mass;
+    p.displacement = -gap;
+    p.velocity = v;
+    const double phi = std::asin(zeta), fast = omega * std::cos(phi), e = std::exp(-(pi - 2 * phi) * std::tan(phi));
+    const double pulls = (pi - 2 * phi) / fast, depth = v / fast * e * std::sin(2 * phi), end = gap / v + 2 * pulls;
+    for (const int steps : {1, 10, 77}) {
+      Spring s(p);
+      for (int i = 0; i < steps; ++i) {
+        s.step(end / steps, Inputs{});
+        EXPECT_GE(s.reaction(), 0.0);
+        ASSERT_NEAR(energy(s) + s.dissipated_energy(), mass / 2 * v * v, 1e-11 * mass * v * v);
+      }
+      EXPECT_NEAR(s.velocity(), -v * e, 1e-10 * v) << zeta << ' ' << steps;
+      EXPECT_NEAR(s.displacement(), depth - v * e * pulls, 1e-10 * gap) << zeta << ' ' << steps;
+    }
+  }
+}
+
+// The tip leaves, so fast from some time on that a damper would pull: no force then, though they overlap, and never an
+// adhesion. Against classical Runge–Kutta steps in extended precision.
+class NeverPulls : public testing::TestWithParam<spring::ContactLaw> {};
+
+TEST_P(NeverPulls, Damping) {
+  const bool voigt = GetParam() == spring::ContactLaw::kelvin_voigt;
+  const double lambda = 1e4, chi = 2.0, c = 20.0, k = 30.0;
   Parameters p = compliant(lambda, 1.5);
+  p.contact_law = GetParam();
   p.compliance_damping = chi;
+  p.contact_damping = c;
   p.linear_stiffness = k;
   p.displacement = 0.02;
   const spring::Polynomial tip{0.0, 0.3, 40.0};  // δ̇ = −1/χ soon after the start
@@ -227,7 +260,8 @@ TEST(SpringCompliance, DampingNeverPulls) {
   const auto rates = [&](long double t, long double u, long double w) -> Rates {
     const long double depth = u - (tip[0] + t * (tip[1] + t * tip[2] / 2)), rate = w - (tip[1] + t * tip[2]);
     const long double elastic = depth > 0 ? lambda * depth * std::sqrt(depth) : 0.0L;
-    const long double force = elastic * std::max(0.0L, 1 + chi * rate);
+    const long double damped = voigt ? elastic + c * rate : elastic * (1 + chi * rate);
+    const long double force = depth > 0 ? std::max(0.0L, damped) : 0.0L;
     return {w, -k * u - force, (force - elastic) * rate};
   };
   bool slack = false;
@@ -238,7 +272,8 @@ TEST(SpringCompliance, DampingNeverPulls) {
     y += h / 6 * (a.z + 2 * b.z + 2 * c.z + d.z);
     z += h / 6 * (a.a + 2 * b.a + 2 * c.a + d.a);
     lost += h / 6 * (a.power + 2 * b.power + 2 * c.power + d.power);
-    slack = slack || (z - tip[1] - t * tip[2] < -1 / chi && y > tip[0] + t * (tip[1] + t * tip[2] / 2));
+    const long double then = t + h, overlap = y - (tip[0] + then * (tip[1] + then * tip[2] / 2));
+    slack = slack || (overlap > 0 && rates(then, y, z).a == -k * y);
   }
   EXPECT_TRUE(slack);
   for (const int steps : {1, 30}) {
@@ -254,6 +289,9 @@ TEST(SpringCompliance, DampingNeverPulls) {
     EXPECT_NEAR(s.dissipated_energy(), static_cast<double>(lost), 1e-10 * static_cast<double>(lost));
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Laws, NeverPulls,
+                         testing::Values(spring::ContactLaw::normal_compliance, spring::ContactLaw::kelvin_voigt));
 
 // ÿ = F − 4 y^p (1 + χ ẏ) from rest, F = 10 t or 5 t²: nothing moves at the start, so that tolerances of the start's
 // motion are those of nothing, which took 15,000 steps of IDA. References: Runge–Kutta of order 8 in extended
@@ -298,5 +336,37 @@ TEST(SpringCompliance, DampingOfASeatedTop) {
     EXPECT_NEAR(s.reaction(), 1e5 * std::pow(depth, 1.5) * (1 + 3.0 * v), 1e-11);
     const double lost = 3.0 * v * 1e5 * std::pow(depth, 2.5) / 2.5;
     EXPECT_NEAR(s.dissipated_energy(), lost, 1e-11 * lost);
+  }
+}
+
+// Seated under a tip that comes down by d = sin²: C = (λ d^p + c ḋ)₊ takes c ∫ ḋ² on the way down, and all that is
+// stored on the way up where it is slack. Here by steps along the parabola d = w t (T − t), down and up again.
+TEST(SpringCompliance, KelvinVoigtOfASeatedTop) {
+  const double lambda = 1e5, c = 40.0, w = 3.0, T = 0.1;
+  Parameters p = compliant(lambda, 1.5);
+  p.contact_law = spring::ContactLaw::kelvin_voigt;
+  p.contact_damping = c;
+  p.stop_enabled = true;
+  p.stop_position = 0.0;
+  const auto depth = [&](double t) { return w * t * (T - t); };
+  const auto rate = [&](double t) { return w * (T - 2 * t); };
+  double low = T / 2, high = T;  // where the damper would pull as much as the law pushes
+  for (int i = 0; i < 200; ++i) {
+    const double t = (low + high) / 2;
+    (lambda * std::pow(depth(t), 1.5) + c * rate(t) > 0.0 ? low : high) = t;
+  }
+  const double left = lambda * std::pow(depth(low), 2.5) / 2.5;
+  const double lost = c * w * w * (std::pow(T, 3) - std::pow(T - 2 * low, 3)) / 6 + left;
+  for (const int steps : {1, 20}) {
+    Spring s(p);
+    Inputs inputs;
+    for (int i = 0; i < steps; ++i) {
+      const double t = T * i / steps;
+      inputs.tip_displacement = {-depth(t), -rate(t), 2 * w};
+      s.step(T / steps, inputs);
+      EXPECT_GE(s.reaction(), 0.0);
+    }
+    EXPECT_TRUE(s.seated());
+    EXPECT_NEAR(s.dissipated_energy(), lost, 1e-10 * lost) << steps;
   }
 }

@@ -150,6 +150,29 @@ TEST(HeldContact, DampingIsBookedAtAnyStepAndRightAtSmallOnes) {
   EXPECT_NEAR(errors[1] / errors[2], 4.0, 1.0);
 }
 
+// The same of a damper c beside λ, and its restitution e^{−(π−2φ) tan φ}, sin φ = c/2√(λμ) (Schwager & Pöschel 2007).
+TEST(HeldContact, KelvinVoigtIsBookedAtAnyStepAndRightAtSmallOnes) {
+  const double mu = m_tip * m_top / (m_tip + m_top), omega = std::sqrt(1e4 / mu), phi = std::asin(0.2);
+  const Compliance law(1e4, 1.0, 0.0, 0.4 * mu * omega);
+  std::array<double, 3> errors{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    Collision c(law, 0.0, k == 0 ? 100.0 / omega : pi / omega / (100.0 * static_cast<double>(k)));
+    const double before = c.energy();
+    double lost = 0.0;
+    for (int i = 0; i < 10 || c.contact.force() > 0.0 || c.top.x > c.tip.x; ++i) {
+      ASSERT_LT(i, 2000);
+      c.step();
+      EXPECT_GE(c.contact.force(), 0.0);
+      EXPECT_GE(c.contact.dissipated(), lost);
+      lost = c.contact.dissipated();
+      EXPECT_NEAR(c.energy() + lost, before, 1e-12 * before);
+    }
+    errors[k] = std::abs(c.tip.v - c.top.v + v * std::exp(-(pi - 2 * phi) * std::tan(phi)));
+  }
+  EXPECT_LT(errors[2], 1e-3 * -v);
+  EXPECT_LT(errors[2], errors[1]);
+}
+
 // Steps of a size that nobody has announced: forces have done other work than the law's. The energy of the pair, with
 // what the contact owes, stays to rounding; and two steps after a single change nothing is owed any more.
 TEST(HeldContact, EnergyStaysWhereTheStepSizeChanges) {
