@@ -8,7 +8,7 @@ from .lazily import attached
 
 if TYPE_CHECKING:
     __version__: str
-    from .api import RunStopped, Simulation, Trajectory, load, simulate
+    from .api import Check, RunStopped, Simulation, Trajectory, check, load, simulate
     from .api_studies import converge, crosscheck, fit, sweep
     from .bodies.elements import MovingWall, PointMass, RigidWall, SpringDamper
     from .bodies.protocol import Body, Energies, Motion
@@ -20,7 +20,7 @@ else:
     __getattr__ = attached(
         __name__,
         {
-            "api": ("RunStopped", "Simulation", "Trajectory", "load", "simulate"),
+            "api": ("Check", "RunStopped", "Simulation", "Trajectory", "check", "load", "simulate"),
             "api_studies": ("converge", "crosscheck", "fit", "sweep"),
             "bodies.elements": ("MovingWall", "PointMass", "RigidWall", "SpringDamper"),
             "bodies.protocol": ("Body", "Energies", "Motion"),
@@ -35,6 +35,7 @@ else:
 __all__ = [
     "Beam",
     "Body",
+    "Check",
     "Contact",
     "Energies",
     "Event",
@@ -53,6 +54,7 @@ __all__ = [
     "Stop",
     "Trajectory",
     "__version__",
+    "check",
     "converge",
     "crosscheck",
     "fit",

@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING
 from .results import recording, totals
 from .results.files import load_trajectory as load
 from .results.trajectory import Trajectory
+from .run.companion import Check, check
 from .run.outcome import RunStopped
 from .run.runner import Simulation
-from .studies.accuracy import simulate
+from .run.simulate import simulate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["RunStopped", "Simulation", "Trajectory", "load", "simulate"]
+__all__ = ["Check", "RunStopped", "Simulation", "Trajectory", "check", "load", "simulate"]
 
 
 def _plot(run: Trajectory, picture: str = "positions", ax: Axes | None = None) -> Figure:

@@ -10,13 +10,14 @@ from springbeam.bodies.protocol import FmuError
 from springbeam.monolithic import event_driven
 from springbeam.results.distance import distance
 from springbeam.results.trajectory import Trajectory
+from springbeam.run.accuracy import pick
+from springbeam.run.companion import check
 from springbeam.run.ledger import EXACT, bounds
 from springbeam.run.outcome import RunStopped
-from springbeam.run.resolution import PEAK_DOUBTED
+from springbeam.run.peaks import PEAK_DOUBTED
 from springbeam.run.runner import Simulation
 from springbeam.scene import Scene, SceneError
 from springbeam.scene.suspicions import suspicions
-from springbeam.studies.accuracy import pick
 from springbeam.studies.comparison import perturbed
 from springbeam.studies.tables import Row
 
@@ -33,7 +34,7 @@ MEANINGS = {
 }
 CLASSES = tuple(MEANINGS)
 #: A run without an accuracy is wrong if an end is further from the reference than this share of its largest change:
-#: what `springbeam.run.misplaced` is to warn of.
+#: what `springbeam.run.companion` is to warn of.
 WRONG = 0.01
 #: Relative change of the initial velocity that shows the conditioning, as large as the errors that are judged; and the
 #: largest amplification of it in the motion or in a time.
@@ -94,7 +95,7 @@ def judge(scene: Scene, reference: Reference | None = None) -> Row:
     cause = ""
     try:
         if scene.accuracy is not None:
-            return judged(pick(scene), reference=reference)
+            return judged(pick(scene).judged_run(), reference=reference)
         simulation = Simulation(scene)
     except (SceneError, FmuError) as error:
         return ended("refused", str(error))
@@ -110,7 +111,7 @@ def judge(scene: Scene, reference: Reference | None = None) -> Row:
             cause, found = stopped.cause, simulation.run
     if "traceback" in found.summary:  # an error that nobody foresaw
         return ended("garbage", f"crashed: {cause}")
-    return judged(found, cause, reference)
+    return judged(found if cause else check(found).judged_run(), cause, reference)
 
 
 def ended(kind: str, reason: str = "") -> Row:

@@ -54,7 +54,7 @@ def test_the_parts_of_a_distance_are_those_of_runs_made_different():
         ],
     )
     first = run.events[0].time
-    assert distance(run, run, 1e-4) == (0.0, 0.0, 0.0, None)
+    assert distance(run, run, 1e-4) == (0.0, 0.0, 0.0, None, 0.0, 0.0)
     found = distance(later, run, 1e-4)
     assert found.motion == 0.0
     assert found.times == pytest.approx(1e-3 / (0.1 - run.time[0]), rel=1e-9)

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bodies import DuffingBody, beam_body, simulate
+from springbeam.run.resolution import WINDOW
 
 from springbeam.monolithic import event_driven
 from springbeam.monolithic import laws as references
 from springbeam.run import runner
-from springbeam.run.resolution import WINDOW
 from springbeam.scene import Scene, laws, load_scene, with_changes
 from springbeam.scene.linearised import contact_energy
 from springbeam.scene.statics import tip_inertia

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from bodies import pair_of
+from springbeam.run.observed import force_window
 
 from springbeam.motion.events import Event
 from springbeam.results.dense import inside
 from springbeam.results.records import STEP
 from springbeam.results.totals import totals
-from springbeam.run.observed import force_window
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.frequencies import slowest_frequency
 

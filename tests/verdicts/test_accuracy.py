@@ -10,6 +10,7 @@ from commands import printed
 from judge import ERRORS, Reference, judge
 from references import reference
 from scenes import scene_from_dict
+from springbeam.studies.accuracy import simulate
 
 from springbeam import RunStopped, SceneError, load_scene, with_changes
 from springbeam.results.distance import Distance, distance
@@ -19,7 +20,6 @@ from springbeam.run.runner import run
 from springbeam.scene import as_scene
 from springbeam.scene.files import tomllib
 from springbeam.studies import accuracy as search
-from springbeam.studies.accuracy import simulate
 
 SCENES, FOUND = (
     tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))

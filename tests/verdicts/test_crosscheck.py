@@ -56,19 +56,19 @@ def test_any_elements_and_loads_pass(degree, loads, beam):
 @pytest.mark.parametrize(
     ("error", "at", "passed"),
     [
-        ([0.3, 0.2, 0.5], 2, True),
-        ([0.5, 0.9, 1.0], 1, False),
-        ([0.0, 0.0, 0.82], 2, False),
-        ([0.41, 0.4, 0.8], 2, True),
+        ([0.15, 0.1, 0.25], 2, True),
+        ([0.25, 0.5, 0.55], 1, False),
+        ([0.0, 0.0, 0.42], 2, False),
+        ([0.21, 0.2, 0.4], 2, True),
     ],
 )
-def test_an_error_may_be_four_times_what_halving_has_changed_so_far_and_the_floor(error, at, passed):
-    """Told is the largest error or, where a bound is broken, the one that is furthest out of it."""
+def test_an_error_may_be_twice_what_the_companion_has_differed_by_so_far_and_the_floor(error, at, passed):
+    """Reported is the largest error or, where a bound is broken, the one that is furthest out of it."""
     changed = np.array([0.1, 0.0, 0.2])
     floor = np.full(3, 0.01)
     found = _judged("y", np.array([1.0, 2.0, 3.0]), np.array(error), changed, floor)
     rms = np.sqrt(np.mean(np.square(error)))
-    bound = (0.41, 0.41, 0.81)[at]
+    bound = (0.21, 0.21, 0.41)[at]
     assert (found["at"], found["error"], found["passed"]) == (at + 1.0, error[at], passed)
     assert (found["l2"], found["bound"]) == pytest.approx((rms, bound), rel=1e-14)
 
@@ -178,7 +178,7 @@ def test_a_right_run_at_coarse_steps_does_not_differ(number):
     assert found["verdict"] == DRAWN[number]
 
 
-@pytest.mark.parametrize("number", DRAWN)
+@pytest.mark.parametrize("number", [number for number, verdict in DRAWN.items() if verdict == "agrees"])
 def test_a_reference_of_a_beam_that_is_a_little_heavier_fails_at_coarse_steps(monkeypatch, number):
     right = event_driven.integrate
 
@@ -190,12 +190,13 @@ def test_a_reference_of_a_beam_that_is_a_little_heavier_fails_at_coarse_steps(mo
 
 
 def test_a_third_run_is_made_only_where_two_do_not_agree_with_the_reference(monkeypatch):
+    """Without it a comparison has a run and its companion, whose bound is that of steps 2.3 times as long."""
     sizes = []
     simulated = comparison.run_in_memory
     monkeypatch.setattr(comparison, "run_in_memory", lambda s: sizes.append(s.coupling.H) or simulated(s))
     H = tenth(8).coupling.H
     compare(tenth(8))
-    assert sizes == [H, H / 2, H / 4]
+    assert sizes == [H, H / 4]
     sizes.clear()
     compare(with_changes(SOFT, time={"t_end": 0.05}, coupling={"macro_step": 1e-3}))
-    assert sizes == [1e-3, 5e-4]
+    assert sizes == [1e-3]

@@ -41,9 +41,6 @@ class EndLoaded(Body):
     def load_on_end(self) -> Force:
         return self._on_end
 
-    def moved_by(self, load: Load) -> float:
-        return self.mass if load.on == "base" else 1.0
-
 
 class MassState(NamedTuple):
     """State of a mass."""

@@ -10,16 +10,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ..scene import Beam, Load, Spring
-from ..scene.frequencies import (
-    fastest_frequency,
-    impact_frequency,
-    lasting_frequency,
-    shear_frequency,
-    slowest_frequency,
-)
-from ..scene.modes import tip_modes
+from ..scene.modes import tip_decay
 from ..scene.partners import ForeignFmu
-from ..scene.statics import SHAPE_POINTS, tip_compliance, tip_inertia, tip_reach
+from ..scene.statics import SHAPE_POINTS, tip_compliance, tip_reach
 from .elements import EndLoaded
 from .fmu import Fmu, Value
 from .force import combined
@@ -33,7 +26,6 @@ from .protocol import (
     FmuError,
     Force,
     InnerForces,
-    Modes,
     Motion,
     StepRefused,
     made_of,
@@ -41,10 +33,6 @@ from .protocol import (
 
 #: Length of a trial step of our own bodies over a macro step; it changes their outputs by no more than rounding.
 _INSTANT = 1e-8
-#: ∫ φ over length and tip value of the lowest mode of a slender beam; one that shears alone has 0.64.
-_MEAN = 0.4
-#: Waves that a smooth motion excites, over the lowest frequency of the beam.
-_SMOOTH_WAVES = 5.0
 #: The numbers by which the beam FMU knows its alternatives.
 _INTEGRATORS = {"modal": 1, "midpoint": 2}
 _MASS_MATRICES = {"consistent": 1, "averaged": 2}
@@ -311,40 +299,11 @@ class FmuBeam(OwnBody):
         shape = load.shape or [1.0]
         return [(f"distributed_load_{i}" if i else "distributed_load", s) for i, s in enumerate(shape) if s != 0.0]
 
-    @property
-    def inertia(self) -> float:
-        return tip_inertia(self._beam)
-
     def stiffness(self, displacement: Any) -> float:
         return 1.0 / tip_compliance(self._beam)
 
-    def oscillation(self, displacement: Any = 0.0) -> tuple[float, float]:
-        omega = slowest_frequency(self._beam)
-        return omega, 0.5 * self._beam.alpha_b * omega
-
-    def modes(self, displacement: Any = 0.0) -> Modes:
-        omega, tip = tip_modes(self._beam)
-        return omega**2, self._beam.alpha_b * omega**2, tip
-
-    @property
-    def ringing(self) -> float:  # type: ignore[override]
-        return min(shear_frequency(self._beam), fastest_frequency(self._beam))
-
-    def late_waves(self, rate: float, *, excited: bool) -> float:
-        beam = self._beam
-        if beam.integrator == "modal":
-            return 0.0
-        if excited:
-            return impact_frequency(beam)
-        return min(max(_SMOOTH_WAVES * slowest_frequency(beam), rate), lasting_frequency(beam))
-
-    def moved_by(self, load: Load) -> float:
-        beam = self._beam
-        if load.on == "base":
-            return _MEAN * beam.density * beam.area * beam.length
-        if load.on == "beam" and load.at is None:
-            return _MEAN * beam.length * sum(map(abs, load.shape or (1.0,)))
-        return 1.0
+    def decay(self, time: float, size: float, speed: float) -> float:
+        return tip_decay(self._beam)
 
     def start_under(self, contact: float) -> None:
         values, _ = self._loads

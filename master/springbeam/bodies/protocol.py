@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import inf, sqrt
+from math import inf
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -48,8 +48,6 @@ _T = TypeVar("_T", bound=tuple[Any, ...])
 #: ``made_of(kind, values)`` is ``kind(*values)`` of a named tuple in a third of the time.
 made_of: Callable[[type[_T], tuple[Any, ...]], _T] = tuple.__new__
 
-#: ω² [1/s²], 2 ζ ω [1/s] and the displacement of the end [1/√kg] of modes of unit mass, (n,) each.
-Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
 #: The interface ends (tip, lower end): the spring top, or without a spring the foundation.
 Ends = tuple[Motion, Motion]
 
@@ -113,58 +111,9 @@ class Body:
     #: Relative tolerance of the solver of its motion.
     tolerance = 0.0
 
-    #: The fastest wave that an impact excites and that its mesh decides [rad/s], 0 where there is none.
-    ringing = 0.0
-
-    @property
-    def inertia(self) -> float:
-        """Mass [kg] that a force moves which acts for long compared with the waves inside the body."""
-        return self.mass
-
     def stiffness(self, displacement: Any) -> Any:
         """Return ∂F/∂w [N/m] of `holding_force` at ``displacement`` [m], a float or an array; ``None`` if unknown."""
         return None
-
-    def oscillation(self, displacement: Any = 0.0) -> tuple[float, float] | None:
-        """Return the lowest frequency of the body alone [rad/s] and its damping ratio; 0 if nothing oscillates.
-
-        For an array of displacements [m]: those where the body is stiffest. ``None`` if unknown.
-        """
-        stiffness = self.stiffness(displacement)
-        if stiffness is None or self.damping is None:
-            return None
-        stiffest = float(np.max(stiffness))
-        if stiffest <= 0.0 or not 0.0 < self.mass < inf:
-            return 0.0, 0.0
-        omega = sqrt(stiffest / self.mass)
-        return omega, 0.5 * self.damping / (self.mass * omega)
-
-    def modes(self, displacement: Any = 0.0) -> Modes | None:
-        """Return the modes of the linearised body at its end; ``None`` if unknown.
-
-        For an array of displacements [m]: those where the body is stiffest.
-        """
-        stiffness = self.stiffness(displacement)
-        if stiffness is None or self.damping is None:
-            return None
-        if not 0.0 < self.mass < inf:
-            return np.zeros(1), np.zeros(1), np.zeros(1)
-        stiffest = float(np.max(stiffness))
-        return np.array([stiffest / self.mass]), np.array([self.damping / self.mass]), np.array([self.mass**-0.5])
-
-    def moved_by(self, load: Load) -> float:
-        """Return the largest force of a unit ``load`` on a mode, over the mode's displacement of the end.
-
-        0 if unknown.
-        """
-        return 0.0
-
-    def late_waves(self, rate: float, *, excited: bool) -> float:
-        """Return the frequency up to which waves count that the body's own steps make late [rad/s], 0 if none are.
-
-        ``rate`` [rad/s] is that of a load on it; ``excited`` says whether something excites its fastest waves.
-        """
-        return 0.0
 
     @property
     def massless(self) -> bool:
@@ -246,13 +195,11 @@ class Body:
     def decay(self, time: float, size: float, speed: float) -> float | None:
         """Return the decrease of ẅ of the end per unit of velocity that an impulse adds [1/s].
 
-        It follows from the modes, or without them from two trial steps at ``time`` [s] as of `trial_acceleration`, one
-        of them after an impulse that adds ``speed`` [m/s]. ``None`` if the body makes no such steps.
+        It follows from mass and damping, or without them from two trial steps at ``time`` [s] as of
+        `trial_acceleration`, one of them after an impulse that adds ``speed`` [m/s]. ``None`` if the body makes none.
         """
-        modes = self.modes()
-        if modes is not None:
-            _, damping, tip = modes
-            return float(tip**2 @ damping) / (float(tip @ tip) or 1.0)
+        if self.damping is not None and self.stiffness(0.0) is not None:
+            return self.damping / self.mass if 0.0 < self.mass < inf else 0.0
         before = self.state
         free = self.trial_acceleration(time, size)
         if free is None or not self.abilities.impulse:

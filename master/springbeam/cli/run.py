@@ -70,6 +70,9 @@ def run(
             help="Write rows at multiples of DT [s] into trajectory.csv, not one per step.",
         ),
     ] = None,
+    no_check: Annotated[
+        bool, typer.Option("--no-check", help="Leave out the companion run in longer steps, which bounds the errors.")
+    ] = False,
     no_plots: NoPlotsOption = False,
     force: ForceOption = False,
     quiet: QuietOption = False,
@@ -96,7 +99,7 @@ def run(
         directory = RunDirectory.create(out or default, replace=force)
     recorder = FileRecorder(what, directory, interval)
     silent = quiet or as_json
-    return carry_out(recorder, made=made, no_plots=no_plots, silent=silent)
+    return carry_out(recorder, made=made, check=not no_check, no_plots=no_plots, silent=silent)
 
 
 def _refuse_options(scene: Scene, interval: float | None) -> None:
@@ -111,12 +114,12 @@ def picked(scene: Scene, *, silent: bool) -> Trajectory | None:
     """Return the run with the accuracy of the scene; ``None`` if the scene has none."""
     if scene.accuracy is None:
         return None
+    from ..run.accuracy import pick
     from ..run.outcome import RunStopped
-    from ..studies.accuracy import pick
 
     try:
         with progress_of_run(scene.time.t_end, "pilot runs", silent=silent) as show:
-            return pick(scene, show)
+            return pick(scene, show).judged_run()
     except RunStopped as stopped:
         fail(STOPPED, f"a pilot run for accuracy = {scene.accuracy:g} {stopped}")
 
@@ -125,11 +128,12 @@ def carry_out(
     recorder: FileRecorder,
     *,
     made: Trajectory | None = None,
+    check: bool = False,
     pictures: Sequence[str] = (OVERVIEW,),
     no_plots: bool,
     silent: bool,
 ) -> Findings:
-    """Run the scene of ``recorder``, or write a run that is ``made``, and draw ``pictures`` of it.
+    """Run the scene of ``recorder`` and ``check`` the run, or write one that is ``made``; draw ``pictures`` of it.
 
     Raises what keeps the run from recording anything.
     """
@@ -147,6 +151,8 @@ def carry_out(
                 recorder.write(made)
             else:
                 run_scene(recorder.scene, recorder, show)
+                if check:
+                    _judge(recorder, silent=silent)
     except (RunStopped, OSError, FmuError, KeyboardInterrupt) as stopped:
         if not recorder.begun and not isinstance(stopped, RunStopped):
             raise
@@ -163,6 +169,14 @@ def carry_out(
     files = [("results", directory.path)]
     draw = None if no_plots else partial(_drawn, directory.path, pictures)
     return Findings(document, shown, files, directory.path, STOPPED if error else 0, error, draw)
+
+
+def _judge(recorder: FileRecorder, *, silent: bool) -> None:
+    """Check the run of ``recorder``, and write what its companion shows into its summary."""
+    from ..run.companion import check as check_run
+
+    with progress_of_run(recorder.scene.time.t_end, "companion run", silent=silent) as show:
+        recorder.amend(check_run(recorder.trajectory(), show).as_summary())
 
 
 def _drawn(directory: Path, names: Sequence[str]) -> Findings:
@@ -211,11 +225,13 @@ def _in_words(scene: Scene, summary: Mapping[str, Any], events: list[Event]) -> 
     for words, value in in_words(summary):
         results.add_row(Text(words), Text(value))
     yield results
-    yield from _lines(summary)
+    yield from _lines(summary, scene.duration)
 
 
-def _lines(summary: Mapping[str, Any]) -> Iterator[str]:
-    """Yield cost, residuals, accuracy and warnings of a run."""
+def _lines(summary: Mapping[str, Any], duration: float) -> Iterator[str]:
+    """Yield cost, residuals, accuracy, errors and warnings of a run of a ``duration`` [s]."""
+    from ..run.companion import judged_in_words
+
     if "macro_steps" in summary and "wall_time" in summary:
         yield f"run       {summary['macro_steps']} macro steps in {summary['wall_time']:.3g} s"
     if "coupling" in summary:
@@ -225,8 +241,9 @@ def _lines(summary: Mapping[str, Any]) -> Iterator[str]:
         beside = "" if interface is None else f", of the interface {float(interface):.1e}"
         yield f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}{beside}"
     if (found := summary.get("accuracy")) is not None:
-        errors = ", ".join(f"{value:.1e} ({name})" for name, value in found["estimated_errors"].items())
-        yield f"accuracy  {picked_in_words(found)}\n          errors at most {errors}"
+        yield f"accuracy  {picked_in_words(found)}"
+    if (said := judged_in_words(summary, duration)) is not None:
+        yield f"errors    {said}"
     yield from (f"warning   {warning}" for warning in summary.get("warnings", ()))
 
 

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import comb
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,27 +51,10 @@ _SAME = 1e-12
 _DEGREE = 5
 
 
-def _bernstein(parts: int) -> np.ndarray:
-    """Return the matrix from powers of s in [0, 1] to the Bernstein coefficients in each of equal ``parts``.
-
-    They enclose the polynomial there.
-    """
-    return np.array(
-        [
-            [
-                sum(comb(i, m) / comb(_DEGREE, m) * comb(k, m) * part ** (k - m) for m in range(min(i, k) + 1))
-                / parts**k
-                for k in range(_DEGREE + 1)
-            ]
-            for part in range(parts)
-            for i in range(_DEGREE + 1)
-        ]
-    )
-
-
-_ENCLOSING = _bernstein(1)
-#: Closer: two waves in a step leave room for a value that neither has.
-_CLOSER = _bernstein(8)
+#: Powers of s at the places of a step where the lowest value of its path is looked for.
+_PLACES_INSIDE = np.vander(np.linspace(0.0, 1.0, 9), _DEGREE + 1, increasing=True)
+#: So many of the steps with the lowest values there are searched closely.
+_SEARCHED = 16
 #: Positions and velocities of both ends.
 _PLACES = ("u_tip", "y")
 _SPEEDS = ("v_tip", "z")
@@ -110,9 +92,7 @@ def rows_at(run: Trajectory, times: Any) -> Trajectory:
     if steps is None:
         raise ValueError("this run has no data between its rows: it is by a reference")
     known = steps["time"]
-    outside = ~((wanted >= known[0]) & (wanted <= known[-1]))
-    if outside.any():
-        raise ValueError(f"time {wanted[outside][0]:g} s: the run is known from {known[0]!s} s to {known[-1]!s} s")
+    _refuse_outside(known, wanted)
     row = np.searchsorted(known, wanted, side="right") - 1
     # Indexing an array of records copies them field by field; ``take`` and ``put`` copy each as a whole.
     records = steps.take(row)
@@ -122,6 +102,34 @@ def rows_at(run: Trajectory, times: Any) -> Trajectory:
     np.put(records, between, _between(run.scene, before, after, run.events, wanted[between]))
     made = columns(run.scene, records, steps[:1])
     return Trajectory(run.scene, made, list(run.events), summary=dict(run.summary))
+
+
+def ends_at(run: Trajectory, times: np.ndarray) -> dict[str, np.ndarray]:
+    """Return positions and velocities of both ends at ``times`` [s], which ascend, as `at` does, for many times."""
+    steps = run.steps
+    assert steps is not None
+    _refuse_outside(steps["time"], times)
+    made = np.flatnonzero(steps["size"] > 0.0)
+    begins = steps["time"][made - 1]
+    found = {name: np.empty(len(times)) for name in (*_PLACES, *_SPEEDS) if name in run.columns}
+    for begin in range(0, len(times), _TOGETHER):
+        some = slice(begin, begin + _TOGETHER)
+        step = np.maximum(np.searchsorted(begins, times[some], side="right") - 1, 0)
+        first = np.diff(step, prepend=-1) > 0  # of its step
+        after = made[step[first]]
+        which = np.cumsum(first) - 1
+        curves = motion(run.scene.contact.rigid, Rows(steps, after - 1), Rows(steps, after))
+        share = (times[some] - begins[step]) / steps["size"][made[step]]
+        for name, values in found.items():
+            values[some] = polyval(share, curves[name][:, which], tensor=False)
+    return found
+
+
+def _refuse_outside(known: np.ndarray, wanted: np.ndarray) -> None:
+    """Raise ValueError if one of the ``wanted`` times is outside of those that are ``known`` [s]."""
+    outside = ~((wanted >= known[0]) & (wanted <= known[-1]))
+    if outside.any():
+        raise ValueError(f"time {wanted[outside][0]:g} s: the run is known from {known[0]!s} s to {known[-1]!s} s")
 
 
 def at_multiples(run: Trajectory, interval: float, start: float = 0.0) -> Trajectory:
@@ -312,8 +320,8 @@ def _between(
 def _lowest(powers: np.ndarray, below: float) -> tuple[float, int, float]:
     """Return the lowest value on [0, 1] of any of n polynomials, which one has it, and where.
 
-    The number is -1 if none is lower than ``below``, but for rounding. The minima are looked for where the Bernstein
-    coefficients, which enclose a polynomial, leave room for a value lower than the lowest one found.
+    The number is -1 if none is lower than ``below``, but for rounding. Minima are looked for in the polynomials that
+    are lowest at some places.
 
     Parameters
     ----------
@@ -325,14 +333,11 @@ def _lowest(powers: np.ndarray, below: float) -> tuple[float, int, float]:
     best = below
     step = -1
     share = 0.0
-    enclosing = _ENCLOSING @ powers
-    tolerance = _ALIKE * float(np.abs(enclosing).max(initial=0.0))
-    some = np.flatnonzero(enclosing.min(axis=0) < best - tolerance)
-    floors = (_CLOSER @ powers[:, some]).min(axis=0)
-    for nearest in np.argsort(floors):
-        if floors[nearest] >= best - tolerance:
-            break
-        i = int(some[nearest])
+    values = _PLACES_INSIDE @ powers
+    tolerance = _ALIKE * float(np.abs(values).max(initial=0.0))
+    lowest = values.min(axis=0)
+    few = min(_SEARCHED, len(lowest))
+    for i in np.argpartition(lowest, few - 1)[:few].tolist():
         path = powers[:, i].tolist()
         # Not at 0: where it begins another one ends, or there is a row.
         for s in (*sign_changes(derivative(path), 0.0, 1.0), 1.0):

@@ -9,12 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from .contact_changes import contact_time_difference, impulse_difference
-from .dense import at
-from .spans import rounding_of, span
+from .dense import ends_at
+from .spans import ROUNDING, rounding_of, span
 from .trajectory import Trajectory
 
 #: Shares of the time from one row to the next, of either run, at which two runs are compared.
 _BETWEEN = np.arange(4.0) / 4.0
+#: Times closer than this share of the run are one.
+_SAME = 1e-12
+#: Columns of both ends.
+_PLACES = ("u_tip", "y")
+_SPEEDS = ("v_tip", "z")
 
 
 class Distance(NamedTuple):
@@ -24,6 +29,8 @@ class Distance(NamedTuple):
     times: float
     impulses: float
     force: float | None
+    velocities: float | None
+    energies: float | None
 
 
 def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
@@ -41,28 +48,35 @@ def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
     Distance
         ``motion``: the largest difference of u_tip or of y, over the range of the exact one (`apart`), taken at all
         rows of both and at three times between each two; with a reference at its rows. ∞ where the two have no body in
-        common. ``times``: the largest difference of a beginning or an end of a contact, over
-        the length of the run. ``impulses``: the difference of the sums of all impacts' impulses on the tip and on the
-        foundation, over the smaller sum that is not 0; 0 where both are. ``force``: the difference of the peaks of a
-        soft contact force, each a mean over its window, over the larger; ``None`` for a rigid law and unknown peaks.
+        common. ``times``: the largest difference of a beginning or an end of a contact, over the length of the run.
+        ``impulses``: the difference of the sums of all impacts' impulses on the tip and on the foundation, over the
+        smaller sum that is not 0; 0 where both are. ``force``: the difference of the peaks of a soft contact force,
+        over the larger; ``None`` for a rigid law and unknown peaks. ``velocities``: that of v_tip or of z, as of
+        the motion, but where an event comes earlier in one run than in the other. ``energies``: that of an energy at
+        the end of the runs, over the largest energy; both ``None`` beside a reference.
     """
-    times = exact.time if exact.steps is None else _all_times(run, exact)
+    curves = run.steps is not None and exact.steps is not None
+    times = _all_times(run, exact) if curves else exact.time if exact.steps is None else run.time
     if run.steps is None:
         times = times[np.isin(times, run.time)]
     rounding = max(rounding_of(run), rounding_of(exact))
     duration = float(exact.time[-1] - exact.time[0])
     impulses = [impulse_difference(run, exact), impulse_difference(exact, run)]
+    late = contact_time_difference(run, exact, window)
+    found, beside = (_ends_at(of, times) for of in (run, exact))
     return Distance(
-        motion(_columns_at(run, times), _columns_at(exact, times), rounding),
-        contact_time_difference(run, exact, window) / duration,
+        motion(found, beside, rounding),
+        late / duration,
         max(np.nan_to_num(impulses).tolist()),
         None if exact.scene.contact.rigid else _peaks_apart(run, exact),
+        _velocities_apart(found, beside, times, _moments(run, exact, late)) if curves else None,
+        _energies_apart(run, exact) if curves else None,
     )
 
 
 def motion(columns: Mapping[str, np.ndarray], exact: Mapping[str, np.ndarray], rounding: float = 0.0) -> float:
     """Return the larger of the largest differences of u_tip and of y, `apart`, at equal times; ∞ without any."""
-    names = [name for name in ("u_tip", "y") if name in columns and name in exact]
+    names = [name for name in _PLACES if name in columns and name in exact]
     found = (apart(columns[name], exact[name], rounding) for name in names)
     return max((float(each.max(initial=0.0)) for each in found), default=inf)
 
@@ -73,16 +87,46 @@ def apart(values: np.ndarray, exact: np.ndarray, rounding: float = 0.0) -> np.nd
     return np.asarray(np.maximum(np.abs(values - exact) - rounding, 0.0) / scale)
 
 
-def _columns_at(run: Trajectory, times: np.ndarray) -> Mapping[str, np.ndarray]:
-    """Return the columns of ``run`` at ``times`` [s], which are rows of it if it is a reference."""
+def _velocities_apart(
+    columns: Mapping[str, np.ndarray], exact: Mapping[str, np.ndarray], times: np.ndarray, moments: np.ndarray
+) -> float:
+    """Return the largest difference of a velocity, `apart`, but within ``moments`` [s], shape (n, 2)."""
+    inside = np.searchsorted(moments[:, 0], times, "right") > np.searchsorted(moments[:, 1], times, "left")
+    found = [0.0]
+    for name in (name for name in _SPEEDS if name in columns and name in exact):
+        # Velocities are differences of positions, and as exact as the fastest.
+        fastest = ROUNDING * max(float(np.abs(exact[of]).max(initial=0.0)) for of in _SPEEDS if of in exact)
+        found.append(float(apart(columns[name], exact[name], fastest)[~inside].max(initial=0.0)))
+    return max(found)
+
+
+def _moments(run: Trajectory, exact: Trajectory, late: float) -> np.ndarray:
+    """Return the times around the events of both runs in which they may have come in one of them only, (n, 2)."""
+    at = np.sort([event.time for of in (run, exact) for event in of.events])
+    slack = late + _SAME * float(exact.time[-1])
+    return np.column_stack([at - slack, at + slack])
+
+
+def _energies_apart(run: Trajectory, exact: Trajectory) -> float:
+    """Return the largest difference of an energy at the end of two runs, over the largest energy until then."""
+    largest = 0.0
+    found = 0.0
+    for name in (name for name in exact.columns if name.startswith("e_")):
+        largest = max(largest, float(np.abs(exact[name]).max()))
+        found = max(found, abs(float(run[name][-1] - exact[name][-1])))
+    return found / (largest or 1.0)
+
+
+def _ends_at(run: Trajectory, times: np.ndarray) -> Mapping[str, np.ndarray]:
+    """Return the motion of both ends at ``times`` [s], which are rows of the run if it is a reference."""
     if run.steps is not None:
-        return at(run, times).columns
+        return ends_at(run, times)
     rows = np.isin(run.time, times)
-    return {name: values[rows] for name, values in run.columns.items()}
+    return {name: run[name][rows] for name in (*_PLACES, *_SPEEDS) if name in run.columns}
 
 
 def _all_times(run: Trajectory, exact: Trajectory) -> np.ndarray:
-    rows = np.union1d(run.time, exact.time)
+    rows = np.sort(np.concatenate([run.time, exact.time]))
     return np.append((rows[:-1, None] + _BETWEEN * np.diff(rows)[:, None]).ravel(), rows[-1])
 
 

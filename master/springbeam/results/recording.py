@@ -15,7 +15,16 @@ from ..scene import Scene
 from .columns import blocks, trajectory_of
 from .dense import at_multiples
 from .directory import RunDirectory
-from .files import chunks, load_events, mapped, read_run, write_columns, write_summary, write_tables
+from .files import (
+    chunks,
+    load_events,
+    load_summary,
+    mapped,
+    read_run,
+    write_columns,
+    write_summary,
+    write_tables,
+)
 from .records import EVENT, SHAPE, STEP, events_as_array
 from .trajectory import SHAPE_COLUMNS, Trajectory
 
@@ -155,6 +164,10 @@ class FileRecorder(AbstractContextManager["FileRecorder"]):
         write_summary(directory, _with_scene({**summary, "files": directory.sizes()}, self.scene))
         shapes = [chunks(mapped(directory.shapes, SHAPE))] * (self.scene.beam is not None)
         write_tables(directory, [rows, chunks(mapped(directory.events, EVENT)), *shapes])
+
+    def amend(self, entries: Mapping[str, Any]) -> None:
+        """Replace ``entries`` of the summary of a finished run, or add them. Raises OSError."""
+        write_summary(self.directory, {**load_summary(self.directory.path), **entries})
 
     def close(self) -> None:
         """Close the files, and let other processes use the directory."""

@@ -14,6 +14,7 @@ from ..bodies.protocol import Body
 from ..results.recording import MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, as_scene
+from ..scene.frequencies import fastest_frequency, shear_frequency, slowest_frequency
 from ..scene.suspicions import suspicions
 from ..version import __version__
 from .gate import admit, tried
@@ -68,6 +69,8 @@ class Simulation(AbstractContextManager["Simulation"]):
             if body is not None:
                 able[table] = tried(body, scene.contact_time or 0.0, H)
         setup = set_up(scene, *able.values())
+        #: The slowest frequency of our beam and the fastest wave that an impact excites in it [rad/s]; 0 without one.
+        self._frequencies = _frequencies(of_scene)
         beam, spring, contact_force = load_bodies(of_scene, setup.start, setup.degree, found)
         self._bodies = beam, spring
         try:
@@ -192,7 +195,7 @@ class Simulation(AbstractContextManager["Simulation"]):
 
     def _summed_up(self, status: dict[str, Any]) -> dict[str, Any]:
         wall_time = perf_counter() - self._loaded
-        amounts = summary(self._master, self.recorder)
+        amounts = summary(self._master, self.recorder, *self._frequencies)
         bodies = zip(("beam", "spring"), self._bodies, strict=True)
         counting = {name: body for name, body in bodies if body is not None and body.steps_made is not None}
         return {
@@ -246,12 +249,19 @@ def run_in_memory(
         return simulation.run
 
 
+def _frequencies(scene: Scene) -> tuple[float, float]:
+    """Return the lowest frequency of our beam, and that of the fastest wave that an impact excites in it [rad/s]."""
+    if scene.beam is None or scene.massless:
+        return 0.0, 0.0
+    return slowest_frequency(scene.beam), min(shear_frequency(scene.beam), fastest_frequency(scene.beam))
+
+
 def _refuse_accuracy(scene: Scene) -> None:
     """Raise SceneError if ``scene`` asks for an accuracy, which is kept by settings that are picked before."""
     if scene.accuracy is not None:
         raise SceneError(
             f"accuracy = {scene.accuracy:g}: is kept by settings that pilot runs pick, and a body of your own can be "
-            "run once; run springbeam.studies.accuracy.pick(scene).scene, or give coupling.scheme, degree and "
+            "run once; run springbeam.simulate(scene).scene, or give coupling.scheme, degree and "
             "macro_step instead"
         )
 

@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from ..bodies.protocol import Body
 from ..results.columns import not_shown
 from ..results.dense import inside
 from ..results.recording import Recorder
 from ..results.totals import totals
 from .contradictions import PLACES, contradictions
-from .errors.peak import peak_beside_law
 from .master import Master
-from .misplaced import misplaced
-from .observed import coarse_force, force_window, unknown
-from .resolution import peak_force_doubt, why_not_resolved
+from .peaks import depends_on_mesh, force_window
+from .stepping import Pair
 
+#: How every warning of a run that is not resolved begins.
+NOT_RESOLVED = "not resolved"
+#: Largest error of an end between the rows, as a share of its motion (`springbeam.results.dense.inside`): where
+#: waves turn by more than 2π in a step, up to half of the error.
+BETWEEN_ROWS = 0.005
 _SHORTER = "take a shorter macro step that is not a whole period of a body"
 
 
-def summary(master: Master, recorder: Recorder) -> dict[str, Any]:
-    """Return the summary of what ``recorder`` has of the run."""
+def summary(master: Master, recorder: Recorder, slowest: float, fastest: float) -> dict[str, Any]:
+    """Return the summary of what ``recorder`` has of the run.
+
+    ``resolved`` is ``False`` where the run shows alone that it is not, else ``None``: a companion run says it
+    (`springbeam.run.companion.check`). ``slowest`` and ``fastest`` are those of `springbeam.run.peaks`.
+    """
     scene = recorder.scene
     steps = recorder.steps()
     pair = master.pair
@@ -29,19 +38,21 @@ def summary(master: Master, recorder: Recorder) -> dict[str, Any]:
     events = recorder.events()[:known]
     made = int(np.count_nonzero(np.diff(steps["time"])))
     energies, warnings, changed = master.balance.report(steps)
-    displaced = misplaced(pair, steps, events)
     places, between = inside(pair.law is None, steps, *PLACES) if len(steps) else ({}, 0.0)
-    unresolved = why_not_resolved(pair, steps, displaced or 0.0, between)
-    window = force_window(pair, steps)
+    window = force_window(pair, steps, slowest)
     amounts = totals(scene, steps, events, window, places["u_tip"]) if len(steps) else {}
-    if pair.law is not None and amounts.get("contact_force_max"):
-        of_window = (amounts[f"contact_force_{name}"] for name in ("max", "window", "max_time"))
-        amounts["contact_force_max_error"] = peak_beside_law(pair.law, steps, *of_window)
-    doubt = peak_force_doubt(pair, window, amounts.get("contact_force_max_error", 0.0))
     warnings += [said for body in pair.bodies for said in body.warnings]
-    warnings += filter(None, [unresolved or doubt, not_shown(scene, steps), unknown(pair), coarse_force(pair)])
-    ruled_out = contradictions(pair.setup, steps, events, amounts.get("contact_duration_total", 0.0), places)
-    warnings += [f"not resolved: {what}: an event was missed; {_SHORTER}" for what in ruled_out]
+    doubts = [f"{what}: an event was missed; {_SHORTER}" for what in contradictions(
+        pair.setup, steps, events, amounts.get("contact_duration_total", 0.0), places
+    )]  # fmt: skip
+    if between > BETWEEN_ROWS:
+        doubts.append(
+            f"between the rows an end may have an error of {100.0 * between:.2g} % of its motion, since it oscillates "
+            "within a step; take a shorter one"
+        )
+    others = (depends_on_mesh(pair, window, fastest), not_shown(scene, steps), _coarse_force(pair))
+    warnings += filter(None, others)
+    warnings += [f"{NOT_RESOLVED}: {doubt}" for doubt in doubts]
     return {
         "degree": pair.setup.degree,
         "time": float(steps["time"][-1]) if len(steps) else master.state.time,
@@ -50,8 +61,25 @@ def summary(master: Master, recorder: Recorder) -> dict[str, Any]:
         "halved_steps": master.state.halvings,
         "iterations": pair.joined.state.iterations,
         **energies,
-        "resolved": unresolved is None and not changed and not ruled_out,
-        **({} if displaced is None else {"misplaced_ends": displaced}),
+        "resolved": False if doubts or changed else None,
         "warnings": warnings,
         **amounts,
     }
+
+
+def _coarse_force(pair: Pair) -> str | None:
+    """Return a warning that names a body of unknown acceleration or damping, so that C is that of the steps."""
+    silent = _tables_of(pair, pair.without_acceleration)
+    if not silent:
+        return None
+    return (
+        f"the body in {silent} does not say its acceleration, or how damping changes it; the force "
+        "between joined ends, and when they part, is only as exact as the force of a step: name its variable in "
+        "acceleration, or take a smaller coupling.macro_step"
+    )
+
+
+def _tables_of(pair: Pair, bodies: Sequence[Body]) -> str:
+    """Return the tables of ``bodies`` in words."""
+    tables = zip(("[beam]", "[spring]"), pair.bodies, strict=True)
+    return " and ".join(table for table, body in tables if body in bodies)

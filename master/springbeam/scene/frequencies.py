@@ -11,8 +11,6 @@ from math import pi, sqrt
 from .statics import bending_stiffness, locking, lowest_frequency
 from .tables import Beam
 
-#: ω α_b above which waves die out within two periods and need no resolution.
-DIES_OUT = 0.15
 #: Steps from 0 to the highest frequency of the mesh in which that of a wave is searched.
 _STEPS = 1 << 20
 
@@ -20,17 +18,6 @@ _STEPS = 1 << 20
 def slowest_frequency(beam: Beam) -> float:
     """Return the lowest frequency of the beam, with its tip free [rad/s]."""
     return lowest_frequency(beam) * sqrt(locking(beam))
-
-
-def impact_frequency(beam: Beam) -> float:
-    """Return the highest frequency of the waves that an impact excites and that do not die out at once [rad/s]."""
-    return min(shear_frequency(beam), lasting_frequency(beam))
-
-
-def lasting_frequency(beam: Beam) -> float:
-    """Return the highest frequency kept, of waves that do not die out at once [rad/s]."""
-    fastest = fastest_frequency(beam)
-    return fastest if beam.alpha_b == 0.0 else min(fastest, DIES_OUT / beam.alpha_b)
 
 
 def fastest_frequency(beam: Beam) -> float:

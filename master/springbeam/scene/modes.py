@@ -1,4 +1,4 @@
-"""Modes of our beam's mesh, as its tip moves in them."""
+"""Damping of our beam's tip, by the modes of its mesh."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ _ELEMENTS = 50
 
 
 @lru_cache(maxsize=16)
-def tip_modes(beam: Beam) -> tuple[np.ndarray, np.ndarray]:
-    """Return the frequencies of the mesh [rad/s], the lowest first, and the tip's displacement in modes of unit mass
-    [1/√kg].
+def tip_decay(beam: Beam) -> float:
+    """Return the decrease of the acceleration of the tip per unit of velocity that an impulse adds [1/s].
 
     Elements of a higher degree and those with the averaged mass are represented by fine linear ones. Both energies are
     sums of squares, so that rounding of the high frequencies of a slender beam does not destroy the low ones.
@@ -44,4 +43,6 @@ def tip_modes(beam: Beam) -> tuple[np.ndarray, np.ndarray]:
         speeds = speeds @ space
         of_strain = of_strain @ space
     periods, modes = np.linalg.svd(speeds)[1:]
-    return 1.0 / periods, modes @ of_strain[n - 1] / periods
+    omega = 1.0 / periods
+    tip = modes @ of_strain[n - 1] / periods
+    return float(tip**2 @ (beam.alpha_b * omega**2)) / (float(tip @ tip) or 1.0)

@@ -2,16 +2,17 @@
 
 The bound of a quantity at time t is
 
-    4 · max over [t₀, t] of |q_H − q_{H/2}|   +   (ε_IDA · steps + rounding) · growth · scale of q:
+    2 · max over [t₀, t] of |q_H − q_{2.3 H}|   +   (ε_IDA · steps + rounding) · growth · scale of q:
 
-The difference of halving the macro step is an upper estimate of the discretisation error for any order ≥ 1 (twice the
-difference at order 1), doubled again because events mix orders. The second term is the tolerance of the spring's
-integrator in every step and the rounding of the beam's modes, amplified like a perturbation of the reference. The bound
-does not depend on the reference, so a wrong sign, mass or law, which converges to something else, fails.
+The difference from the companion run (`springbeam.run.companion`) is an upper bound of the discretisation error for any
+order ≥ 1 (1.3 times the error at order 1), doubled because events mix orders. The second term is the tolerance of the
+spring's integrator in every step and the rounding of the beam's modes, amplified like a perturbation of the reference.
+The bound does not depend on the reference, so a wrong sign, mass or law, which converges to something else, fails.
 
-Where the errors do not decrease as a power of H yet, the runs at H and H/2 may be close by chance while both err. A
-difference beyond the bound is therefore judged again by the larger of both halvings, from H and from H/2. Runs that
-converge to something else than the reference change less by the second halving, and still differ.
+Where the errors do not decrease as a power of H yet, both runs may be close by chance while both err; and what is
+linear between rows is compared where both runs have one, which every 23rd macro point is. A difference beyond the bound
+is therefore judged again, also by 4/3 of the difference from a run at H/4, which has a row at each macro point. Runs
+that converge to something else than the reference change less by that, and still differ.
 
 Nonsmooth trajectories separate: they are comparable until the first change of contact that the macro step, or a tiny
 perturbation of the reference, moves to another position in the order of events. A run that is not resolved at its macro
@@ -33,16 +34,20 @@ from ..results.contact_changes import ContactChange, contact_changes
 from ..results.dense import rows_at
 from ..results.distance import apart
 from ..results.trajectory import BODY_COLUMNS, Trajectory, columns_of
+from ..run.companion import check
 from ..run.runner import run_in_memory
+from ..run.summary import NOT_RESOLVED
 from ..scene import Scene, SceneError, with_changes
 from ..scene.frequencies import mesh_frequency, slowest_frequency
 from .tables import Done, Row, unseen
 
 Verdict = Literal["agrees", "differs", "not comparable"]
-#: Largest change by halving the macro step, relative to the largest displacement (velocity), of a resolved motion.
+#: Largest change by the steps of the companion, relative to the largest displacement (velocity), of a resolved motion.
 _RESOLVED = {"u_tip": 0.05, "y": 0.05, "v_tip": 0.25, "z": 0.25}
-#: Factor on the difference of halving the macro step.
-_SAFETY = 4.0
+#: Factor on the difference from the companion; of the differences from it and from a run at a quarter of the macro step,
+#: whose error is a quarter at order 1, shape (2, 1).
+_SAFETY = 2.0
+_FACTORS = np.array([[1.0], [4.0 / 3.0]])
 #: Least relative error of a step, unless IDA's tolerance is larger.
 _LEAST = 1e-12
 #: Relative change of the initial velocity that shows how fast two solutions separate, and how far that may grow.
@@ -52,8 +57,10 @@ _GROWTH = 1e4
 SHORT = 2.0
 #: The same where nothing has macro steps, as a share of the time.
 SHORT_SHARE = 2e-3
-#: What a comparison computes: the run, at half its macro step; the reference, from another velocity.
+#: What a comparison computes: the run, its companion; the reference, from another velocity.
 PARTS = 4
+#: Quantities that are more than linear between rows.
+_CURVES = ("u_tip", "v_tip", "y", "z", "contact_force")
 #: Columns of both motions that are kept for a picture.
 _DRAWN = ("time", "u_tip", "y", "v_tip", "z", "contact_force", "foundation_force")
 
@@ -102,61 +109,59 @@ def _judged(name: str, times: np.ndarray, error: np.ndarray, changed: np.ndarray
 
 
 def _beside_event_driven(scene: Scene, found: Row, done: Done) -> tuple[Trajectory, ...]:
-    """Compare a run with the event-driven reference, by bounds from a run at half its macro step."""
+    """Compare a run with the event-driven reference, by bounds from its companion."""
     event_driven.refuse(scene)
-    coarse = run_in_memory(scene)
+    run = run_in_memory(scene)
     done()
-    fine = _halved(coarse)
+    checked = check(run)
+    run = checked.judged_run()
+    companion = checked.companion
     done()
-    found["horizon"] = _same_story_until(coarse, fine) if coarse.summary["resolved"] else found["from"]
-    if found["horizon"] <= found["from"]:
-        said = [warning for warning in coarse.summary["warnings"] if warning.startswith("not resolved")]
-        found["notes"] += said or ["not resolved: half the macro step changes the motion from the first contact on"]
+    found["horizon"] = found["from"]
+    if companion is not None and checked.resolved:
+        found["horizon"] = _same_story_until(run, companion)
+    if companion is None or found["horizon"] <= found["from"]:
+        said = [warning for warning in run.summary["warnings"] if warning.startswith(NOT_RESOLVED)]
+        found["notes"] += said or [f"{NOT_RESOLVED}: longer steps change the motion from the first contact on"]
         return ()
     times = macro_points(scene)
     reference, moved = reference_and_perturbed(scene, times, done)
-    _judge(found, [coarse, fine], reference, moved)
+    _judge(found, [run, companion], reference, moved)
     if not all(row["passed"] for row in (*found["quantities"], *found["events"])):
-        finest = _halved(fine)
-        found["horizon"] = min(found["horizon"], _same_story_until(fine, finest))
-        _judge(found, [coarse, fine, finest], reference, moved)
+        finer = run_in_memory(with_changes(scene, coupling={"macro_step": 0.25 * scene.coupling.H}))
+        found["horizon"] = min(found["horizon"], _same_story_until(run, finer))
+        _judge(found, [run, companion, finer], reference, moved)
     if not found["quantities"]:
         found["notes"].append(
             f"Nothing could be compared: another change of contact comes first, from t = {found['horizon']:.9g} s on, "
             "if the initial velocity changes a little; begin with another velocity, or at a distance"
         )
-    return coarse, reference
-
-
-def _halved(run: Trajectory) -> Trajectory:
-    """Return the run of the same scene at half the macro step."""
-    scene = run.scene
-    return run_in_memory(with_changes(scene, coupling={"macro_step": 0.5 * scene.coupling.H}))
+    return run, reference
 
 
 def _judge(found: Row, runs: list[Trajectory], reference: Trajectory, moved: Trajectory) -> None:
-    """Judge the first of ``runs`` against ``reference``, by what each halving of its macro step to the next changes.
+    """Judge the first of ``runs`` against ``reference``, by its largest difference from the others.
 
     ``moved`` is the perturbed reference. The results replace those in ``found``, up to whose horizon they are.
     """
-    coarse = runs[0]
-    scene = coarse.scene
+    judged_run = runs[0]
+    scene = judged_run.scene
     size = scene.coupling.H
     times = macro_points(scene)
     of_reference, of_moved, *of_runs = (contact_changes(run, SHORT * size) for run in (reference, moved, *runs))
-    stable = _agree_until(of_reference, of_moved, found["from"], float(coarse.time[-1]))
+    stable = _agree_until(of_reference, of_moved, found["from"], float(judged_run.time[-1]))
     found["horizon"] = min(found["horizon"], stable)
     found |= {"growth": 1.0, "quantities": [], "events": []}
     before = times <= found["horizon"]
     # A jump at slightly different times is an event error, judged there.
-    jumps = [event.time for run in (coarse, reference) for event in run.events]
+    jumps = [event.time for run in (*runs, reference) for event in run.events]
     away = away_from(
         times, jumps + [kink for load in scene.loads if not load.is_finer_than(size) for kink in load.kinks], size
     )
-    sampled = [sample(run, times) for run in runs]
+    sampled = [sample(run, times, rows=run is not judged_run) for run in runs]
     for name in quantities(scene):
         values = np.array([columns[name] for columns in sampled])
-        good = before & np.isfinite(values).all(axis=0) & (away | (name in ("u_tip", "y")))
+        good = before & np.isfinite(values[0]) & (away | (name in ("u_tip", "y")))
         if good.sum() < 2:
             continue
         # Of the whole reference: what is away from events may be at rest to rounding.
@@ -166,25 +171,32 @@ def _judge(found: Row, runs: list[Trajectory], reference: Trajectory, moved: Tra
         growth = np.maximum(1.0, np.maximum.accumulate(np.abs(moved[name][good] - exact) / (PERTURBATION * scale)))
         found["growth"] = max(found["growth"], float(growth[-1]))
         floor = _step_error(scene) * (np.flatnonzero(good) + 1.0) + _SAFETY * _rounding(scene, name)
-        changed = np.abs(np.diff(values, axis=0)).max(axis=0)
+        changed = (_FACTORS[: len(runs) - 1] * _known_next(np.abs(values[1:] - values[0]))).max(axis=0)
         judged = _judged(name, times[good], np.abs(values[0] - exact), changed, floor * growth * scale)
         found["quantities"].append(judged)
     _compare_events(scene, found, of_runs, of_reference)
 
 
-def _same_story_until(coarse: Trajectory, fine: Trajectory) -> float:
-    """Return the time [s] up to which a run and that at half its macro step agree.
+def _known_next(values: np.ndarray) -> np.ndarray:
+    """Return ``values``, shape (m, n), with the next number of the row in place of each NaN, 0 without one."""
+    places = np.where(np.isfinite(values), np.arange(values.shape[1]), values.shape[1])
+    following = np.minimum.accumulate(places[:, ::-1], axis=1)[:, ::-1]
+    return np.take_along_axis(np.column_stack([np.nan_to_num(values), np.zeros(len(values))]), following, axis=1)
 
-    They agree if they have the same events, and halving hardly changes displacements and velocities away from events.
+
+def _same_story_until(run: Trajectory, other: Trajectory) -> float:
+    """Return the time [s] up to which a run and one in other steps agree.
+
+    They agree if they have the same events, and hardly differ in displacements and velocities away from events.
     """
-    times = macro_points(coarse.scene)
-    size = coarse.scene.coupling.H
-    changes, others = (contact_changes(run, SHORT * size) for run in (coarse, fine))
-    horizon = _agree_until(changes, others, float(times[0]), float(coarse.time[-1]))
-    away = away_from(times, (event.time for run in (coarse, fine) for event in run.events), size)
-    values, finer = (rows_at(run, times) for run in (coarse, fine))
-    for name in present(coarse, _RESOLVED):
-        differ = away & (apart(finer[name], values[name]) > _RESOLVED[name])
+    times = macro_points(run.scene)
+    size = run.scene.coupling.H
+    changes, others = (contact_changes(each, SHORT * size) for each in (run, other))
+    horizon = _agree_until(changes, others, float(times[0]), float(run.time[-1]))
+    away = away_from(times, (event.time for each in (run, other) for event in each.events), size)
+    values, beside = (rows_at(each, times) for each in (run, other))
+    for name in present(run, _RESOLVED):
+        differ = away & (apart(beside[name], values[name]) > _RESOLVED[name])
         if differ[1:].any():
             horizon = min(horizon, float(times[1:][differ[1:]][0]) - size)
     return horizon
@@ -223,16 +235,16 @@ def _compare_events(
 ) -> None:
     size = scene.coupling.H
     start = found["from"]
-    coarse = of_runs[0]
+    found_changes = of_runs[0]
     moved = 0.0
     for i, (kind, time) in enumerate(change for change in reference if change.time <= found["horizon"]):
         row: dict[str, Any] = {"kind": kind, "time": None, "reference": time, "bound": 0.0, "passed": False}
         found["events"].append(row)
-        if i >= len(coarse) or coarse[i].kind != kind:
+        if i >= len(found_changes) or found_changes[i].kind != kind:
             return
-        ours = coarse[i].time
+        ours = found_changes[i].time
         known = [changes[i].time for changes in of_runs if i < len(changes)]
-        moved = max([moved, *np.abs(np.diff(known)).tolist()])
+        moved = max([moved, *(_FACTORS[: len(known) - 1, 0] * np.abs(np.subtract(known[1:], known[0]))).tolist()])
         steps = (time - start) / size + 1.0
         # The unit of time in which the state changes as a whole is what the events so far have taken.
         bound = _SAFETY * moved + _step_error(scene) * steps * found["growth"] * max(time - start, size)
@@ -308,11 +320,19 @@ def quantities(scene: Scene) -> list[str]:
     return [name for name in wanted if name in there]
 
 
-def sample(run: Trajectory, times: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the `quantities` of a run at macro points [s], NaN after its end."""
+def sample(run: Trajectory, times: np.ndarray, *, rows: bool = False) -> dict[str, np.ndarray]:
+    """Return the `quantities` of a run at macro points [s], NaN after its end.
+
+    With ``rows`` those that are linear between its rows are NaN there: a run and its companion share every 23rd point.
+    """
     H = run.scene.coupling.H
-    rows = run.time
-    nearest = rows[np.searchsorted(rows, times - 1e-9 * H).clip(max=len(rows) - 1)]  # what is known at rows alone
-    wanted = np.where(np.abs(nearest - times) <= 1e-9 * H, nearest, times)
-    found = rows_at(run, np.minimum(wanted, rows[-1]))
-    return {name: np.where(wanted <= rows[-1], found[name], np.nan) for name in quantities(run.scene)}
+    there = run.time
+    nearest = there[np.searchsorted(there, times - 1e-9 * H).clip(max=len(there) - 1)]  # what is known at rows alone
+    on_row = np.abs(nearest - times) <= 1e-9 * H
+    wanted = np.where(on_row, nearest, times)
+    found = rows_at(run, np.minimum(wanted, there[-1]))
+    known = wanted <= there[-1]
+    return {
+        name: np.where(known & (on_row | (not rows) | (name in _CURVES)), found[name], np.nan)
+        for name in quantities(run.scene)
+    }

@@ -95,7 +95,7 @@ def converge(scene: Scene, *, levels: int = 4, metric: Sequence[str] = (), done:
     rows = dict[str, Row]()
     for name, mesh in meshes(scene, levels).items():
         began = perf_counter()
-        record = measured(partial(with_keys, scene, mesh), metrics)
+        record = measured(partial(with_keys, scene, mesh), metrics, judge=not rows)
         rows[name] = {**mesh, **record, "cost_wall_time": perf_counter() - began}
         done()
     found = judged(scene, list(rows.values()), metric)

@@ -29,11 +29,12 @@ from pydantic_core import from_json, to_json
 from ..bodies.archive import fmu_directory, own_fmu
 from ..bodies.protocol import FmuError
 from ..results.directory import ResultsExist, ResultsUnreadable, RunDirectory, lock
+from ..run.companion import Check
 from ..run.outcome import RunStopped
+from ..run.simulate import checked, simulate
 from ..scene import Scene, SceneError, load_scene
 from ..scene.loads import TableLoad
 from ..version import __version__
-from .accuracy import simulate
 from .engine import Measure, Report, lost, record_all
 from .metrics import Metric, costs
 from .tables import Findings, Row
@@ -189,16 +190,21 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Row], int]:
         raise ResultsUnreadable(f"{path}: not a file of records: {error}") from error
 
 
-def measured(at: Callable[[], Scene], metrics: Mapping[str, Metric]) -> Row:
+def measured(at: Callable[[], Scene], metrics: Mapping[str, Metric], *, judge: bool = True) -> Row:
     """Run the scene that ``at`` returns; return how the run ended, its metrics and its cost.
 
+    With ``judge`` the run is checked, and ``error_NAME`` bounds the error of the metric NAME, in its unit.
     ``status`` is ``done``, ``stopped`` (early) or ``refused`` (bad input), ``error`` has the cause. Raises FmuError if
     an FMU cannot be loaded.
     """
     row: Row = {"status": "done", "error": "", "warnings": "", **dict.fromkeys(metrics)}
     try:
-        run = simulate(at())
+        found = checked(at()) if judge else None
+        run = simulate(at(), check=False) if found is None else found.judged_run()
         numbers = {name: metric(run) for name, metric in metrics.items()}
+        if found is not None and found.companion is not None:
+            for name, metric in metrics.items():
+                numbers |= _error(name, metric, found)
         lacking = dict.fromkeys(metric.lacking(run) for metric in metrics.values())
     except SceneError as refused:
         row |= {"status": "refused", "error": str(refused)}
@@ -208,6 +214,14 @@ def measured(at: Callable[[], Scene], metrics: Mapping[str, Metric]) -> Row:
         row["warnings"] = "\n".join([*run.summary["warnings"], *filter(None, lacking)])
         row |= numbers | costs(run)
     return row
+
+
+def _error(name: str, metric: Metric, found: Check) -> Row:
+    """Return a bound of the error of a ``metric`` of one number, under its ``name``; nothing where it is unknown."""
+    assert found.companion is not None
+    if metric.several or metric(found.run) is None or metric(found.companion) is None:
+        return {}
+    return {f"error_{name}": float(found.error_of(metric))}
 
 
 def troubles(records: Mapping[str, Row]) -> list[str]:

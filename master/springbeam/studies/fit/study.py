@@ -18,7 +18,9 @@ from pydantic import PrivateAttr
 from rich.text import Text
 
 from ...results.trajectory import Trajectory
+from ...run.accuracy import prepared
 from ...run.outcome import RunStopped
+from ...run.simulate import simulate_to
 from ...scene import ArgumentError, Scene, SceneError, with_changes
 from ...scene.tables import TOLERANCE_KEYS
 from ...signals.measured import (
@@ -31,7 +33,6 @@ from ...signals.measured import (
     settled,
     shifts,
 )
-from ..accuracy import prepared, simulate_to
 from ..design import with_keys
 from ..study import Make, Study
 from ..tables import Findings, Row, table
