@@ -110,19 +110,11 @@ class ModalBody(Double):
             self._dissipated += work - (sum(self.energies()[:2]) - stored)
         return self.motion()
 
-    @property
-    def inertia(self):
-        return float(np.sum((self.b / self.omega**2) ** 2)) * self.stiffness(0.0) ** 2
-
     def stiffness(self, displacement):
         return 1.0 / float(np.sum((self.b / self.omega) ** 2))
 
-    def oscillation(self, displacement=0.0):
-        k = self.omega.argmin()
-        return float(self.omega[k]), 0.5 * float(self._damping[k] / self.omega[k])
-
-    def modes(self, displacement=0.0):
-        return self.omega**2, self._damping, self.b
+    def decay(self, time, size, speed):
+        return float(self.b**2 @ self._damping) / float(self.b @ self.b)
 
     def acceleration(self):
         return float(self.b @ (self._acting - self._damping * self.v - self.omega**2 * self.a))

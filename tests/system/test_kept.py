@@ -3,7 +3,6 @@
 from math import nan
 
 import pytest
-from scenes import load_of
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.bodies import fmu
@@ -31,17 +30,6 @@ def test_the_last_derivative_alone_acts():
         before = body.motion().velocity
         assert body.advance(0.0, H, *forces).velocity - before == pytest.approx(1.0 / body.mass, rel=1e-4)
         body.close()
-
-
-def test_a_load_moves_the_tip_as_the_lowest_mode_of_a_slender_beam_says():
-    """∫ φ dx of it is 0.3915 of the length times its tip."""
-    scene = with_changes(load_scene("soft"), beam={"density": 3.0, "area": 0.5, "length": 2.0})
-    beam, spring, _ = load_bodies(scene, 0.0, 2)
-    loads = [load_of(**keys) for keys in ({"on": "beam"}, {"on": "beam", "shape": [1.0, -2.0]}, {"on": "base"})]
-    assert [beam.moved_by(load) for load in loads] == pytest.approx([0.783, 3.0 * 0.783, 1.5 * 0.783], rel=0.03)
-    assert beam.moved_by(load_of(on="tip")) == 1.0
-    beam.close()
-    spring.close()
 
 
 def test_few_are_kept_and_the_oldest_is_freed(monkeypatch):

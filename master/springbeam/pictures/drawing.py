@@ -97,7 +97,7 @@ GLOSSARY = {
     "window": "the time over which a force is averaged before its largest value is taken",
     "reference": "the same equations solved by another method, both bodies as one system",
     "energy residual": "change of the sum of all energies, losses and works; it should be zero",
-    "not resolved": "halving the macro step would change the motion visibly",
+    "not resolved": "a companion run in longer steps differs visibly",
     "settled": "a driven motion repeats itself; its period is that of the drive, or a multiple",
 }
 #: More events than this are not drawn through all panels.
@@ -199,13 +199,13 @@ def event_marks(trajectory: Trajectory) -> list[EventMark]:
     return found
 
 
-#: The mark of pictures of a run that is not resolved (`springbeam.run.resolution`).
+#: The mark of pictures of a run that is not resolved (`springbeam.run.companion`).
 NOT_RESOLVED = "NOT RESOLVED by the macro step: see the warnings"
 
 
 def mark(trajectory: Trajectory) -> str:
-    """Return `NOT_RESOLVED`, or nothing if the run has resolved its motion."""
-    return "" if trajectory.summary.get("resolved", True) else NOT_RESOLVED
+    """Return `NOT_RESOLVED`, or nothing unless the run has not resolved its motion."""
+    return NOT_RESOLVED if trajectory.summary.get("resolved") is False else ""
 
 
 def phase_intervals(

@@ -25,7 +25,7 @@ BETWEEN_ROWS = 0.005
 _SHORTER = "take a shorter macro step that is not a whole period of a body"
 
 
-def summary(master: Master, recorder: Recorder, slowest: float, fastest: float) -> dict[str, Any]:
+def summary(master: Master, recorder: Recorder, slowest: float = 0.0, fastest: float = 0.0) -> dict[str, Any]:
     """Return the summary of what ``recorder`` has of the run.
 
     ``resolved`` is ``False`` where the run shows alone that it is not, else ``None``: a companion run says it

@@ -182,11 +182,6 @@ def depth(law: SoftLaw, energy: float) -> float:
     return high
 
 
-def stiffest(law: SoftLaw, energy: float) -> float:
-    """Return F′ [N/m] where ``law`` stores ``energy`` [J]; one that is not one-sided is linear."""
-    return law.slope(depth(law, energy) if law.one_sided else 0.0)
-
-
 # -- tables ------------------------------------------------------------------------------------------------------------
 
 

@@ -44,7 +44,7 @@ from .tables import Done, Row, unseen
 Verdict = Literal["agrees", "differs", "not comparable"]
 #: Largest change by the steps of the companion, relative to the largest displacement (velocity), of a resolved motion.
 _RESOLVED = {"u_tip": 0.05, "y": 0.05, "v_tip": 0.25, "z": 0.25}
-#: Factor on the difference from the companion; of the differences from it and from a run at a quarter of the macro step,
+#: Factor on the difference from the companion; of differences from it and from a run at a quarter of the macro step,
 #: whose error is a quarter at order 1, shape (2, 1).
 _SAFETY = 2.0
 _FACTORS = np.array([[1.0], [4.0 / 3.0]])

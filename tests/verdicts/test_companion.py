@@ -1,0 +1,155 @@
+"""The error of a run is at most what its companion says: attempts to make that false, and who is judged."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from references import reference
+from scenes import group
+
+import springbeam
+from springbeam import PointMass, SpringDamper, load_scene, simulate, with_changes
+from springbeam.results.distance import distance
+from springbeam.run import companion
+from springbeam.run.companion import LIMITS, LONGER, check
+from springbeam.scene import scene_from_dict
+
+#: Soft laws, ties, impacts on the foundation, creeping and fine beams, of `tests/scenes.toml`.
+JUDGED = group("judged")
+
+
+def apart(run, exact):
+    return distance(run, exact, LONGER * run.scene.coupling.H)
+
+
+@pytest.mark.parametrize("degree", [0, 2])
+@pytest.mark.parametrize("share", [4.0, 1.0])
+@pytest.mark.parametrize("name", JUDGED)
+def test_ends_are_no_further_from_the_reference_than_is_said(name, share, degree):
+    """In steps in which errors are from 1e-7 to 30 % of the motion; the reference is exact to 1e-9."""
+    scene = JUDGED[name]
+    run = simulate(with_changes(scene, coupling={"degree": degree, "macro_step": share * scene.coupling.H}))
+    true = apart(run, reference(run.scene, sample_times=run.time)).motion
+    if run.summary["resolved"]:
+        assert true < LIMITS.motion / 2.0
+    assert true <= max(run.summary["errors"]["motion"], 1e-9)
+
+
+OSCILLATOR = {
+    "time": {"t_end": 2.0},
+    "beam": {"element": "spring_damper", "mass": 1.0, "stiffness": 1e4, "displacement": 0.01, "velocity": -1.0},
+    "spring": {"mass": 1.0, "linear_stiffness": 9e4, "equilibrium": -0.02},
+    "contact": {"law": "compliance", "stiffness": 1e5, "exponent": 1.5},
+}
+LATE = {"on": "tip", "signal": "half_sine", "start": 1.637, "duration": 0.004, "amplitude": 2e4}
+ABRUPT = {"on": "tip", "signal": "half_sine", "start": 0.0503, "duration": 0.0004, "amplitude": 2e4}
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"coupling": {"macro_step": 0.02 * np.pi}}, "an element at its own period"),
+        ({"coupling": {"macro_step": 0.02 * np.pi / 3.0}}, "both at a whole number of their periods"),
+        ({"coupling": {"macro_step": 0.02}, "loads": [LATE]}, "a load that begins late, between two rows"),
+        ({"coupling": {"macro_step": 0.05}, "loads": [ABRUPT]}, "a short pulse that no row has"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_the_steps_cannot_follow_is_not_resolved(changes, why):
+    run = simulate(scene_from_dict({**OSCILLATOR, **changes}))
+    assert run.summary["resolved"] is False, why
+    assert any(warning.startswith("not resolved") for warning in run.summary["warnings"])
+
+
+def test_a_check_changes_no_bit_of_the_run_and_may_come_later():
+    scene = load_scene("soft", ["time.t_end=0.1", "beam.n_elements=6"])
+    judged = simulate(scene)
+    run = simulate(scene, check=False)
+    assert run.steps.tobytes() == judged.steps.tobytes()
+    assert (run.summary["resolved"], "errors" in run.summary) == (None, False)
+    later = springbeam.check(run)
+    assert {**later.as_summary()["errors"], "wall_time": 0.0} == {**judged.summary["errors"], "wall_time": 0.0}
+    assert later.resolved
+    assert run.summary["resolved"] is None
+
+
+def test_the_error_of_any_function_of_a_run_is_that_of_both():
+    """Of the clamp's moment at the end, of a position between rows, and of a count, beside a run in steps of H/16."""
+    scene = load_scene("soft", ["time.t_end=0.1", "beam.n_elements=6", "coupling.macro_step=4e-3", "coupling.degree=0"])
+    found = check(simulate(scene, check=False))
+    fine = simulate(with_changes(scene, coupling={"macro_step": 2.5e-4}), check=False)
+    for quantity in (
+        lambda run: run.clamp_moment[-1],
+        lambda run: run.at(0.0417).u_tip[0],
+        lambda run: run.summary["number_of_contacts"],
+    ):
+        assert abs(quantity(found.run) - quantity(fine)) <= found.error_of(quantity)
+    said = found.quantities()
+    assert said["deepest_tip"] == found.error_of(lambda run: run.summary["deepest_tip"])
+    assert abs(found.run.summary["bounce_time"] - fine.summary["bounce_time"]) <= said["bounce_time"]
+
+
+def falling():
+    """Scene of a mass that falls onto a spring."""
+    return scene_from_dict(
+        {
+            "time": {"t_end": 1.0},
+            "beam": {"element": "point_mass", "mass": 2.0, "displacement": 0.1, "velocity": -1.0},
+            "spring": {"mass": 1.0, "linear_stiffness": 300.0},
+            "contact": {"stiffness": 1e4, "exponent": 3.0},
+            "coupling": {"macro_step": 0.01},
+        }
+    )
+
+
+def test_bodies_of_the_caller_are_judged_if_they_can_return_to_their_start():
+    upper = PointMass(2.0, displacement=0.1, velocity=-1.0)
+    lower = SpringDamper(1.0, 300.0)
+    run = simulate(falling(), upper=upper, lower=lower)
+    assert run.summary["resolved"]
+    assert (upper.motion().displacement, lower.motion().displacement) == (run.u_tip[-1], run.y[-1])
+    with_element = simulate(falling(), lower=SpringDamper(1.0, 300.0))
+    assert run.summary["errors"]["motion"] == with_element.summary["errors"]["motion"]
+
+
+def test_a_run_without_a_companion_says_why(monkeypatch):
+    run = simulate(falling(), check=False)
+    monkeypatch.setattr(companion, "run_in_memory", lambda *_, **__: (_ for _ in ()).throw(springbeam.SceneError("no")))
+    found = check(run)
+    assert (found.resolved, found.judged) == (None, False)
+    assert found.judged_run().summary["not_judged"] == "not judged: the companion is refused: no"
+    with pytest.raises(ValueError, match="there is no companion run"):
+        found.error_of(len)
+
+
+def test_a_companion_that_stops_early_leaves_the_run_unresolved(monkeypatch):
+    """An exchange that is unstable at 2.3 times its steps: the energy grows beyond what stops a run."""
+    contact = {"law": "compliance", "stiffness": 1e6, "exponent": 1.0}
+    scene = with_changes(falling(), contact=contact, coupling={"scheme": "jacobi", "macro_step": 3e-5})
+    found = check(simulate(scene, check=False))
+    assert found.resolved is False
+    assert found.why_not.startswith("not resolved: ")
+
+
+@pytest.mark.parametrize("steps", [1, 4, 8])
+def test_a_run_of_few_steps_has_a_companion_in_shorter_ones(steps):
+    """A mass on a spring alone, whose error at degree 2 is rounding, and a contact, whose error is not."""
+    scene = with_changes(falling(), coupling={"macro_step": 1.0 / steps})
+    found = check(simulate(scene, check=False))
+    assert found.ratio == 1.0 / LONGER
+    fine = simulate(with_changes(scene, coupling={"macro_step": 1e-3}), check=False)
+    assert distance(found.run, fine, 1.0 / steps).motion <= max(found.errors["motion"], 1e-9)
+
+
+def test_an_adaptive_run_has_a_companion_with_larger_tolerances():
+    scene = load_scene("soft", ["time.t_end=0.1", "beam.n_elements=6", "coupling.relative_tolerance=1e-5"])
+    run = simulate(scene)
+    true = distance(run, reference(scene, sample_times=run.time), 1e-3).motion
+    assert true <= run.summary["errors"]["motion"]
+    assert run.summary["errors"]["do_steps"] < run.do_steps
+
+
+def test_an_unfinished_run_is_not_checked():
+    run = simulate(falling(), check=False)
+    with pytest.raises(ValueError, match="has not come to its end"):
+        check(replace(run, summary={**run.summary, "status": "stopped"}))
