@@ -21,6 +21,7 @@ from ..results.totals import LOSS_NAMES, TOTALS
 from ..results.trajectory import BODY_COLUMNS, Trajectory
 from ..scene import Scene, SceneError, with_changes
 from .outcome import Progress, RunStopped
+from .peaks import PEAK_DOUBTED
 from .runner import run_in_memory
 from .summary import NOT_RESOLVED
 
@@ -33,7 +34,9 @@ _FEWEST = 8
 #: Error of the coarser of both runs over their difference, at order 1.
 _OF_COARSER = LONGER / (LONGER - 1.0)
 #: A run is resolved if the companion differs from it by no more than this: `Distance`.
-LIMITS = Distance(motion=0.02, times=0.005, impulses=0.1, force=0.1, velocities=inf, energies=inf)
+LIMITS = Distance(motion=0.02, times=0.01, impulses=0.2, force=inf, velocities=inf, energies=inf)
+#: Error of the peak of a soft contact force, relative to it, from which on a run warns.
+PEAK_FORCE = 0.1
 #: What each part of `Distance` is in words, and the unit of its size where that is not a share.
 WORDS = {
     "motion": "the motion",
@@ -99,6 +102,8 @@ class Check:
         warnings = [*self.run.summary.get("warnings", ())]
         if self.resolved is False and self.why_not:
             warnings.append(self.why_not)
+        if (peak := self.errors.get("force", 0.0)) > PEAK_FORCE:
+            warnings.append(f"{PEAK_DOUBTED}may be wrong by up to {100.0 * peak:.2g} %; take shorter steps")
         if not self.judged:
             not_judged = {} if self.resolved is False else {"not_judged": self.why_not}
             return {"resolved": self.resolved, "warnings": warnings, **not_judged}
