@@ -141,13 +141,6 @@ def test_a_body_that_ignores_what_a_degree_needs_is_run_with_degree_0_and_refuse
     assert again.motion()[:2] == (y, -0.3)
 
 
-def test_the_damper_of_an_element_takes_what_mass_and_spring_lose_wherever_its_rest_is():
-    body = SpringDamper(2.0, 80.0, 0.6, rest=0.3, displacement=0.1, velocity=-1.0, external_force=5.0)
-    at_start = sum(body.energies())
-    body.advance(0.0, 0.5, NO_FORCE)
-    assert sum(body.energies()) == pytest.approx(at_start, rel=1e-13)
-
-
 def test_the_acceleration_of_the_base_acts_on_the_mass_of_an_element_downward_and_a_wall_stays():
     body = SpringDamper(2.0)
     body.expect_loads([load_of(on="base"), load_of(on="tip")])

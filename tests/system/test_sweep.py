@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from commands import command, swept
+from commands import swept
 from runs import a_trajectory
 
 from springbeam.motion.events import Event, EventKind
@@ -67,22 +67,6 @@ def test_each_metric_is_the_number_that_it_names():
     expected |= {f"number_of_{kind}": float(n) for n, kind in enumerate(EventKind, 1)}
     expected |= {f"first_{kind}": 0.05 * n for n, kind in enumerate(EventKind, 1)}
     assert {name: METRICS_THERE_ARE[name](run) for name in expected} == expected
-
-
-def test_a_sweep_whose_every_run_is_refused_is_bad_input(tmp_path, monkeypatch):
-    monkeypatch.setattr(sweep.Sweep, "parallel", False)
-    for masses, code in (("-1,-2", 2), ("-1,1", 0)):
-        given = (
-            "--vary",
-            f"spring.mass={masses}",
-            "--set",
-            "time.t_end=0.01",
-            "--out",
-            tmp_path / masses,
-            "--no-plots",
-        )
-        assert command("sweep", "duffing", *given).exit_code == code
-        assert swept(tmp_path / masses)["status"].count("refused") == (2 if code else 1)
 
 
 @pytest.mark.filterwarnings("error:The input coordinates to pcolormesh")  # of values that do not ascend
