@@ -1,9 +1,6 @@
 """Broken FMUs, where the master names the file and the cause; and archives made to do harm."""
 
-import os
 import re
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 from zipfile import ZipFile, ZipInfo
@@ -12,7 +9,7 @@ import pytest
 
 import springbeam
 from springbeam.bodies import archive
-from springbeam.bodies.archive import UnsafeArchive, unpack, unpacked
+from springbeam.bodies.archive import UnsafeArchive, unpack
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.protocol import FmuError
 
@@ -161,61 +158,3 @@ def test_a_bomb_is_not_unpacked(tmp_path, monkeypatch):
     with pytest.raises(UnsafeArchive, match="take 5000000 bytes unpacked, at most 4000000 are allowed; pack smaller"):
         unpack(tmp_path / "bomb.fmu", tmp_path / "in", HERE)
     assert not (tmp_path / "in").exists()
-
-
-# -- the cache ---------------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return tmp_path / "cache" / "springbeam" / "fmus"
-
-
-def nothing_to_check(folder):
-    assert (folder / "modelDescription.xml").is_file()
-
-
-def test_an_fmu_is_unpacked_once_for_all_processes(fmu_folder, cache):
-    script = f"""
-from pathlib import Path
-from springbeam.bodies.archive import unpacked
-print(unpacked(Path({str(fmu_folder / "spring.fmu")!r}), {HERE!r}, lambda folder: None))
-"""
-    words = [sys.executable, "-c", script]
-    both = [subprocess.Popen(words, stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    found = {process.communicate()[0].strip() for process in both}
-    assert [found] == [{str(path)} for path in cache.iterdir()]
-    changed = [(path, path.stat().st_mtime_ns) for path in cache.rglob("*") if path.is_file()]
-    assert changed
-    assert {str(unpacked(fmu_folder / "spring.fmu", HERE, nothing_to_check))} == found
-    assert [(path, path.stat().st_mtime_ns) for path in cache.rglob("*") if path.is_file()] == changed
-
-
-@pytest.mark.parametrize("damage", ["cut", "gone"])
-def test_a_damaged_entry_is_not_used(fmu_folder, cache, damage):
-    first = unpacked(fmu_folder / "spring.fmu", HERE, nothing_to_check)
-    file = first / "modelDescription.xml"
-    whole = file.read_bytes()
-    file.unlink()
-    if damage == "cut":
-        file.write_bytes(whole[:-1])
-    second = unpacked(fmu_folder / "spring.fmu", HERE, nothing_to_check)
-    assert cache not in second.parents
-    assert (second / "modelDescription.xml").read_bytes() == whole
-
-
-def test_what_is_refused_leaves_no_entry(fmu_folder, cache):
-    def refuse(folder):
-        raise ValueError("no")
-
-    with pytest.raises(ValueError, match="no"):
-        unpacked(fmu_folder / "spring.fmu", HERE, refuse)
-    assert list(cache.iterdir()) == []
-
-
-def test_entries_that_nobody_uses_go(fmu_folder, cache):
-    old = unpacked(fmu_folder / "spring.fmu", HERE, nothing_to_check)
-    os.utime(old, (0, 0))
-    new = unpacked(fmu_folder / "spring3.fmu", (*HERE, "x86_64-linux"), nothing_to_check)
-    assert list(cache.iterdir()) == [new]

@@ -1,22 +1,11 @@
-"""FMU files: find them, and unpack archives of others safely inside their folder.
-
-Unpacked files are kept for later processes in ``$XDG_CACHE_HOME/springbeam/fmus`` (default: ``~/.cache``), by the hash
-of the archive. An entry appears there whole or not at all, and is never changed.
-"""
+"""FMU files: find them, and unpack archives of others safely inside their folder."""
 
 from __future__ import annotations
 
-import atexit
 import os
 import re
-import shutil
-import tempfile
 import zipfile
-from collections.abc import Callable
-from contextlib import suppress
-from hashlib import sha256
 from pathlib import Path
-from time import time
 
 from .protocol import FmuError
 
@@ -33,8 +22,6 @@ _BINARIES = "binaries/"
 _EXECUTABLE = 0o111
 #: Endings of the names of our FMUs, by version of FMI.
 ENDINGS = {"2.0": "", "3.0": "3"}
-#: Entries of the cache that nobody has used for so long go [s].
-_KEPT_FOR = 30 * 24 * 3600.0
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -62,47 +49,6 @@ def own_fmu(name: str, version: str | None = None) -> Path:
 
 class UnsafeArchive(ValueError):
     """An archive that is not unpacked; the message names the member and the cause."""
-
-
-def unpacked(path: Path, platforms: tuple[str, ...], check: Callable[[Path], object], *, alone: bool = False) -> Path:
-    """Return a folder with the files of the FMU ``path`` that a run needs: that of the cache, or a temporary one.
-
-    It is temporary if the cache cannot be used, or if only this process may use it (``alone``). ``check`` gets the
-    folder just unpacked, and raises if it is wrong. Raises the errors of `unpack` and ``check``.
-    """
-    if not alone:
-        with suppress(OSError):
-            return _kept(path, platforms, check)
-    folder = Path(tempfile.mkdtemp(prefix="springbeam-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    unpack(path, folder, platforms)
-    check(folder)
-    return folder
-
-
-def _kept(path: Path, platforms: tuple[str, ...], check: Callable[[Path], object]) -> Path:
-    """Return the folder of the cache, made if missing. Raises OSError if the cache cannot be used."""
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser(), "springbeam", "fmus")
-    entry = cache / sha256(path.read_bytes()).hexdigest()
-    if not entry.exists():
-        cache.mkdir(parents=True, exist_ok=True)
-        for old in cache.iterdir():
-            if time() - old.stat().st_mtime > _KEPT_FOR:
-                shutil.rmtree(old, ignore_errors=True)
-        part = Path(tempfile.mkdtemp(prefix="part-", dir=cache))
-        try:
-            unpack(path, part, platforms)
-            check(part)
-            with suppress(OSError):  # another process was first
-                part.rename(entry)
-        finally:
-            shutil.rmtree(part, ignore_errors=True)
-    with zipfile.ZipFile(path) as archive:
-        members = [(entry / member.filename, member.file_size) for member in _used(archive, platforms)]
-    if not all(file.is_dir() or file.stat().st_size == size for file, size in members):
-        raise OSError(f"{entry}: damaged")
-    os.utime(entry)
-    return entry
 
 
 def unpack(path: Path, folder: Path, platforms: tuple[str, ...]) -> None:

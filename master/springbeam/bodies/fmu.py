@@ -9,6 +9,8 @@ from __future__ import annotations
 import atexit
 import difflib
 import os
+import shutil
+import tempfile
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -23,7 +25,7 @@ from xml.parsers import expat
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, read_model_description
 
-from .archive import UnsafeArchive, own_fmu, unpacked
+from .archive import UnsafeArchive, own_fmu, unpack
 from .functions import DISCARD, ERROR, FATAL, FMU2, FMU3, PLATFORMS, VERSIONS, WARNING, Advance, advances
 from .protocol import FmuError, StepRefused
 from .units import Unit, unit_of
@@ -41,9 +43,11 @@ def _opened(path: Path, modified: int, fatal: int) -> tuple[ModelDescription, FM
 
     After ``fatal`` instances the library is another copy, because theirs must not be called again.
     """
+    folder = Path(tempfile.mkdtemp(prefix="springbeam-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     try:
-        folder = unpacked(path, PLATFORMS, _check_description, alone=fatal > 0)
-        description = read_model_description(str(folder), validate=False)  # `_check_description` has
+        unpack(path, folder, PLATFORMS)
+        description = _description(folder)
         version = VERSIONS.get(description.fmiVersion)
         if description.coSimulation is None or version is None:
             kind = "co-simulation" if description.coSimulation else "model exchange"
@@ -53,13 +57,16 @@ def _opened(path: Path, modified: int, fatal: int) -> tuple[ModelDescription, FM
             )
         identifier = description.coSimulation.modelIdentifier
         with _back_again(folder):
-            return description, version(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder))
+            opened = version(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder))
+        if not (folder / "resources").exists():  # what is loaded needs no file any more
+            shutil.rmtree(folder, ignore_errors=True)
+        return description, opened
     except Exception as error:  # FMPy raises bare Exceptions for whatever is wrong with an archive
         raise FmuError(f"{path}: not a usable FMU: {' '.join(str(error).split())}") from error
 
 
-def _check_description(folder: Path) -> None:
-    """Raise an error if the modelDescription.xml in ``folder`` is invalid.
+def _description(folder: Path) -> ModelDescription:
+    """Return the description in ``folder``; raise an error if it is invalid.
 
     UnsafeArchive if it has a document type: its entities may name files; FMI's schema has none.
     """
@@ -74,7 +81,7 @@ def _check_description(folder: Path) -> None:
         parser.Parse(path.read_bytes(), True)
     except expat.ExpatError as error:
         raise ValueError(f"modelDescription.xml is not XML: {error}") from error
-    read_model_description(str(folder))
+    return read_model_description(str(folder))
 
 
 @contextmanager
