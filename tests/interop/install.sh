@@ -51,6 +51,7 @@ fmi_sim() {
 # Its library needs TBB, which is on PyPI too.
 ecos() { "$python" -m venv "$2/venv" && "$2/venv/bin/pip" install -q "ecospy==$1" tbb==2023.2.0; }
 pathsim() { "$python" -m venv "$2/venv" && "$2/venv/bin/pip" install -q "pathsim==$1" pathsim-fmi==0.1.1 fmpy==0.3.32; }
+sofirpy() { "$python" -m venv "$2/venv" && "$2/venv/bin/pip" install -q "sofirpy==$1" fmpy==0.3.32; }
 fmucontainer() { "$python" -m venv "$2/venv" && "$2/venv/bin/pip" install -q "fmu-manipulation-toolbox==$1"; }
 # FMI4j and JavaFMI; the versions are in java.xml.
 java_importers() {
@@ -66,6 +67,7 @@ attempt maestro 3.1.1 maestro
 attempt ecos 0.7.2 ecos
 attempt fmucontainer 2.0 fmucontainer
 attempt pathsim 0.27.1 pathsim
+attempt sofirpy 1.0.2 sofirpy
 attempt java "$(cksum <"$here/java.xml")" java_importers
 attempt fmi-sim 0.7.0 fmi_sim
 exit 0
