@@ -9,7 +9,6 @@
 #include "gauss.hpp"
 #include "midpoint.hpp"
 #include "modal_beam.hpp"
-#include "text.hpp"
 #include "timoshenko.hpp"
 
 namespace beam {

@@ -8,15 +8,12 @@
 #include <initializer_list>
 #include <memory>
 
+#include "../fmus/adapter/common.hpp"
 #include "eigen.hpp"
 
 namespace beam {
 
-/// A quantity that is quadratic in time over a step, p(τ) = p₀ + p₁τ + p₂τ²/2.
-using Polynomial = std::array<double, 3>;
-inline double value(const Polynomial& p, double t) { return p[0] + t * (p[1] + t * p[2] / 2); }
-/// Over 0 … t.
-inline double mean(const Polynomial& p, double t) { return p[0] + t * (p[1] / 2 + t * p[2] / 6); }
+using common::mean, common::number, common::Polynomial, common::value;
 
 enum class Integrator { modal = 1, midpoint = 2 };
 enum class MassMatrix { consistent = 1, averaged = 2 };

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "step_cache.hpp"
-#include "text.hpp"
 
 namespace beam {
 namespace {

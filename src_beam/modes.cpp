@@ -10,7 +10,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "text.hpp"
 
 namespace beam {
 namespace {

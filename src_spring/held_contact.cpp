@@ -50,10 +50,9 @@ void HeldContact::begin(const TipMessage& arrived, double size, double y, const 
   now_.size = size;
   now_.tip = now_.start = arrived.displacement;
   now_.depth = y - now_.tip;
-  now_.next_free = now_.tip + Ahead{arrived, size}.free(size);
   response_ = arrived.response;
   now_.yielding = response_ + size * size / 2 / mass_;  // of a free top
-  choose(now_.next_free, top);
+  choose(now_.tip + Ahead{arrived, size}.free(size), top);
 }
 
 void HeldContact::take_over(double tip, double size, double y, double force) {
@@ -83,8 +82,6 @@ void HeldContact::advance(const TipMessage& arrived, double size, double y, cons
   if (std::abs(now_.debt) <= energy_rounding * (std::abs(C * rise) + law_.energy(start) + elastic)) now_.debt = 0.0;
 
   now_.steps = std::min(now_.steps + 1.0, 3.0);
-  now_.free = now_.next_free;
-  now_.next_free = arrived.displacement + ahead.free(2.0 * size);
   now_.foreseen = size == now_.size ? 1.0 : 0.0;
   now_.before = now_.last;
   now_.last = C;
@@ -92,7 +89,7 @@ void HeldContact::advance(const TipMessage& arrived, double size, double y, cons
   now_.start = arrived.displacement;
   now_.size = size;
   if (!(now_.yielding > 0.0 && now_.foreseen != 0.0)) now_.yielding = response_ + size * size / 2 / mass_;
-  choose(now_.next_free + C * ahead.response_2(size), top);
+  choose(arrived.displacement + ahead.free(2.0 * size) + C * ahead.response_2(size), top);
 }
 
 bool HeldContact::first_force_missed(const TipMessage& arrived) const {
@@ -147,14 +144,14 @@ HeldContact::Found HeldContact::solve(double start, double free, const Top& top)
   double low = 0.0, high = infinite, last = 0.0, end = 0.0, last_end = 0.0, last_missing = infinite;
   double force = std::max(0.0, 2.0 * now_.last - now_.before);
   for (int trial = 0; trial < most_trials; ++trial) {
-    const double reached = top(force);
+    const double place = top(force);
     double next = 0.0;
-    if (std::isfinite(reached)) {
-      end = reached - free - response_ * force;
+    if (std::isfinite(place)) {
+      end = place - free - response_ * force;
       const Mean wanted = mean(start, end);
       if (!std::isfinite(wanted.force)) break;
       const double missing = wanted.force - force;
-      const double depths = std::abs(reached) + std::abs(free) + response_ * force;
+      const double depths = std::abs(place) + std::abs(free) + response_ * force;
       const double accuracy = std::abs(missing) < 0.5 * last_missing ? 4.0 * epsilon : top_error;
       if (std::abs(missing) <= force_rounding * force + wanted.rounding + wanted.by_end * accuracy * depths)
         return {force, end};
@@ -172,7 +169,7 @@ HeldContact::Found HeldContact::solve(double start, double free, const Top& top)
     }
     if (high < infinite && (!(low <= next && next < high) || trial > most_trials / 6)) next = low + (high - low) / 2;
     const bool closed = high < infinite && high - low <= 4.0 * epsilon * high;
-    if (closed || next == force) return {std::isfinite(reached) ? force : infinite, end};
+    if (closed || next == force) return {std::isfinite(place) ? force : infinite, end};
     force = next;
   }
   return {infinite, end};

@@ -73,7 +73,6 @@ class HeldContact {
     double debt = 0.0;                   ///< what the force has stored, less Φ [J]
     double dissipated = 0.0;             ///< [J]
     double steps = 0.0;                  ///< made, 3 for more
-    double free = 0.0, next_free = 0.0;  ///< the tip now and after the coming step, without forces meanwhile [m]
     double last = 0.0, before = 0.0;     ///< forces over the last two steps [N]
     double start = 0.0, path = 0.0;      ///< where the last step found the tip, and its path in the one before it [m]
     double yielding = 0.0;               ///< what 1 N more takes from the depth at a step's end [m/N]

@@ -4,8 +4,6 @@
 #include <limits>
 #include <stdexcept>
 
-#include "text.hpp"
-
 namespace spring {
 
 double Parameters::hilltop() const {

@@ -1,17 +1,12 @@
-// A quantity that is quadratic in time over a step, p(τ) = p₀ + p₁τ + p₂τ²/2: its value and its first two time
-// derivatives at τ = 0.
+// What a step does with quantities that are quadratic in time (common.hpp).
 #pragma once
 
-#include <array>
+#include "../fmus/adapter/common.hpp"
 
 namespace spring {
 
-using Polynomial = std::array<double, 3>;
+using common::mean, common::number, common::Polynomial, common::rate, common::value;
 
-inline double value(const Polynomial& p, double t) { return p[0] + t * (p[1] + t * p[2] / 2); }
-inline double rate(const Polynomial& p, double t) { return p[1] + t * p[2]; }
-/// Over 0 … t.
-inline double mean(const Polynomial& p, double t) { return p[0] + t * (p[1] / 2 + t * p[2] / 6); }
 /// ∫₀ʰ p ẋ dτ of a path that rises by Δ = x(h) − x(0), with I = ∫(x − x(0)) dτ and J = ∫∫(x − x(0)) dτ dτ; x may have
 /// kinks. By parts.
 inline double work(const Polynomial& p, double h, double rise, double I, double J) {

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "seated.hpp"
-#include "text.hpp"
 
 namespace spring {
 

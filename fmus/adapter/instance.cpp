@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "references3.hpp"
-#include "text.hpp"
 namespace fmi {
 
 namespace {

@@ -1,16 +1,16 @@
 // The interface of a model to the adapter: built from parameters, stepped, saved and restored. No FMI types.
 #pragma once
 
-#include <array>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "common.hpp"
+
 namespace fmi {
 
-/// A quantity that is quadratic in time over a step: its value and its first two time derivatives at the start.
-using Polynomial = std::array<double, 3>;
+using common::number, common::Polynomial;
 
 /// The call cannot be carried out, and nothing has changed: becomes fmi2Discard or fmi3Discard, after which the
 /// instance goes on. So FMI 3.0 has it; an importer that follows FMI 2.0 restores a state before it repeats a step,

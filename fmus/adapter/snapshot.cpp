@@ -5,7 +5,6 @@
 #include <stdexcept>
 
 #include "table.hpp"
-#include "text.hpp"
 
 namespace fmi {
 namespace {
@@ -14,7 +13,7 @@ constexpr std::size_t progress_count = 4;  ///< doubles before the values
 
 /// What precedes the doubles.
 std::string header(std::string_view doubles) {
-  const std::uint64_t checksum = hash(doubles);
+  const std::uint64_t checksum = common::hash(doubles);
   return guid() + std::string(reinterpret_cast<const char*>(&checksum), sizeof checksum);
 }
 

@@ -4,7 +4,6 @@
 #include <initializer_list>
 #include <stdexcept>
 
-#include "text.hpp"
 #include "version.hpp"
 
 namespace fmi {
@@ -80,7 +79,7 @@ std::string printed(const Table& t, const std::string& guid) {
 
 std::string make_guid(const std::string& content) {
   // Two differently seeded halves make the 128 bits of a GUID.
-  const unsigned long long first = hash(content), second = hash(content, 0x9ae16a3b2f90404fULL);
+  const unsigned long long first = common::hash(content), second = common::hash(content, 0x9ae16a3b2f90404fULL);
   char text[39];
   std::snprintf(text, sizeof text, "{%08llx-%04llx-%04llx-%04llx-%012llx}", first >> 32, first >> 16 & 0xffff,
                 first & 0xffff, second >> 48, second & 0xffffffffffffULL);

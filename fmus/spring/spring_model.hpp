@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../../src_spring/held_contact.hpp"
@@ -17,7 +18,6 @@
 #include "../adapter/flat.hpp"
 #include "../adapter/learnt_step.hpp"
 #include "../adapter/model.hpp"
-#include "../adapter/text.hpp"
 
 /// The spring's parameters and where its top rests.
 struct FmuParameters : spring::Parameters {
@@ -253,7 +253,7 @@ class SpringModel final : public fmi::Model {
     const double stiffness = top().reaction_slopes().force_by_depth;
     if (!parameters.compliant() && arrives) wiring_.count(spring::Wiring::no_law);
     if (m.forecast != 0.0 && stiffness > 0.0) wiring_.check_resolved(rhythm_.size, stiffness, parameters.mass);
-    if (const std::string news = wiring_.news(); !news.empty()) warning = news;
+    if (!wiring_.news.empty()) warning = std::exchange(wiring_.news, {});
   }
 
   std::optional<spring::Spring> spring_;

@@ -37,7 +37,6 @@
 
 #include "fmi2Functions.h"
 #include "table.hpp"
-#include "text.hpp"
 
 namespace {
 
