@@ -211,8 +211,8 @@ def test_ecos(system):
 @pytest.mark.parametrize("system", ["pair", "beam"], indirect=True)
 def test_pathsim(system):
     """It exchanges after each FMU's step; with the force held back by one step the results are those of a parallel
-    exchange, if inputs have start values: the hold takes its first value before one. (It writes 0 to every input, so the
-    spring alone is another case.)"""
+    exchange, if inputs have start values: the hold takes its first value before one. (It writes 0 to every input, so
+    the spring alone is another case.)"""
     system.by_hand()
     system.parameters |= system.exchanged
     system.check(system.in_python("pathsim"))
