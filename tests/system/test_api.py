@@ -11,6 +11,7 @@ from commands import printed
 import springbeam
 from springbeam import RunStopped, SceneError, Simulation, load_scene, simulate, with_changes
 from springbeam.scene import scene_from_dict
+from springbeam.scene.laws import Compliance
 
 SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2}, coupling={"macro_step": 1e-3, "degree": 2})
 
@@ -226,3 +227,38 @@ def test_other_studies_from_python(tmp_path):
     fitted = springbeam.fit(scene, tmp_path / "y.csv", {"spring.linear_stiffness": "1:9"}, shift=0.0)
     (key,) = fitted.document["keys"]
     assert (key["key"], key["value"]) == ("spring.linear_stiffness", pytest.approx(3.0, rel=1e-4))
+
+
+# -- loads and laws of one's own ------------------------------------------------------------------------------------
+
+
+def test_a_function_is_a_load_like_its_signal():
+    """Over a step of ωH = 0.04 both are projected to rounding: 8 Gauss points are exact to (ωH/2)¹⁶."""
+    own = springbeam.FunctionLoad(on="tip", function=lambda t: -3.0 * np.sin(40.0 * t))
+    same = {"on": "tip", "signal": "harmonic", "amplitude": -3.0, "frequency": 20.0 / np.pi}
+    made, known = (simulate(with_changes(SOFT, loads=[load])) for load in (own, same))
+    assert np.abs(made.y - known.y).max() <= 1e-13 * np.abs(known.y).max()
+    assert np.allclose(made["load_0"], known["load_0"], rtol=1e-14, atol=1e-14)
+    again = with_changes(made.scene, {"spring.mass": 2.0})
+    assert (again.loads, again.spring.mass) == ((own,), 2.0)
+    assert springbeam.crosscheck(with_changes(made.scene, {"time.t_end": 0.02, "beam.n_elements": 4})).ok
+
+
+def test_a_function_moves_a_wall_if_its_derivative_is_given():
+    tables = {"time.t_end": 0.1, "contact.law": "tie", "coupling.macro_step": 1e-3}
+    bodies = {"beam": {"element": "point_mass", "mass": 1.0}, "spring": {"element": "moving_wall"}}
+    cam = {"on": "wall", "function": lambda t: 0.01 * t**3}
+    scene = {**tables, **bodies, "loads": [springbeam.FunctionLoad(**cam, derivative=lambda t: 0.03 * t**2)]}
+    run = simulate(scene)
+    assert np.abs(run.u_tip - 0.01 * run.time**3).max() < 1e-17
+    with pytest.raises(ValueError, match="has no derivative, by which a wall moves; give it one"):
+        simulate({**scene, "loads": [springbeam.FunctionLoad(**cam)]})
+
+
+def test_a_law_of_ones_own_is_the_one_that_has_the_same_force():
+    soft = {"law": "compliance", "stiffness": 1e4, "exponent": 1.5, "damping": 0.3}
+    own, known = (simulate(with_changes(SOFT, contact=law)) for law in (Compliance(1e4, 1.5, 0.3), soft))
+    assert np.array_equal(own.y, known.y)
+    assert np.array_equal(own.contact_force, known.contact_force)
+    with pytest.raises(SceneError, match="no reference has it"):
+        springbeam.crosscheck(own.scene)

@@ -18,7 +18,7 @@ from pydantic import model_validator
 from typing_extensions import Self
 
 from ..lazily import Later
-from .tables import OneOf, Table, key
+from .tables import OfProgram, OneOf, Table, key
 
 if TYPE_CHECKING:
     import numpy as np
@@ -341,6 +341,23 @@ class LinkContact(Contact):
 
     def force(self) -> Link:
         return Link(self.stiffness, self.damping)
+
+
+class OwnContact(OfProgram, Contact):
+    """The law that a program makes: ``with_changes(scene, contact=law)``, a `SoftLaw`."""
+
+    law: str = key("–", "a law of your own", "own")
+    own: SoftLaw
+
+    rigid = False
+
+    @property
+    def lasting(self) -> bool:  # type: ignore[override]
+        """Whether the law joins the ends from the start and for good."""
+        return self.own.lasting
+
+    def force(self) -> SoftLaw:
+        return self.own
 
 
 #: By their names in a scene.

@@ -6,7 +6,7 @@ values is a file of two columns, time and value (``recorded``).
 
 from collections.abc import Callable
 from functools import lru_cache
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -15,7 +15,7 @@ from typing_extensions import Self
 
 from ..lazily import Later
 from .recorded import Reading, Recorded
-from .tables import OneOf, Table, key
+from .tables import OfProgram, OneOf, Table, key
 
 if TYPE_CHECKING:
     import numpy as np
@@ -375,8 +375,8 @@ class TableLoad(Reading, _Started):
         return self.record(t, 1)
 
 
-class FunctionLoad(Load):
-    """A load that is a function of time, for programs: no scene file has it, and `springbeam.simulate` takes it.
+class FunctionLoad(OfProgram, Load):
+    """A load that is a function of time: ``with_changes(scene, loads=[FunctionLoad(on="tip", function=f)])``.
 
     ``function`` returns the value at one time [s], in the unit of the load; steps end at the times ``breaks`` [s], at
     which it jumps or has a kink. ``derivative``, of the function, is for the motion of a wall.
@@ -385,7 +385,7 @@ class FunctionLoad(Load):
     signal: str = "function"
     function: Callable[[float], float]
     derivative: Callable[[float], float] | None = None
-    breaks: tuple[float, ...] = ()
+    breaks: Annotated[tuple[float, ...], Field(strict=False)] = ()
 
     @property
     def _bends(self) -> tuple[float, ...]:
@@ -401,7 +401,7 @@ class FunctionLoad(Load):
 
 
 def _each(function: Callable[[float], float], times: "np.ndarray") -> "np.ndarray":
-    values = [function(time) for time in np.ravel(times).tolist()]
+    values = [function(time) if isfinite(time) else 0.0 for time in np.ravel(times).tolist()]
     return np.reshape(np.array(values, dtype=float), np.shape(times))
 
 

@@ -10,11 +10,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from .files import parse_value, shipped_scenes, tables_of
+from .laws import OwnContact, SoftLaw
 from .messages import VARIANTS, explain, models_of, nearest, one_line
 from .rules import impossible
 from .scene import TABLES, Scene, split_key
 from .schemes import PICKED_BY_ACCURACY
-from .tables import ArgumentError, SceneError
+from .tables import ArgumentError, OfProgram, SceneError
 
 
 def load_scene(
@@ -94,7 +95,7 @@ def with_changes(scene: Scene, changes: Mapping[str, Any] | None = None, /, **ta
 
     ``with_changes(scene, {"spring.mass": 2.0, "loads.0.frequency": 12.0})`` changes keys,
     ``with_changes(scene, spring={"mass": 2.0}, stop=None)`` keys of tables; ``None`` takes a table out, or the
-    accuracy. A list ``loads`` takes the place of all loads.
+    accuracy. A list ``loads`` takes the place of all loads, a `springbeam.SoftLaw` as ``contact`` that of the law.
 
     Raises
     ------
@@ -102,6 +103,10 @@ def with_changes(scene: Scene, changes: Mapping[str, Any] | None = None, /, **ta
         If the changed scene cannot be run, or its ``accuracy`` would overrule a change.
     """
     data = scene.model_dump(exclude_none=True, exclude_unset=True)
+    if isinstance(scene.contact, OfProgram):
+        data["contact"] = scene.contact
+    if any(isinstance(load, OfProgram) for load in scene.loads):
+        data["loads"] = [load if isinstance(load, OfProgram) else load.model_dump() for load in scene.loads]
     _apply(data, by_table({**(changes or {}), **tables}))
     return scene_from_dict(data)
 
@@ -119,7 +124,11 @@ def by_table(changes: Mapping[str, Any]) -> dict[str, Any]:
 
 def _apply(data: dict[str, Any], changes: Mapping[str, Any]) -> None:
     """Change tables, given by their keys, and replace everything else; ``None`` takes it out. Raises SceneError."""
-    whole = {name: content for name, content in changes.items() if not isinstance(content, Mapping)}
+    whole = {
+        name: OwnContact(own=content) if isinstance(content, SoftLaw) else content
+        for name, content in changes.items()
+        if not isinstance(content, Mapping)
+    }
     data |= whole
     for name in [name for name, content in whole.items() if content is None]:
         del data[name]

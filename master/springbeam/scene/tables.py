@@ -27,7 +27,7 @@ from pydantic import (
     model_serializer,
     model_validator,
 )
-from pydantic_core import CoreSchema
+from pydantic_core import CoreSchema, core_schema
 from typing_extensions import Self
 
 if TYPE_CHECKING:
@@ -161,6 +161,12 @@ class Table(BaseModel):
         return {name: value for name, value in handler(self).items() if name not in followed and value not in ((), [])}
 
 
+class OfProgram(Table):
+    """A table with functions, which a program makes and no file has."""
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+
+
 @dataclass(frozen=True, eq=False)
 class OneOf:
     """Annotate a field whose table is one of several, chosen by the value of its key ``name``.
@@ -200,7 +206,15 @@ class OneOf:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         tables = (Annotated[table, Tag(kind)] for kind, table in self.tables.items())
-        return handler.generate_schema(Annotated[reduce(or_, tables), Discriminator(self.kind)])
+        of_file = handler.generate_schema(Annotated[reduce(or_, tables), Discriminator(self.kind)])
+        return core_schema.no_info_wrap_validator_function(
+            lambda value, validate: value if isinstance(value, OfProgram) else validate(value),
+            of_file,
+            serialization=core_schema.wrap_serializer_function_ser_schema(
+                lambda value, serialize: value.model_dump() if isinstance(value, OfProgram) else serialize(value),
+                schema=of_file,
+            ),
+        )
 
 
 class Time(Table):
