@@ -49,13 +49,6 @@ class Double(Body):
     def rewind(self):
         vars(self).update(self._marked)
 
-    def _trial(self, time, size):
-        before = {name: getattr(self, name) for name in self.CHANGES}
-        end = self.advance_alone(time, size)
-        self.steps_made -= 1
-        vars(self).update(before)
-        return end
-
 
 class ModalBody(Double):
     """ä + α ω² ȧ + ω² a = b C + f per mode, w = bᵀa; F = +C.

@@ -18,14 +18,6 @@ SCENES = {
     "no beam": with_changes(PAIR, beam=None),
     "spring": with_changes(PAIR, beam=None, stop=None),
 }
-#: Columns that a picture must get along with: zero, negative energy, extreme, alternating.
-ODD_COLUMNS = {name: np.zeros(400) for name in columns_of(PAIR) if name not in ("time", "phase")} | {
-    "e_spring": np.linspace(-1.0, 1.0, 400),
-    "e_beam": np.full(400, 4.5e9),
-    "u_tip": np.full(400, 1e-300),
-    "y": np.full(400, -1e300),
-    "v_tip": np.where(np.arange(400) % 2, 1.0, -1.0),
-}
 
 
 def a_trajectory(scene=PAIR, n=400, events=(), **columns):
