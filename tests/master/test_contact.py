@@ -44,17 +44,6 @@ def test_an_impact_loses_the_kinetic_energy_that_it_takes(impact):
     assert impact.energy_loss == pytest.approx(taken, rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("v", "e", "kind"), [(1.0, 0.9, "seated"), (1.0, 1.0, "stop_impact"), (-0.1, 0.9, "stop_impact")]
-)
-def test_what_a_heavier_tip_takes_up_at_once_has_struck_for_the_last_time_unless_nothing_is_lost(v, e, kind):
-    """A top that falls on the foundation by 0.5 m/s, tied to a tip of ten times its mass."""
-    automaton = automaton_of(tip_mass=10.0, stop={"restitution": e, "position": -0.015})
-    ends = tuple(Motion(-0.015, w, 0.0, 0.0) for w in (v, -0.5))
-    found, *_ = automaton.after(EventKind.STOP_IMPACT, instant(Phase(Joint.TIED), ends))
-    assert found == kind
-
-
 @pytest.mark.parametrize(("kind", "mass"), [("separation", inf), ("separation", 1.0), ("unseated", 1.0)])
 def test_a_tip_that_leaves_the_foundation_leaves_at_rest(kind, mass):
     """It rests on the stop, or on a seated spring top, which stays or leaves with it: the foundation gives the impulse.

@@ -7,7 +7,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.polynomial import legendre
 
-from springbeam.bodies.protocol import NO_FORCE, Body, Motion
 from springbeam.coupling.exchange import Exchange
 from springbeam.coupling.projection import Projection
 from springbeam.coupling.soft import SoftSolver
@@ -57,32 +56,6 @@ def test_what_damping_takes_is_booked(law, degree, size):
     rows = couple(coupling, size, 60, unit_beam(4), DuffingBody(k1=3.0, k2=-0.2))
     assert coupling.state.dissipated > 1e-4
     assert max(abs(row.energy - rows[0].energy) for row in rows) < 1e-12 * rows[0].energy
-
-
-class Affine(Body):
-    """Ends a step at ``free`` + ``response``·C [m]."""
-
-    def __init__(self, free, response, size):
-        self.free = free
-        self.response = response
-        self.mass = 0.5 * size**2 / abs(response)
-        self.state = 0.0
-
-    def advance(self, time, size, contact, foundation=NO_FORCE):
-        self.state = self.free + self.response * contact[0]
-        return self.motion()
-
-    def motion(self):
-        return Motion(self.state, 0.0, 0.0, 0.0)
-
-
-@pytest.mark.parametrize(("response", "depth"), [(1e-12, 10.0), (1.0, 1e-9), (1e4, 10.0)])
-def test_forces_are_found_however_far_they_move_the_ends(depth, response):
-    """λ = 1e12 N/m, q = 1, contact from the start of the step: C = λ p⁺/2 with p⁺ = depth − 2·response·C. The force at
-    C = 0 is up to 1e16 times the one that is looked for."""
-    ends = Affine(-depth, response, 1e-3), Affine(0.0, -response, 1e-3)
-    c = solve(SoftSolver(Compliance(1e12, 1.0), 0, 1e-12), 1e-3, *ends)[0]
-    assert c == pytest.approx(1e12 * depth / (2.0 + 2e12 * response), rel=1e-11)
 
 
 @pytest.mark.parametrize(("sequential", "degree", "pressed"), [

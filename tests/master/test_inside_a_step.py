@@ -36,14 +36,6 @@ def test_what_turns_a_mismatch_of_velocities_is_the_mass_times_the_acceleration_
     assert _turning(steps[:1], steps[1:])[:, 0] == pytest.approx(turning.coef, rel=1e-9)
 
 
-def test_of_two_falls_the_last_one_counts_and_a_dip_before_it_is_asked_for():
-    """(s − 0.2)(s − 0.4)(0.9 − s): a path that rounding makes fall at its start as well is through where it ends so."""
-    path = through(Polynomial.fromroots([0.2, 0.4]) * Polynomial((0.9, -1.0)))
-    assert path.falls_through_zero() == pytest.approx(0.9, abs=1e-12)
-    assert path.falls_through_zero(0.3) == pytest.approx(0.2, abs=1e-12)
-    assert path.rises_through_zero(0.3) == pytest.approx(0.4, abs=1e-12)
-
-
 # -- where polynomials change their sign: their roots, to rounding ----------------------------------------------------
 
 

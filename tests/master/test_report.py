@@ -12,7 +12,6 @@ import pytest
 from lxml import html
 from runs import EVERY_EVENT, PAIR, SCENES, a_trajectory
 
-from springbeam.pictures.drawing import NOT_RESOLVED
 from springbeam.pictures.panels import panels
 from springbeam.pictures.report import page
 from springbeam.results.trajectory import BODY_COLUMNS
@@ -106,18 +105,6 @@ def test_curves_are_the_columns_bit_for_bit_in_single_precision():
     assert {curve.name for _, curve in drawn} >= {
         "u_tip", "y", "v_tip", "z", "contact_force", "foundation_force", "gap", "e_total"
     }  # fmt: skip
-
-
-# -- motion -------------------------------------------------------------------------------------------------------
-
-
-# -- what is wrong with them --------------------------------------------------------------------------------------
-
-
-def test_every_chart_of_a_run_that_is_not_resolved_carries_the_mark():
-    marked, plain = (page(dataclasses.replace(a_trajectory(), summary={"resolved": r})) for r in (False, True))
-    assert marked.count(NOT_RESOLVED) == len(Page(marked).data["charts"]) > 4
-    assert NOT_RESOLVED not in plain
 
 
 # -- how to run it again ------------------------------------------------------------------------------------------

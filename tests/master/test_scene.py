@@ -54,17 +54,6 @@ def test_contact_time_of_the_undeformed_approach(name):
     assert t_c == (None if expected is None else pytest.approx(expected, rel=1e-14))
 
 
-def test_a_tolerance_takes_the_place_of_the_macro_step_and_back():
-    """A file has one or the other; who changes a scene means what was said last."""
-    tolerant = load_scene("soft", ["coupling.relative_tolerance=1e-5"])
-    assert (tolerant.coupling.macro_step, tolerant.coupling.relative_tolerance) == (None, 1e-5)
-    assert with_changes(tolerant, coupling={"absolute_tolerance": 1e-9}).coupling.relative_tolerance == 1e-5
-    fixed = with_changes(tolerant, coupling={"macro_step": 1e-3})
-    assert (fixed.coupling.macro_step, fixed.coupling.relative_tolerance) == (1e-3, None)
-    assert not fixed.coupling.adaptive
-    assert scene_from_dict({**load_pair(), "coupling": {}}).coupling.H == 0.004  # without either
-
-
 def test_a_change_of_the_law_or_of_a_signal_keeps_the_keys_that_the_new_one_has_too():
     """λ and q of compliance are no keys of a tie, λ is one of a link; a key that is new and another's is refused."""
     given = {"law": "compliance", "stiffness": 7.0, "exponent": 1.5, "damping": 0.25}

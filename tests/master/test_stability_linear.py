@@ -2,50 +2,17 @@
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.statics import tip_inertia
 from springbeam.studies.predict import (
-    impulse_integrals,
     predict,
 )
 
 
 def omega_max(p):
     return float(np.sqrt(p.beam.omega2.max()))
-
-
-# -- propagators ----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("omega", "c", "h", "bound"),
-    [
-        (3.0, 0.0, 5.0, 1e-12),
-        (3.0, 1.0, 0.2, 1e-14),
-        (3.0, 6.0, 0.5, 1e-8),  # critical: the roots are moved apart by 1e-6
-        (0.0, 2.0, 0.3, 1e-13),
-        (1e4, 1e6, 0.01, 1e-11),
-        (0.0, 300.0, 0.3, 1e-11),  # nothing holds it, and its damping is fast: they were NaN
-        (300.0, 3.0, 0.3, 1e-11),
-    ],
-)
-def test_integrals_of_the_impulse_response(omega, c, h, bound):
-    """Against the exponential of (ξ, ξ̇, F, Ḟ, F̈, ∫ξ, ∫∫ξ), whose own rounding is |A|h ulp."""
-    A = np.zeros((7, 7))
-    A[0, 1] = 1.0
-    A[1, 0] = -(omega**2)
-    A[1, 1] = -c
-    A[1, 2] = A[2, 3] = A[3, 4] = A[5, 0] = A[6, 5] = 1.0
-    E = expm(A * h)
-    exact = [E[1, 1], E[0, 1], E[0, 2], E[0, 3], E[0, 4], E[5, 4], E[6, 4]]
-    ours = impulse_integrals(np.array([omega**2]), np.array([c]), h)[:, 0]
-    assert ours == pytest.approx(exact, rel=bound, abs=bound * abs(exact[0]))
-
-
-# -- schemes --------------------------------------------------------------------------------------------------------
 
 
 # -- scenes ---------------------------------------------------------------------------------------------------------

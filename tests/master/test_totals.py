@@ -45,33 +45,6 @@ def parabola(t):
     return 12.0 * t * (1.0 - t), 12.0 - 24.0 * t, -24.0
 
 
-@pytest.mark.parametrize("window", [1e-3, 0.5, 0.97])
-@pytest.mark.parametrize("ends", [[0.0, 1.0], [0.0, 0.31, 0.33, 0.6, 1.0]])
-def test_a_window_need_not_begin_or_end_at_a_row(ends, window):
-    """C = 12 t (1 − t): the best window has ½ as its middle, wherever the steps end."""
-    numbers = found(steps_with(parabola, ends), window=window)
-    assert numbers["contact_force_max"] == pytest.approx(3.0 - window**2, rel=1e-12)
-
-
-def test_durations_and_rebound():
-    steps = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 1.0, 11))
-    events = (
-        Event(0.1, "impact", joint="tied"),
-        Event(0.3, "separation", v_tip=0.5),
-        Event(0.4, "impact", joint="touch"),
-        Event(0.5, "retie", v_tip=0.125, joint="tied"),
-        Event(0.5, "release", v_tip=0.25),
-        Event(0.9, "impact", joint="tied"),
-    )
-    numbers = found(steps, *events, apart=False)
-    assert numbers["contact_duration"] == pytest.approx(0.2, rel=1e-15)
-    assert numbers["contact_duration_total"] == pytest.approx(0.2 + 0.1 + 0.1, rel=1e-14)
-    assert numbers["rebound_velocity"] == 0.25  # of the last contact that has opened
-    assert "rebound_velocity" not in found(steps, events[0], apart=False)
-    assert numbers["bounce_time"] == pytest.approx(0.8, rel=1e-15)
-    assert "bounce_time" not in found(steps[:6], *events[:5])  # it flies where the run ends
-
-
 def test_the_window_is_a_fiftieth_of_the_slowest_period():
     def window_of(scene):
         with pair_of(scene) as pair:

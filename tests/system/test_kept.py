@@ -4,10 +4,8 @@ from math import nan
 
 import pytest
 
-from springbeam import load_scene, simulate, with_changes
-from springbeam.bodies import fmu
+from springbeam import load_scene
 from springbeam.bodies.factory import load_bodies
-from springbeam.bodies.fmu import MOST_KEPT, release
 from springbeam.bodies.protocol import NO_FORCE, StepRefused
 
 pytestmark = pytest.mark.usefixtures("none_kept")
@@ -30,16 +28,3 @@ def test_the_last_derivative_alone_acts():
         before = body.motion().velocity
         assert body.advance(0.0, H, *forces).velocity - before == pytest.approx(1.0 / body.mass, rel=1e-4)
         body.close()
-
-
-def test_few_are_kept_and_the_oldest_is_freed(monkeypatch):
-    closed = []
-    close = fmu.Fmu.close
-    monkeypatch.setattr(fmu.Fmu, "close", lambda self: (closed.append(self), close(self)))
-    springs = [with_changes(load_scene("duffing"), spring={"mass": m}, time={"t_end": 0.1}) for m in range(1, 7)]
-    for scene in springs:
-        simulate(scene)
-    assert len(closed) == len(springs) - MOST_KEPT
-    release()
-    assert len(closed) == len(springs)
-    assert not any(one.faultless for one in closed)

@@ -6,10 +6,8 @@ import numpy as np
 import oscillator
 import pytest
 from bodies import DuffingBody
-from scenes import load_of
 
 from springbeam import PointMass, SceneError, SpringDamper, simulate, with_changes
-from springbeam.bodies.elements import RigidWall
 from springbeam.bodies.protocol import NO_FORCE, Abilities
 from springbeam.scene import load_scene, scene_from_dict
 
@@ -69,20 +67,6 @@ def test_they_move_alike(below, kind):
     assert run.summary["degree"] == 2
 
 
-@pytest.mark.parametrize(("kind", "said", "degree"), [
-    ("own", {}, 2), ("element", {}, 2), ("foreign", {}, 2), ("foreign", {"slopes": False}, 0),
-])  # fmt: skip
-def test_a_degree_that_is_left_out_is_the_one_that_both_bodies_are_made_for(below, kind, said, degree):
-    """A beam without inertia has a deflection of one degree more than the force that its run has."""
-    spring, _ = below(kind, **said)
-    beam = {**load_scene("soft").beam.model_dump(exclude_none=True), "fidelity": "quasi_static", "alpha_b": 0.01}
-    left, given = (
-        simulate(above(spring, beam=beam, coupling={"macro_step": 0.01, **asked})) for asked in ({}, {"degree": degree})
-    )
-    assert left.summary["degree"] == degree
-    assert left.steps.tobytes() == given.steps.tobytes()
-
-
 @pytest.mark.parametrize(("kind", "upper"), [
     ("function", "own"), ("function", "element of the caller's"), ("foreign", "element of the caller's"),
 ])  # fmt: skip
@@ -139,11 +123,3 @@ def test_a_body_that_ignores_what_a_degree_needs_is_run_with_degree_0_and_refuse
     with pytest.raises(SceneError, match=rf"degree = 1: .* {lacks}.*; use degree = 0"):
         simulate(with_changes(given, coupling={"degree": 1}), **{place: again})
     assert again.motion()[:2] == (y, -0.3)
-
-
-def test_the_acceleration_of_the_base_acts_on_the_mass_of_an_element_downward_and_a_wall_stays():
-    body = SpringDamper(2.0)
-    body.expect_loads([load_of(on="base"), load_of(on="tip")])
-    body.set_loads([(3.0, 0.0, 0.0), (5.0, 0.0, 0.0)])
-    assert body.load_on_end()[0] == -1.0
-    assert RigidWall(0.5).advance(0.0, 0.1, NO_FORCE) == pytest.approx((0.5, 0.0, 0.05, 0.0025), rel=1e-15)

@@ -5,14 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import printed
 from judge import ERRORS, Reference, judge
 from references import reference
 from scenes import scene_from_dict
 
 from springbeam import RunStopped, SceneError, load_scene, with_changes
 from springbeam.results.distance import distance
-from springbeam.results.files import load_trajectory
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run import accuracy as search
 from springbeam.run.runner import run
@@ -135,17 +133,6 @@ def test_what_runs_a_scene_as_it_is_wants_the_accuracy_picked():
     scene = scene_from_dict(ASKING)
     with pytest.raises(SceneError, match=r"accuracy = 0\.0001"):
         run(scene, MemoryRecorder(scene))
-
-
-def test_command(tmp_path):
-    out = tmp_path / "out"
-    arguments = ["run", "soft", "--set", "beam.n_elements=6", "--set", "time.t_end=0.06", "--accuracy", "1e-4"]
-    assert "0.0001 asked" in printed(*arguments, "--no-plots", "--out", out)
-    written = load_trajectory(out)
-    assert written.scene.coupling.macro_step == written.summary["accuracy"]["picked"]["macro_step"]
-    again = simulate(written.scene)  # the last pilot run is the result, and that of the scene which it was picked for
-    assert written.steps.tobytes() == again.steps.tobytes()
-    assert written.events == again.events
 
 
 @pytest.mark.parametrize(

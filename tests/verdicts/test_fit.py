@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import oscillator
 import pytest
-from commands import Interrupt, command, printed, refused
+from commands import Interrupt, command, printed
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 from scenes import scene_from_dict
@@ -137,18 +137,6 @@ def test_a_file_without_a_column_of_the_run_is_refused(tmp_path, text, why):
     path.write_text(text)
     with pytest.raises(SceneError, match=re.escape(why)):
         read_measured(path, OSCILLATOR)
-
-
-def test_the_command_compare_takes_a_measurement(here):
-    simulate(OSCILLATOR).save("run")
-    written(here / "m.csv", "time [s],position [mm]", TIMES + 0.2, 1e3 * exact())
-    compare = ("compare", "run", "m.csv", "--json", "--map")
-    for clock, shift, apart in (([], pytest.approx(-0.2, abs=1e-6), 1e-4), (["--shift", "-0.2"], -0.2, 1e-8)):
-        found = json.loads(printed(*compare, "position=y", *clock))
-        assert found["shift"] == shift
-        assert found["residuals"][0]["relative"] < apart
-    assert (here / "results" / "comparison.png").stat().st_size > 10_000
-    assert "m.csv: --map CH1: there are the columns position" in refused(*compare, "CH1=y")
 
 
 # -- keys found ---------------------------------------------------------------------------------------------------
