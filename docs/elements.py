@@ -14,7 +14,7 @@ from pages import DOCS, table, write_section  # beside this script
 
 from springbeam import Scene, load_scene, simulate, with_changes
 from springbeam.bodies.fmu import release
-from springbeam.bodies.fmu_bodies import FmuBeam
+from springbeam.bodies.own import FmuBeam
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam
 

@@ -12,7 +12,7 @@ from scipy.sparse import csc_matrix
 
 from springbeam import load_scene
 from springbeam.bodies.fmu import release
-from springbeam.bodies.fmu_bodies import FmuBeam
+from springbeam.bodies.own import FmuBeam
 from springbeam.monolithic.semi_discrete import assemble
 
 PROGRAMS = Path(__file__).parents[2] / "build" / "tests" / "bench"

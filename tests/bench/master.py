@@ -11,7 +11,7 @@ from measure import Row, Times, below, compare, median_and_spread, ratio_row, sh
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.bodies.fmu import Fmu, release
-from springbeam.bodies.fmu_bodies import FmuSpring
+from springbeam.bodies.own import FmuSpring
 from springbeam.paper import co_simulation, monolithic
 
 #: The calls of a macro step beside its advances; those before the first one are set-up.

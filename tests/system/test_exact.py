@@ -9,7 +9,7 @@ from exact.coupled import _airy_overshoot
 from scipy.integrate import quad
 from scipy.special import airy
 
-from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
+from springbeam.bodies.own import FmuBeam, FmuSpring
 from springbeam.coupling import solver
 from springbeam.scene.laws import Compliance, KelvinVoigt
 

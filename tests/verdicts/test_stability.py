@@ -12,7 +12,7 @@ from worked import Part
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
 from springbeam.bodies.factory import load_bodies
-from springbeam.bodies.fmu_bodies import FmuBeam
+from springbeam.bodies.own import FmuBeam
 from springbeam.bodies.protocol import NO_FORCE
 from springbeam.coupling import coupling_of
 from springbeam.monolithic.semi_discrete import modal_beam

@@ -12,7 +12,7 @@ from ..scene.partners import ForeignFmu, MovingWallElement, PointMassElement, Ri
 from ..scene.statics import tip_compliance, tip_load_deflection
 from .elements import ELEMENTS, MovingWall
 from .equilibrium import contact_at_rest, element_at_rest, lower_at_rest
-from .fmu_bodies import FmuBeam, FmuSpring
+from .own import FmuBeam, FmuSpring
 from .protocol import Body, FmuError
 from .quasi_static import QuasiStaticBeam
 

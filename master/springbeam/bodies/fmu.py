@@ -8,25 +8,20 @@ from __future__ import annotations
 
 import atexit
 import difflib
-import os
-import shutil
-import tempfile
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from contextlib import suppress
 from ctypes import byref, c_double, c_int, c_size_t, c_uint, c_void_p, cast
-from functools import cache, lru_cache, partial
+from functools import cache, partial
 from math import prod
 from pathlib import Path
 from struct import Struct
 from typing import Any, NoReturn, TypeVar
-from xml.parsers import expat
 
 from fmpy.fmi1 import FMICallException
-from fmpy.model_description import ModelDescription, read_model_description
 
-from .archive import UnsafeArchive, own_fmu, unpack
-from .functions import DISCARD, ERROR, FATAL, FMU2, FMU3, PLATFORMS, VERSIONS, WARNING, Advance, advances
+from .archive import own_fmu
+from .functions import DISCARD, ERROR, FATAL, WARNING, Advance, advances, opened
 from .protocol import FmuError, StepRefused
 from .units import Unit, unit_of
 
@@ -35,70 +30,6 @@ _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 
 #: Number of instances of a file that have returned fmi2Fatal in this process.
 _fatal: Counter[Path] = Counter()
-
-
-@lru_cache(maxsize=8)
-def _opened(path: Path, modified: int, fatal: int) -> tuple[ModelDescription, FMU2 | FMU3]:
-    """Return the description of the FMU at ``path``, and its library. Raises FmuError.
-
-    After ``fatal`` instances the library is another copy, because theirs must not be called again.
-    """
-    folder = Path(tempfile.mkdtemp(prefix="springbeam-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    try:
-        unpack(path, folder, PLATFORMS)
-        description = _description(folder)
-        version = VERSIONS.get(description.fmiVersion)
-        if description.coSimulation is None or version is None:
-            kind = "co-simulation" if description.coSimulation else "model exchange"
-            raise ValueError(
-                f"it is for {kind} of FMI {description.fmiVersion}; export it for co-simulation, as FMI "
-                f"{' or '.join(VERSIONS)}"
-            )
-        identifier = description.coSimulation.modelIdentifier
-        with _back_again(folder):
-            opened = version(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder))
-        if not (folder / "resources").exists():  # what is loaded needs no file any more
-            shutil.rmtree(folder, ignore_errors=True)
-        return description, opened
-    except Exception as error:  # FMPy raises bare Exceptions for whatever is wrong with an archive
-        raise FmuError(f"{path}: not a usable FMU: {' '.join(str(error).split())}") from error
-
-
-def _description(folder: Path) -> ModelDescription:
-    """Return the description in ``folder``; raise an error if it is invalid.
-
-    UnsafeArchive if it has a document type: its entities may name files; FMI's schema has none.
-    """
-    path = folder / "modelDescription.xml"
-
-    def refuse(*_: Any) -> NoReturn:
-        raise UnsafeArchive("modelDescription.xml: a document type declaration is not part of an FMU")
-
-    parser = expat.ParserCreate()  # which knows the encodings that a file may have
-    parser.StartDoctypeDeclHandler = refuse
-    try:
-        parser.Parse(path.read_bytes(), True)
-    except expat.ExpatError as error:
-        raise ValueError(f"modelDescription.xml is not XML: {error}") from error
-    return read_model_description(str(folder))
-
-
-@contextmanager
-def _back_again(folder: Path) -> Iterator[None]:
-    """Return to the working directory in the end, even to one that has been removed; begin in ``folder``.
-
-    FMPy asks for its name, which one that has been removed lacks, and stays in the folder of a library that cannot be
-    loaded.
-    """
-    here = os.open(".", os.O_RDONLY) if os.chdir in os.supports_fd else os.getcwd()
-    try:
-        os.chdir(folder)
-        yield
-    finally:
-        os.chdir(here)
-        if isinstance(here, int):
-            os.close(here)
 
 
 #: A value of a parameter.
@@ -162,20 +93,20 @@ class Fmu:
         if not self.path.is_file():
             remedy = "; ./build.sh fmus builds it, SPRINGBEAM_FMUS names another folder" if self._own else ""
             raise FmuError(f"{self.path}: not found{remedy}")
-        description, opened = _opened(self.path, self.path.stat().st_mtime_ns, _fatal[self.path])
+        description, library = opened(self.path, self.path.stat().st_mtime_ns, _fatal[self.path])
         identifier = description.coSimulation.modelIdentifier
         if self._own and identifier != self._name:
             raise FmuError(f"{self.path}: model identifier {identifier!r}, expected {self._name!r}")
         #: What it says it can do, and the version of FMI.
         self.says = description.coSimulation
-        self.version = opened.VERSION
+        self.version = library.VERSION
         self._variables = {v.name: v for v in description.modelVariables}
         self._units = {unit.name: unit for unit in description.unitDefinitions}
         clocks = [v.name for v in description.modelVariables if v.causality == "independent"]
         #: The unit of its time.
         self.time_unit = self.unit(clocks[0], "time") if clocks else Unit()
         try:
-            return opened.instance(self._name, self._log)
+            return library.instance(self._name, self._log)
         except Exception as error:  # FMPy's own have no other type
             raise FmuError(f"{self.path}: cannot be instantiated: {self._cause(error)}") from error
 

@@ -24,7 +24,7 @@ from ..scene.partners import ForeignFmu
 from . import force
 from .elements import EndLoaded
 from .fmu import Fmu
-from .fmu_bodies import FmuBody
+from .fmu_body import FmuBody
 from .isolated import RemotePort
 from .port import Port
 from .protocol import NO_FORCE, SIZES_REMEMBERED, Abilities, Body, BodyFailed, Energies, FmuError, Force, Motion

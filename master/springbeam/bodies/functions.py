@@ -5,19 +5,29 @@ Only this module and `fmu` import FMPy.
 
 from __future__ import annotations
 
+import atexit
+import os
+import shutil
 import sys
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from copy import copy
 from ctypes import CDLL, POINTER, Structure, byref, c_double, c_int, c_size_t, c_uint, c_void_p
 from enum import IntEnum
-from functools import cache
+from functools import cache, lru_cache
 from itertools import count
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NoReturn
+from xml.parsers import expat
 
 from fmpy import fmi2, fmi3, platform, platform_tuple
 from fmpy.logging import addLoggerProxy
+from fmpy.model_description import ModelDescription, read_model_description
 from typing_extensions import Self
+
+from .archive import UnsafeArchive, unpack
+from .protocol import FmuError
 
 #: Values of fmi2Status and fmi3Status.
 OK = 0
@@ -211,3 +221,70 @@ class FMU3(Slave, fmi3.FMU3Slave):  # type: ignore[misc]
 
 #: The versions of FMI that are known.
 VERSIONS: dict[str, Any] = {version.VERSION: version for version in (FMU2, FMU3)}
+
+
+# -- loaded ------------------------------------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=8)
+def opened(path: Path, modified: int, fatal: int) -> tuple[ModelDescription, FMU2 | FMU3]:
+    """Return the description of the FMU at ``path``, and its library. Raises FmuError.
+
+    After ``fatal`` instances the library is another copy, because theirs must not be called again.
+    """
+    folder = Path(tempfile.mkdtemp(prefix="springbeam-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    try:
+        unpack(path, folder, PLATFORMS)
+        description = _description(folder)
+        version = VERSIONS.get(description.fmiVersion)
+        if description.coSimulation is None or version is None:
+            kind = "co-simulation" if description.coSimulation else "model exchange"
+            raise ValueError(
+                f"it is for {kind} of FMI {description.fmiVersion}; export it for co-simulation, as FMI "
+                f"{' or '.join(VERSIONS)}"
+            )
+        identifier = description.coSimulation.modelIdentifier
+        with _back_again(folder):
+            library = version(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder))
+        if not (folder / "resources").exists():  # what is loaded needs no file any more
+            shutil.rmtree(folder, ignore_errors=True)
+        return description, library
+    except Exception as error:  # FMPy raises bare Exceptions for whatever is wrong with an archive
+        raise FmuError(f"{path}: not a usable FMU: {' '.join(str(error).split())}") from error
+
+
+def _description(folder: Path) -> ModelDescription:
+    """Return the description in ``folder``; raise an error if it is invalid.
+
+    UnsafeArchive if it has a document type: its entities may name files; FMI's schema has none.
+    """
+    path = folder / "modelDescription.xml"
+
+    def refuse(*_: Any) -> NoReturn:
+        raise UnsafeArchive("modelDescription.xml: a document type declaration is not part of an FMU")
+
+    parser = expat.ParserCreate()  # which knows the encodings that a file may have
+    parser.StartDoctypeDeclHandler = refuse
+    try:
+        parser.Parse(path.read_bytes(), True)
+    except expat.ExpatError as error:
+        raise ValueError(f"modelDescription.xml is not XML: {error}") from error
+    return read_model_description(str(folder))
+
+
+@contextmanager
+def _back_again(folder: Path) -> Iterator[None]:
+    """Return to the working directory in the end, even to one that has been removed; begin in ``folder``.
+
+    FMPy asks for its name, which one that has been removed lacks, and stays in the folder of a library that cannot be
+    loaded.
+    """
+    here = os.open(".", os.O_RDONLY) if os.chdir in os.supports_fd else os.getcwd()
+    try:
+        os.chdir(folder)
+        yield
+    finally:
+        os.chdir(here)
+        if isinstance(here, int):
+            os.close(here)

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..bodies.fmu_bodies import FmuBeam, FmuSpring
+from ..bodies.own import FmuBeam, FmuSpring
 from ..bodies.protocol import NO_FORCE, BodyFailed, StepRefused
 from ..motion.events import Event, EventKind, Joint
 from ..results.trajectory import Trajectory
