@@ -23,7 +23,9 @@ _MOST_PHASE_PER_STEP, _MOST_PHASE = 30.0, 1000.0
 #: law, scheme, degree: all possible couplings.
 COUPLINGS = (
     *(("transmission", *scheme) for scheme in RIGID),
+    *(("unilateral", *scheme) for scheme in RIGID),
     *(("compliance", *scheme) for scheme in SOFT),
+    *(("kelvin_voigt", *scheme) for scheme in RIGID),
     *(("tie", *scheme) for scheme in RIGID),
     *(("link", *scheme) for scheme in SOFT),
 )
@@ -108,12 +110,13 @@ def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
         "time": {"t_end": steps * H + (0.0 if elastic or not with_beam else clearance / speed)},
         "contact": {"law": law},
     }
-    if law == "compliance":
+    resistance = damping * sqrt((mass + tip_mass) * (k1 + tip_stiffness))
+    if law in ("compliance", "kelvin_voigt"):
         q = cell["exponent"]
         stiffness = (tip_stiffness + k1) * reach / (cell["depth"] * reach) ** q
-        scene["contact"] |= {"stiffness": stiffness, "exponent": q, "damping": damping / speed}
+        of_law = damping / speed if law == "compliance" else resistance
+        scene["contact"] |= {"stiffness": stiffness, "exponent": q, "damping": of_law}
     if law == "link":
-        resistance = damping * sqrt((mass + tip_mass) * (k1 + tip_stiffness))
         scene["contact"] |= {"stiffness": (tip_stiffness + k1) / cell["depth"], "damping": resistance}
     if with_beam:
         scene["beam"] = {
