@@ -7,8 +7,6 @@ from numpy.polynomial import Legendre, Polynomial
 from springbeam.bodies import force
 from springbeam.bodies.protocol import Motion
 from springbeam.motion.paths import Path, sign_changes
-from springbeam.results.dense import _turning
-from springbeam.results.records import STEP
 
 # -- The path of a position inside a step: quintics exactly, minima, zeros, the order of its error and of the cubic's
 
@@ -22,18 +20,6 @@ def through(p, size=SIZE):
     q0 = p.integ(2)
     samples = [(float(p(s)), float(p.deriv()(s)) / size) for s in (0.0, 1.0)]
     return Path.through(*samples, size, (float(q(1.0)), float(q0(1.0))))
-
-
-def test_what_turns_a_mismatch_of_velocities_is_the_mass_times_the_acceleration_of_the_gap():
-    """The gap of joined ends has degree 5 and is 0 at both ends of a step; Legendre polynomials show degree 3 of it."""
-    s = Polynomial((0.0, 1.0))
-    gap = s * (1.0 - s) * Polynomial((0.3, 1.0, -2.0, 1.5))
-    steps = np.zeros(2, STEP)
-    steps["phase"], steps["reduced_mass"], steps["size"] = 2.0, 0.7, SIZE
-    steps["v_tip_after"], steps["v_tip"] = gap.deriv()(0.0) / SIZE, gap.deriv()(1.0) / SIZE
-    steps["u_tip_integral"], steps["u_tip_integral_2"] = SIZE * gap.integ()(1.0), SIZE**2 * gap.integ(2)(1.0)
-    turning = Legendre.cast(0.7 / SIZE**2 * gap.deriv(2)(0.5 * s + 0.5))
-    assert _turning(steps[:1], steps[1:])[:, 0] == pytest.approx(turning.coef, rel=1e-9)
 
 
 # -- where polynomials change their sign: their roots, to rounding ----------------------------------------------------

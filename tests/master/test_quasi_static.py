@@ -9,7 +9,6 @@ from scenes import scene_from_dict
 from springbeam.bodies.protocol import Motion
 from springbeam.bodies.quasi_static import QuasiStaticBeam
 from springbeam.contact.events import Holding
-from springbeam.monolithic.hybrid_system import _statics
 from springbeam.monolithic.semi_discrete import assemble, constant_forces
 from springbeam.scene import Beam, statics
 from springbeam.scene.statics import SHAPE_POINTS
@@ -39,8 +38,6 @@ def test_statics_are_those_of_a_mesh_that_holds_them():
     assert statics.tip_reach(moving) == pytest.approx(np.sqrt(2.0 * energy * by_force[d.tip]), rel=0.02)
     at_rest = QuasiStaticBeam(BEAM, 0, statics.tip_load_deflection(BEAM), 0.0).energies()
     assert at_rest.potential == pytest.approx(0.5 * load @ by_load, rel=1e-12)
-    by_loads = statics.tip_load_deflection(BEAM), 0.5 * statics.load_energy(BEAM)
-    assert _statics(BEAM) == pytest.approx((1.0 / statics.tip_compliance(BEAM), *by_loads), rel=1e-12)
     sampler = d.interpolated()
     np.testing.assert_allclose(statics.tip_force_shape(BEAM, SHAPE_POINTS), sampler @ by_force, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(statics.load_shape(BEAM, SHAPE_POINTS), sampler @ by_load, rtol=1e-11, atol=1e-15)

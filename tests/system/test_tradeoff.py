@@ -14,7 +14,7 @@ def test_what_a_configuration_costs_and_where_it_errs_is_that_of_its_run():
     scene = soft(time={"t_end": 0.12})
     run = tradeoff.run_in_memory(scene)
     exact = reference(scene)
-    row = {**costs(run), **tradeoff._errors(run, exact)}
+    row = {**costs(run), **tradeoff.errors(run, exact)}
     summary = run.summary
     assert row["cost_do_steps"] == summary["beam_steps"] + summary["spring_steps"]
     assert row["cost_rollbacks"] == summary["beam_rollbacks"] + summary["spring_rollbacks"]

@@ -136,7 +136,7 @@ class Tradeoff(Study):
             "cost_setup": float(run.summary["setup_time"]),
             **costs(run),
             "cost_macro_steps": int(run.summary.get("macro_steps", 0)),
-            **_errors(run, self.reference),
+            **errors(run, self.reference),
         }
 
     @cached_property
@@ -192,7 +192,7 @@ class Tradeoff(Study):
         return partial(draw_diagrams, diagrams, title, (6.0, 6.5))
 
 
-def _errors(run: Trajectory, exact: Trajectory) -> Row:
+def errors(run: Trajectory, exact: Trajectory) -> Row:
     """Return the `distance` of a run from the exact one, that of the times in seconds, and the energy residual."""
     span = float(np.ptp(exact.time))
     found = distance(run, exact, SHORT_SHARE * span)
