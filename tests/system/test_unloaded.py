@@ -9,9 +9,8 @@ import pytest
 import scenes
 from references import reference
 
-from springbeam import SceneError, load_scene, simulate, with_changes
+from springbeam import simulate, with_changes
 from springbeam.motion.events import EventKind
-from springbeam.paper import co_simulation, monolithic
 from springbeam.scene import scene_from_dict
 
 RAISED = 0.375  # m; exact in binary, as the heights below
@@ -88,25 +87,9 @@ def test_a_linear_spring_is_one_under_the_load_of_its_preload(program, tables):
     np.testing.assert_allclose(total, 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("program", [monolithic.algorithm_1, co_simulation.algorithm_1])
-def test_algorithm_1_has_the_same_spring(program):
-    scene = with_changes(load_scene("paper-fig2"), time={"t_end": 0.6}, spring={"cubic_stiffness": 0.0})
-    k1 = scene.spring.linear_stiffness
-    moved = program(with_changes(scene, spring={"unloaded": Y0}))
-    loaded = program(with_changes(scene, spring={"external_force": k1 * Y0}))
-    np.testing.assert_allclose(moved["y"], loaded["y"], atol=1e-10 * np.abs(loaded["y"]).max())
-    np.testing.assert_allclose(
-        moved["e_spring"] - k1 / 2.0 * Y0**2, loaded["e_spring"] - k1 * Y0 * loaded["y"], atol=1e-12
-    )
-
-
 # -- a gap ---------------------------------------------------------------------------------------------------------
 
 GAP = 0.01
-
-
-def with_gap(**tables):
-    return with_changes(scene_from_dict(PAIR), stop={"position": -0.03}, **tables)
 
 
 @pytest.mark.parametrize(
@@ -125,18 +108,6 @@ def test_what_is_below_the_gap_is_placed_by_it(body, where):
     assert run.time[0] == keys.time[0] == GAP
     for column in run.columns:
         np.testing.assert_array_equal(run[column], keys[column])
-
-
-def test_a_scene_with_a_gap_is_written_and_changed_as_it_was_given():
-    named = with_gap(contact={"gap": GAP})
-    written = named.model_dump(exclude_none=True)
-    assert written["contact"]["gap"] == GAP
-    assert not {"equilibrium", "unloaded"} & written["spring"].keys()
-    assert scene_from_dict(written) == named
-    wider = with_changes(named, contact={"gap": 2.0 * GAP})
-    assert wider.spring.unloaded == -2.0 * GAP
-    with pytest.raises(SceneError, match="gives it; leave one of the two out"):
-        with_changes(named, spring={"equilibrium": -0.1})
 
 
 @pytest.mark.parametrize(
