@@ -225,12 +225,6 @@ Beam::Response Beam::response_rate(const Loads::Values& loads, double tip_force)
   return respond(space_->mass_solve(rate), loads, tip_force);
 }
 
-Beam::Response Beam::response_per_load(std::size_t shape) const {
-  Loads::Values unit{};
-  unit[shape] = 1.0;
-  return respond(space_->mass_solve(space_->load(shape)), unit, 0.0);
-}
-
 /// Puts the state back.
 class Beam::Trial {
  public:

@@ -177,9 +177,6 @@ class Beam {
   double load_potential() const {
     return potential(now_.scalars.loads, now_.q);
   }  ///< −qᵀF [J] of the uniform and the hat load, as if they were constant
-  double load_work_per_unit(std::size_t shape) const {
-    return space_->load(shape).dot(now_.q);
-  }  ///< qᵀF of a unit of a load, as ∫ u dx [m²]
   // Their rates, under what acts now.
   double tip_rotation_rate() const { return space_->tip_rotation(now_.v); }               ///< [rad/s]
   double kinetic_power() const { return now_.v.dot(inertia_force()); }                    ///< [W]
@@ -201,8 +198,6 @@ class Beam {
   Response response() const;
   /// How it changes, with C and the loads at these rates.
   Response response_rate(const Loads::Values& loads_rate, double tip_force_rate) const;
-  /// What a unit of a load adds to it. The tip force acts as the tip load does.
-  Response response_per_load(std::size_t shape) const;
 
   /// Put the beam at rest under the tip force and the loads that act now.
   void put_at_rest();

@@ -57,7 +57,6 @@ class HeldContact {
   /// The same with the tip as it has `arrived` [m], where the last step has left it: to where it was predicted that
   /// step's force did the rest of its work.
   double energy(double y, double arrived) const { return energy(y) + now_.last * (now_.tip - arrived); }
-  double last_force() const { return now_.last; }        ///< over the last step [N]
   double dissipated() const { return now_.dissipated; }  ///< by the contact since the start [J]
   bool held() const { return now_.held != 0.0; }         ///< a force is: a message has arrived
   bool started() const { return now_.steps > 0.0; }      ///< a step was made

@@ -176,40 +176,40 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
   const bool starting = progress.phase == initialization;
   if (!by.continuous_input() && !(is_setting(by) && starting && order == 0))
     throw std::invalid_argument("'" + by.name + "' is not a continuous input");
-  evaluate();
-  for (const Dependency& d : of.dependencies) {
-    if (d.input != by.name || d.order != order) continue;
-    const double partial = d.partial(*model_);
-    return std::isnan(partial) ? difference(of, known) : finite(of, partial, too_large);
-  }
   const auto& at_start = of.initial_dependencies;
   const bool named = !at_start || std::find(at_start->begin(), at_start->end(), by.name) != at_start->end();
-  const bool follows = starting && order == 0 && named;
-  return follows ? difference(of, known) : 0.0;
+  const auto meant = [&, order = order](const Dependency& d) { return d.input == by.name && d.order == order; };
+  const bool follows = std::any_of(of.dependencies.begin(), of.dependencies.end(), meant);
+  return follows || (starting && order == 0 && named) ? difference(of, place, order) : 0.0;
 }
 
-/// At the start a parameter may act in any way, and its derivative is read once: two models more cost little.
-double Instance::difference(const Variable& of, unsigned known) {
+/// A derivative is read rarely: two more evaluations cost little. They leave no trace.
+double Instance::difference(const Variable& of, unsigned known, std::size_t order) {
   const Variable& by = table_.variables[known];
-  const std::size_t place = place_[known];
-  const double x = values_[place][0], change = 1e-6 * (x != 0.0 ? std::abs(x) : by.nominal);
+  double& value = values_[place_[known]][order];
+  const double x = value, change = 1e-6 * (x != 0.0 ? std::abs(x) : by.nominal);
   const std::pair here{x, evaluated(of)};
-  const auto put = [&](double value) {
-    values_[place][0] = value;
-    changed(place);
-  };
-  const auto beside = [&](double value) {
+  const bool inputs_set = inputs_set_;
+  std::vector<double> state;
+  model_->save(state);
+  const auto beside = [&](double there) {
     try {
-      require_allowed(by, value);
-      put(value);
-      return std::pair{value, evaluated(of)};
+      if (order == 0) require_allowed(by, there);
+      value = there;
+      changed(place_[known]);
+      return std::pair{there, evaluated(of)};
     } catch (const std::invalid_argument&) {
       return here;  // that side is out of bounds, its own or those that other parameters set
     }
   };
   const auto [high, above] = beside(x + change);
   const auto [low, below] = beside(x - change);
-  put(x);
+  value = x;
+  changed(place_[known]);
+  if (built_) {
+    model_->restore(state);
+    inputs_set_ = inputs_set;
+  }
   return finite(of, (above - below) / (high - low), too_large);
 }
 

@@ -58,8 +58,8 @@ class Instance {
   void evaluate();
   double evaluated(const Variable& output);
   void drop_used(bool stepped);
-  double difference(const Variable& of, unsigned known);  ///< the derivative by differences
-  void changed(std::size_t place);                        ///< by the importer
+  double difference(const Variable& of, unsigned known, std::size_t order);  ///< the derivative by differences
+  void changed(std::size_t place);                                           ///< by the importer
 
   const TypeNames type_names_;
   const Table& table_;

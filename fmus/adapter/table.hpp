@@ -27,8 +27,7 @@ enum class Causality { parameter, input, output, local };
 /// An input that an output follows without a step.
 struct Dependency {
   std::string input;
-  std::function<double(const Model&)> partial;  ///< ∂output/∂input, not finite where it is not known
-  int order = 0;                                ///< of the input's derivative that it is, where that is a variable
+  int order = 0;  ///< of the input's derivative that it is, where that is a variable
 };
 
 /// Values of every type are held as double, which represents all of them exactly.
@@ -176,11 +175,9 @@ class TableBuilder {
     return v;
   }
 
-  /// Says that the last output follows `input` between steps, and with which derivative.
-  template <class Partial>
-  void depends(const std::string& input, Partial partial, int order = 0) {
-    table_.variables.back().dependencies.push_back(
-        {input, [partial](const Model& m) { return static_cast<double>(partial(static_cast<const M&>(m))); }, order});
+  /// Says that the last output follows `input` between steps.
+  void depends(const std::string& input, int order = 0) {
+    table_.variables.back().dependencies.push_back({input, order});
   }
 
   /// Makes the last output's start value settable: it is a field of the parameters.

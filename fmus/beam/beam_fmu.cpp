@@ -169,14 +169,6 @@ struct BeamModel final : fmi::Model {
   double size_ = fmi::default_step;  ///< H, of the last step [s]
 };
 
-/// The partial derivative by an input where that is known: a state of rest follows the loads as a whole.
-template <class Partial>
-auto unless_at_rest(Partial partial) {
-  return [partial](const BeamModel& m) {
-    return m.starts_at_rest ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(partial(m));
-  };
-}
-
 template <class Value>
 auto of(Value (Beam::*value)() const) {
   return [value](const BeamModel& m) { return ((*m.beam).*value)(); };
@@ -309,8 +301,7 @@ fmi::Table fmi::make_table() {
              "potential of the loads distributed_load, gravity and tip_load_coefficient, as if they were constant",
              of(&Beam::load_potential), [](const BeamModel& m) { return m.load_potential_rate(); })
       .from_all();
-  add.depends("distributed_load",
-              unless_at_rest([](const BeamModel& m) { return -m.beam->load_work_per_unit(Loads::distributed); }));
+  add.depends("distributed_load");
   add.output("load_work", "J",
              "work of all loads on the beam since the start: distributed_load, point_force, tip_load, "
              "base_acceleration and tip_load_coefficient, not tip_force or tip_impulse. A load that is present at the "
@@ -335,9 +326,7 @@ fmi::Table fmi::make_table() {
          [](const BeamModel& m) { return m.forecast().velocity; }, [](const BeamModel& m) { return m.forecast_rate(); })
       .only_read()
       .from_all();
-  for (std::size_t i = 0; i < load_names.size(); ++i) {
-    add.depends(load_names[i], unless_at_rest([i](const BeamModel& m) { return m.forecast_per_load(i); }));
-  }
+  for (const std::string& name : load_names) add.depends(name);
   const std::vector<std::string> discretised{"density",        "area",          "second_moment_of_area",
                                              "young_modulus",  "shear_modulus", "shear_coefficient",
                                              "length",         "alpha_b",       "n_elements",
@@ -363,12 +352,8 @@ fmi::Table fmi::make_table() {
            name, unit, text, [=](const BeamModel& m) { return of_response(m, m.response()); },
            [=](const BeamModel& m) { return of_response(m, m.response_rate()); })
         .from_all();
-    const auto follows = [&](const std::string& input, std::size_t load) {
-      add.depends(input,
-                  unless_at_rest([=](const BeamModel& m) { return of_response(m, m.beam->response_per_load(load)); }));
-    };
-    follows("tip_force", Loads::tip);
-    for (std::size_t i = 0; i < load_names.size(); ++i) follows(load_names[i], i);
+    add.depends("tip_force");
+    for (const std::string& name : load_names) add.depends(name);
   };
   using M = const BeamModel&;
   using R = const Beam::Response&;

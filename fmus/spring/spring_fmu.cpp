@@ -1,4 +1,5 @@
 // The spring FMU: its table of variables, bound to SpringModel.
+#include <initializer_list>
 #include <limits>
 #include <string>
 #include <vector>
@@ -140,32 +141,18 @@ fmi::Table fmi::make_table() {
          "reaction", "N", "contact force computed by this FMU; 0 when contact_law = 1",
          [](const SpringModel& m) { return m.reaction(); }, [](const SpringModel& m) { return m.reaction_rate(); })
       .from(motion);
-  // What changes force and contact force at once: by an input, or by its derivative of that order.
-  struct Influence {
-    const char* input;
-    double (*partial)(M);
-    int order = 0;
+  // What force and contact force follow at once: inputs, and a derivative of one.
+  const auto follows = [&add](std::initializer_list<const char*> inputs) {
+    for (const char* input : inputs) add.depends(input);
+    add.depends("tip_displacement", 1);
   };
-  const auto by_held = [](M m) { return m.held_force_by_input(); };
-  const Influence loads[] = {{"foundation_force", [](M m) { return m.parameters.stop_enabled ? 0.0 : 1.0; }},
-                             {"external_force", [](M) { return 1.0; }},
-                             {"base_acceleration", [](M m) { return -m.parameters.mass; }}};
-  const Influence contact[] = {{"tip_displacement", [](M m) { return m.reaction_by_tip_displacement(); }},
-                               {"tip_displacement", [](M m) { return m.reaction_by_tip_rate(); }, 1},
-                               {"tip_velocity", [](M m) { return m.reaction_by_tip_velocity(); }},
-                               {"tip_velocity_forecast", by_held},
-                               {"tip_response", by_held}};
-  for (const auto& [name, partial, order] : contact) add.depends(name, partial, order);
-  for (const auto& [name, partial, order] : loads)
-    add.depends(name, [=, by = partial](M m) { return by(m) * by_held(m); });
+  follows({"tip_displacement", "tip_velocity", "tip_velocity_forecast", "tip_response", "foundation_force",
+           "external_force", "base_acceleration"});
   add.output("acceleration", "m/s2", "acceleration of the top", of(&Spring::acceleration), [](M m) { return m.jerk(); })
       .from(motion);
   t.variables.back().initial_dependencies->emplace_back("contact_force");
-  add.depends("contact_force", [](M m) { return m.parameters.compliant() ? 0.0 : -m.mobility(); });
-  for (const auto& [name, partial, order] : contact)
-    add.depends(name, [by = partial](M m) { return -m.mobility() * by(m); }, order);
-  for (const auto& [name, partial, order] : loads)
-    add.depends(name, [=, by = partial](M m) { return m.mobility() * by(m) * (1.0 - by_held(m)); });
+  follows({"contact_force", "tip_displacement", "tip_velocity", "tip_velocity_forecast", "tip_response",
+           "foundation_force", "external_force", "base_acceleration"});
   add.output("seated", "", "1 while the top rests on the foundation, otherwise 0", of(&Spring::seated)).steps_only();
   add.output("number_of_impacts", "", "number of impacts on the foundation since the start", of(&Spring::impacts))
       .steps_only();
@@ -184,7 +171,7 @@ fmi::Table fmi::make_table() {
          "contact_energy", "J", "energy stored in the contact", [](M m) { return m.contact_energy(); },
          [](M m) { return m.contact_power(); })
       .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement"});
-  add.depends("tip_displacement", [](M m) { return m.contact_energy_by_tip_displacement(); });
+  add.depends("tip_displacement");
   add.output(
       "dissipated_energy", "J", "energy dissipated since the start by the damping of the spring and of the contact",
       [](M m) { return m.dissipated_energy(); }, [](M m) { return m.dissipated_power(); });

@@ -120,31 +120,6 @@ class SpringModel final : public fmi::Model {
     return top().jerk(spring::Loads::from(parameters, acting()).force[1], held() ? 0.0 : reaction_rate());
   }
 
-  // Derivatives of outputs.
-  double mobility() const { return top().seated() ? 0.0 : 1.0 / parameters.mass; }  ///< of the top, by a force on it
-  /// Not a number, so found by differences, where the held force follows an input: before its first step.
-  double held_force_by_input() const {
-    return held() && rhythm_.stepped == 0.0 ? std::numeric_limits<double>::quiet_NaN() : 0.0;
-  }
-
-  double reaction_by_tip_displacement() const {
-    return held() ? held_force_by_input() : -top().reaction_slopes().force_by_depth;
-  }
-
-  double reaction_by_tip_velocity() const {
-    if (held()) return held_force_by_input();
-    return tip_displacement[1] != 0.0 ? 0.0 : -top().reaction_slopes().force_by_rate;
-  }
-
-  /// By the derivative of tip_displacement
-  double reaction_by_tip_rate() const {
-    return tip_displacement[1] != 0.0 ? -top().reaction_slopes().force_by_rate : 0.0;
-  }
-
-  double contact_energy_by_tip_displacement() const {
-    return held() && rhythm_.stepped != 0.0 ? -held_->last_force() : -elastic_reaction();
-  }
-
  private:
   /// What is known of the steps: the size that is expected [s], and whether there was one.
   struct Rhythm {
