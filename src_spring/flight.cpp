@@ -34,7 +34,7 @@ Flight::Flight(const EquationOfMotion& equation, const Parameters& parameters)
 
 const FlightEnd& Flight::run(const Start& start) {
   start_ = start;
-  reached_ = {Event::none, 0.0, false, start.y, start.z, 0.0, 0.0, 0.0, 0};
+  end_ = {Event::none, 0.0, false, start.y, start.z, 0.0, 0.0, 0.0, 0};
   Expansion motion = expand(start.size);
   EquationOfMotion::Rates rates = this->rates(motion);
   while (size_ * rates.sum() > 1.0) {
@@ -50,14 +50,14 @@ const FlightEnd& Flight::run(const Start& start) {
     follow(motion);
   else
     integrate();
-  return reached_;
+  return end_;
 }
 
 void Flight::integrate() {
   try {
-    reached_ = integrated_.run(start_, touching_);
+    end_ = integrated_.run(start_, touching_);
   } catch (const SolverError&) {
-    reached_ = integrated_.reached();
+    end_ = integrated_.end();
     throw;
   }
 }
@@ -146,15 +146,15 @@ void Flight::follow(Expansion& motion) {
     if (k > 1) faster = (faster + k * c) * s;
   }
   const double at_start = start_.y;
-  reached_ = {event,
-              s * H,
-              s == 1.0 && H == start_.size,
-              at_start + rise,
-              start_.z + faster / H,
-              s * H * (at_start + integral),
-              s * s * H * H * (at_start / 2 + integral_2),
-              dissipated(motion, order, s),
-              1};
+  end_ = {event,
+          s * H,
+          s == 1.0 && H == start_.size,
+          at_start + rise,
+          start_.z + faster / H,
+          s * H * (at_start + integral),
+          s * s * H * H * (at_start / 2 + integral_2),
+          dissipated(motion, order, s),
+          1};
 }
 
 /// By α_s, and by the contact: what the contact force does along the depth, less what the law stores.

@@ -16,9 +16,9 @@ class Flight {
   Flight(const EquationOfMotion& equation, const Parameters& parameters);
 
   /// Flies on to an event, to the end, or as far as one series serves.
-  /// @throws SolverError; reached() says how far it came
+  /// @throws SolverError; end() says how far it came
   const FlightEnd& run(const Start& start);
-  const FlightEnd& reached() const { return reached_; }
+  const FlightEnd& end() const { return end_; }
 
  private:
   Expansion expand(double size);
@@ -35,7 +35,7 @@ class Flight {
   double size_ = 0.0;  ///< H [s]
   Loads loads_{};      ///< over s
   bool touching_ = false;
-  FlightEnd reached_{};
+  FlightEnd end_{};
 };
 
 }  // namespace spring

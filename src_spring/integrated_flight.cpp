@@ -38,12 +38,12 @@ FlightEnd IntegratedFlight::run(const Start& start, bool touching) {
     const auto [event, place] = event_of_last_step();
     if (event == Event::none) continue;
     solver_.interpolate(solver_.last_start() + place * solver_.last_size());
-    return reached(event);
+    return end(event);
   }
-  return reached();
+  return end();
 }
 
-FlightEnd IntegratedFlight::reached(Event event) const {
+FlightEnd IntegratedFlight::end(Event event) const {
   const double H = start_.size, y = start_.y, s = solver_.s();
   const double* Y = solver_.value();
   return {event, s * H,          s == 1.0, y + Y[q], Y[p] / H, H * (s * y + Y[A]), H * H * (s * s / 2 * y + Y[B]),

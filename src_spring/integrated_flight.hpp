@@ -39,9 +39,9 @@ class IntegratedFlight final : public ImplicitSystem {
   IntegratedFlight(const EquationOfMotion& equation, const Parameters& parameters);
 
   /// Flies on to an event or to the end; `touching` the tip, or not.
-  /// @throws SolverError; reached() says how far it came
+  /// @throws SolverError; end() says how far it came
   FlightEnd run(const Start& start, bool touching);
-  FlightEnd reached(Event event = Event::none) const;
+  FlightEnd end(Event event = Event::none) const;
 
   bool residual(double s, const double* Y, const double* Yp, double* F) const noexcept override;
   void jacobian(double s, double c, const double* Y, const double* Yp, double* J) const noexcept override;

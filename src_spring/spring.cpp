@@ -11,7 +11,7 @@ namespace spring {
 namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-/// In one step, counted in internal steps of IDA: some two thousand periods of the spring. A step that needs more is
+/// In one step, counted in series and steps of IDA: some two thousand periods of the spring. A step that needs more is
 /// refused, so that no call lasts longer than a second or two. To start a segment costs as much as some steps.
 constexpr long most_work = 250'000;
 constexpr double smallest_step = 1e-100;  ///< [s], whose square, of a series, is far above the least number
@@ -44,7 +44,7 @@ class Spring::Step {
           fly();
       }
     } catch (const SolverError& error) {
-      fail(error.what(), spring_.flight_.reached().y, t_ + spring_.flight_.reached().elapsed);
+      fail(error.what(), spring_.flight_.end().y, t_ + spring_.flight_.end().elapsed);
     }
     const Reached reached{remaining() > 0.0 ? t_ : size_, to_event && ends()};
     state_.stop_force = seated_impulse_ / reached.size;
@@ -139,13 +139,12 @@ class Spring::Step {
   }
 
   /// Past the hilltop, a motion that nothing brings back reaches infinity in finite time, where the solver fails.
-  [[noreturn]] void fail(const std::string& why, double y, double reached) const {
+  [[noreturn]] void fail(const std::string& why, double y, double done) const {
     const bool away = std::abs(y - parameters_.unloaded) > parameters_.hilltop();
-    throw StepFailure("spring: a step of " + number(size_) + " s fails after " + number(reached) + " s: " +
-                          (away ? "the top has run away, past its hilltop |y - unloaded| = " +
-                                      number(parameters_.hilltop()) + " m, where a softening spring pushes outwards"
-                                : why + "; use a smaller step size"),
-                      reached);
+    throw StepFailure("spring: a step of " + number(size_) + " s fails after " + number(done) + " s: " +
+                      (away ? "the top has run away, past its hilltop |y - unloaded| = " +
+                                  number(parameters_.hilltop()) + " m, where a softening spring pushes outwards"
+                            : why + "; use a smaller step size"));
   }
 
   Spring& spring_;
@@ -170,8 +169,7 @@ Spring::Spring(const Parameters& p)
 Spring::Reached Spring::step_to_event(double size, const Inputs& inputs, double time, bool to_event) {
   if (size < smallest_step)
     throw StepFailure("spring: a step of " + number(size) + " s is too small, its square underflows; use a step size " +
-                          "of at least " + number(smallest_step) + " s",
-                      0.0);
+                      "of at least " + number(smallest_step) + " s");
   const Loads loads = Loads::from(parameters_, inputs);
   const State before = state_;
   Step step(*this, time, size, loads);
@@ -185,8 +183,7 @@ Spring::Reached Spring::step_to_event(double size, const Inputs& inputs, double 
   if (!finite()) {
     state_ = before;
     throw StepFailure("spring: the motion leaves the range of floating-point numbers in a step of " + number(size) +
-                          " s; use a smaller step size or smaller inputs",
-                      0.0);
+                      " s; use a smaller step size or smaller inputs");
   }
   return reached;
 }

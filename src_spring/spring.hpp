@@ -1,4 +1,5 @@
-// The Duffing spring with its foundation, integrated by SUNDIALS IDA as an implicit system F(t, Y, Ẏ) = 0.
+// The Duffing spring with its foundation. Its motion is a Taylor series between events (flight.hpp); SUNDIALS IDA takes
+// over where there is none.
 //     m ÿ + α_s ẏ + k1 (y − y₀) + k2 (y − y₀)³ = −C + N + f_s − m a   (Ahn & Tate, eq. (6)),      up is positive.
 // y₀ is where the spring force is 0, at 0 in (6); y is relative to the foundation, whose acceleration is a. C comes
 // from outside (contact_law external) or from the normal compliance inside, C = λ_nc δ₊^p (1 + χ δ̇)₊, δ = y − u_tip; N
@@ -15,14 +16,14 @@
 
 namespace spring {
 
-/// The step could not be completed: the state is as before the step, `reached` is how far it came.
+/// The step could not be completed: the state is as before the step.
 class StepFailure : public std::runtime_error {
  public:
-  StepFailure(const std::string& what, double reached) : std::runtime_error(what), reached(reached) {}
-  double reached;  ///< [s] after the step's start
+  using std::runtime_error::runtime_error;
 };
 
-/// One spring. Every step starts IDA afresh, so a step repeated from the same saved state is bit-identical.
+/// One spring. A step depends only on the state, the inputs and its size: repeated from the same saved state it is
+/// bit-identical.
 class Spring {
  public:
   /// @throws std::invalid_argument naming the parameter, its value and what is allowed

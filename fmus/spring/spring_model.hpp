@@ -218,8 +218,7 @@ class SpringModel final : public fmi::Model {
     throw spring::StepFailure(
         "spring: no contact force was found that holds over the step: the tip is too far or too fast, or the step too "
         "long" +
-            (failure.empty() ? "" : " (a trial step says: " + failure + ")"),
-        0.0);
+        (failure.empty() ? "" : " (a trial step says: " + failure + ")"));
   }
 
   void check_wiring() {
