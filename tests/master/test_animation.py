@@ -23,5 +23,3 @@ def test_a_gif_plays_as_long_as_asked(tmp_path, recwarn):
     assert durations == [100] * 4
     assert all(np.any(a != b) for a, b in pairwise(images))
     assert [str(warning.message) for warning in recwarn] == []
-
-

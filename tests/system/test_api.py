@@ -262,3 +262,12 @@ def test_a_law_of_ones_own_is_the_one_that_has_the_same_force():
     assert np.array_equal(own.contact_force, known.contact_force)
     with pytest.raises(SceneError, match="no reference has it"):
         springbeam.crosscheck(own.scene)
+
+
+def test_accuracy_and_times_are_arguments_of_a_run():
+    scene = with_changes(SOFT, {"time.t_end": 0.05, "beam.n_elements": 4})
+    times = [0.0, 0.0123, 0.05]
+    accurate = simulate(scene, accuracy=1e-3, times=times)
+    assert accurate.time.tolist() == times
+    assert accurate.summary["accuracy"]["asked"] == 1e-3
+    assert accurate.y.tolist() == simulate(with_changes(scene, accuracy=1e-3)).at(times).y.tolist()

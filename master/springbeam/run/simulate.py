@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..bodies.protocol import Body
 from ..results.trajectory import Trajectory
-from ..scene import Scene, as_scene
+from ..scene import Scene, as_scene, with_changes
 from . import companion, runner
 from .accuracy import pick
 from .companion import Check
@@ -19,6 +21,8 @@ def simulate(
     scene: Scene | Mapping[str, Any] | str | Path,
     progress: Progress | None = None,
     *,
+    accuracy: float | None = None,
+    times: Sequence[float] | np.ndarray | None = None,
     upper: Body | None = None,
     lower: Body | None = None,
     check: bool = True,
@@ -32,6 +36,10 @@ def simulate(
     progress
         Called with time [s], phase and number of macro steps once per accepted step; also in the companion run, and
         with an accuracy in each of the runs that are made for it.
+    accuracy
+        Takes the place of the scene's own.
+    times
+        Times of the rows [s], as of `Trajectory.at`. Default: those of the steps.
     upper, lower
         Bodies of the caller at the start of the run, in place of the beam and of the spring: `springbeam.Body`. They
         are at its end afterwards.
@@ -51,6 +59,13 @@ def simulate(
         If an FMU cannot be found or loaded.
     """
     scene = as_scene(scene)
+    if accuracy is not None:
+        scene = with_changes(scene, accuracy=accuracy)
+    run = _run(scene, progress, upper, lower, check=check)
+    return run if times is None else run.at(times)
+
+
+def _run(scene: Scene, progress: Progress | None, upper: Body | None, lower: Body | None, *, check: bool) -> Trajectory:
     if scene.accuracy is not None and upper is None and lower is None:
         return pick(scene, progress).judged_run()
     own = {"beam": upper, "spring": lower}
