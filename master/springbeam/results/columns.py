@@ -9,7 +9,7 @@ import numpy as np
 
 from ..motion.events import Event
 from ..scene import Scene, Spring
-from .records import BEAM_REPORTS, PHASE_NAMES, SPRING_REPORTS, STEP_COLUMNS, common, joined
+from .records import BEAM_REPORTS, PHASE_NAMES, SPRING_REPORTS, STEP_COLUMNS, common, joined, seated
 from .trajectory import BODY_COLUMNS, Trajectory, columns_of
 
 #: Limit of a column that does not affect the motion [N]; pictures multiply two of them.
@@ -46,7 +46,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     zeros = np.zeros(len(steps))
     contact = steps["contact_force_after"]
     if rigid:
-        v, z = (np.where(apart, own, common(steps, steps["phase"] >= 3.0, "v_tip_after", "z_after")) for own in (v, z))
+        v, z = (np.where(apart, own, common(steps, seated(steps), "v_tip_after", "z_after")) for own in (v, z))
     phase = PHASE_NAMES[steps["phase"].astype(int)]
     if rigid:  # ends that touch and part at once: a pulling force is no contact force
         contact = np.where(phase == "touch", np.maximum(contact, 0.0), contact)
@@ -89,7 +89,7 @@ def _acceleration(scene: Scene, spring: Spring, found: Mapping[str, np.ndarray],
             force = force + found[f"load_{i}"] * (1.0 if load.on == "spring" else -spring.mass)
     if scene.coupled:
         force = force - found["contact_force"]
-    return np.where(steps["phase"] < 3.0, force / spring.mass, 0.0)
+    return np.where(seated(steps), 0.0, force / spring.mass)
 
 
 def first_not_finite(scene: Scene, steps: np.ndarray, first: np.ndarray) -> tuple[int, str] | None:

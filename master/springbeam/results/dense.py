@@ -31,7 +31,7 @@ from ..motion.events import Event
 from ..motion.paths import LAST_MOMENT, Path, derivative, sign_changes, value
 from ..scene import Scene
 from .columns import columns
-from .records import Records, Rows, common, joined, reduced_mass
+from .records import Records, Rows, common, joined, reduced_mass, seated
 from .spans import rounding_of_steps, span
 from .trajectory import Trajectory
 
@@ -210,7 +210,7 @@ def motion(rigid: bool, before: Records, steps: Records) -> dict[str, np.ndarray
     found: dict[str, np.ndarray] = {}
     size: Any = steps["size"]
     together = rigid & joined(before)
-    held = before["phase"] >= 3.0
+    held = seated(before)
 
     def of(end: int, records: Records, field: str) -> Any:
         """Return a field of an end; for joined ends that of their common motion."""
@@ -303,7 +303,7 @@ def _between(
     for name in ("u_tip", "v_tip", "y", "z"):
         found[f"{name}_after"] = curves[name]
     if scene.coupled and not (scene.contact.rigid or scene.contact.lasting):
-        found["phase"] = np.where(before["phase"] >= 3.0, before["phase"], np.where(curves["gap"] < 0.0, 2.0, 0.0))
+        found["phase"] = np.where(seated(before), before["phase"], np.where(curves["gap"] < 0.0, 2.0, 0.0))
     for name in _LINEAR:
         found[name] = linear(name, after[name])
     # An event at the end of the step changes kinetic energy, or releases a massless tip. Where ends part without an

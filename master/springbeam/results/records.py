@@ -62,8 +62,9 @@ SHAPE = np.dtype([(name, "<f8") for name in SHAPE_COLUMNS])
 packed = Struct(f"<{len(STEP_COLUMNS)}d").pack
 #: The column ``phase`` by the number in a record: how the ends are joined, and 3 more while the lower end is seated.
 PHASE_NAMES = np.array(["free", "tied", "touch", "seated", "seated", "seated"])
-#: Numbers of phases in which nothing joins the ends.
-_APART = (0.0, 3.0)
+#: The first number of the phases in which the lower end is seated; numbers of those in which nothing joins the ends.
+_SEATED = 3.0
+_APART = (0.0, _SEATED)
 
 
 class Rows:
@@ -120,6 +121,11 @@ def joined(steps: Records) -> np.ndarray:
     return ~np.isin(steps["phase"], _APART)
 
 
+def seated(steps: Records) -> np.ndarray:
+    """Return whether the lower end is seated on the foundation from each row on."""
+    return np.asarray(steps["phase"] >= _SEATED)
+
+
 def common(steps: Records, held: np.ndarray, of_tip: str, of_low: str) -> np.ndarray:
     """Return what joined ends have in common of a field of the tip and that of the lower end, as of their velocities.
 
@@ -136,7 +142,7 @@ def impulse(steps: np.ndarray, name: str = "contact_force") -> np.ndarray:
     size, c, dc, ddc = (steps[part] for part in ("size", name, f"{name}_rate", f"{name}_rate_2"))
     before = Rows(steps, np.arange(len(steps)) - 1)
     turned = steps["v_tip"] - steps["z"] - before["v_tip_after"] + before["z_after"]
-    together = joined(before) & (size > 0.0) & ((name == "contact_force") | (before["phase"] >= 3.0))
+    together = joined(before) & (size > 0.0) & ((name == "contact_force") | seated(before))
     turning = np.where(together, reduced_mass(before) * turned, 0.0)
     return np.asarray(size * (c + size * (dc / 2.0 + size * ddc / 6.0)) - turning)
 
@@ -145,7 +151,7 @@ def reduced_mass(before: Records) -> np.ndarray:
     """Return μ [kg] of ends that a rigid law joins after the records ``before``; the tip's alone on a seat."""
     free = 1.0 - before["tip_share"]
     alone = before["reduced_mass"] / np.where(free > 0.0, free, 1.0)
-    return np.where((before["phase"] >= 3.0) & (free > 0.0), alone, before["reduced_mass"])
+    return np.where(seated(before) & (free > 0.0), alone, before["reduced_mass"])
 
 
 def force(steps: Records | Mapping[str, np.ndarray], tau: np.ndarray, name: str = "contact_force") -> np.ndarray:
