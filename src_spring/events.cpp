@@ -2,18 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace spring {
 namespace {
 
-double value(const Series& c, int degree, double s) { return sum_of_powers(c, s, 0, degree); }
-
-/// In low … high, where the sign of a monotone stretch changes once.
-double sign_change(const Series& c, int degree, double low, double high) {
-  const bool negative = value(c, degree, low) < 0.0;
-  const auto past = [&](double s) { return (value(c, degree, s) < 0.0) != negative; };
-  return last_before(low, high, 2.0 * std::numeric_limits<double>::epsilon(), past);
+auto negative(const Series& c, int degree) {
+  return [&c, degree](double s) { return sum_of_powers(c, s, 0, degree) < 0.0; };
 }
 
 /// The polynomial is monotone from 0 to the first, and from each to the next; the last is 1.
@@ -32,11 +26,10 @@ Places sign_changes(const Series& c, int degree) {
   for (int k = 1; k <= degree; ++k) others += std::abs(c[static_cast<std::size_t>(k)]);
   Places changes;
   if (degree <= 0 || std::abs(c[0]) > others) return changes;
-  double low = 0.0;
-  for (const double high : ends_of_monotone_stretches(c, degree)) {
-    if ((value(c, degree, low) < 0.0) != (value(c, degree, high) < 0.0)) changes.add(sign_change(c, degree, low, high));
-    low = high;
-  }
+  changes_between(0.0, ends_of_monotone_stretches(c, degree), negative(c, degree), [&](double s, bool) {
+    changes.add(s);
+    return false;
+  });
   return changes;
 }
 
@@ -45,12 +38,12 @@ std::optional<double> first_fall(const Series& c, int degree) {
   for (int k = 1; k <= degree; ++k) least += std::min(c[static_cast<std::size_t>(k)], 0.0);
   if (least >= 0.0) return {};
   if (c[0] < 0.0) return 0.0;
-  double low = 0.0;
-  for (const double high : ends_of_monotone_stretches(c, degree)) {
-    if (value(c, degree, high) < 0.0) return sign_change(c, degree, low, high);
-    low = high;
-  }
-  return {};
+  std::optional<double> fall;
+  changes_between(0.0, ends_of_monotone_stretches(c, degree), negative(c, degree), [&](double s, bool) {
+    fall = s;
+    return true;
+  });
+  return fall;
 }
 
 Occurrence first_event(const Series* to_stop, const Series* to_tip, int degree) {

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <optional>
 
 #include "taylor.hpp"
@@ -19,6 +20,21 @@ double last_before(double low, double high, double resolution, const Past& past)
     (past(middle) ? high : low) = middle;
   }
   return low;
+}
+
+/// One rung of the ladder: calls found(place, now_negative) for each change of what is `negative` between `low` and the
+/// first of the ends, and between these, in which it changes once at most; until it returns true.
+template <class Ends, class Negative, class Found>
+void changes_between(double low, const Ends& ends, const Negative& negative, const Found& found) {
+  bool before = negative(low);
+  for (const double high : ends) {
+    const bool after = negative(high);
+    const auto past = [&](double s) { return negative(s) == after; };
+    if (after != before && found(last_before(low, high, 2.0 * std::numeric_limits<double>::epsilon(), past), after))
+      return;
+    before = after;
+    low = high;
+  }
 }
 
 /// Ascending places in (0, 1].

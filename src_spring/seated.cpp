@@ -77,17 +77,15 @@ class HoldingForce {
       // The second derivative is scaled by a power of δ, of which rounding is left where δ is 0. What it does so near
       // the ends changes N by less than its rounding.
       const double inset = k == 2 ? 1e-7 * (stretch.to - stretch.from) : 0.0;
+      const auto negative = [&](double s) { return derivative_sign(k, s, stretch.pressed) < 0.0; };
+      if (k == 0 && negative(stretch.from)) return stretch.from;
       std::vector<double> changes;
-      double low = stretch.from + inset;
-      for (const double end : ends) {
-        const double high = std::min(end, stretch.to - inset);
-        const auto negative = [&](double s) { return derivative_sign(k, s, stretch.pressed) < 0.0; };
-        const bool at_low = negative(low);
-        if (negative(high) != at_low)
-          changes.push_back(last_before(low, high, 2.0 * epsilon, [&](double s) { return negative(s) != at_low; }));
-        if (k == 0 && negative(high)) return changes.empty() ? stretch.from : changes.back();
-        low = high;
-      }
+      for (double& end : ends) end = std::min(end, stretch.to - inset);
+      changes_between(stretch.from + inset, ends, negative, [&](double s, bool now) {
+        changes.push_back(s);
+        return k == 0 && now;
+      });
+      if (k == 0 && !changes.empty()) return changes.back();
       ends = changes;
       ends.push_back(stretch.to);
     }
@@ -100,13 +98,14 @@ class HoldingForce {
     constexpr int samples = 16;  // between two of the other cuts, where depth and rate are monotone
     const auto pulls = [this](double s) { return law_.elastic(depth(s)) + law_.viscosity() * rate(s) < 0.0; };
     const std::size_t known = cuts.size();
-    for (std::size_t i = 1; i < known; ++i)
-      for (int k = 0; k < samples; ++k) {
-        const double step = (cuts[i] - cuts[i - 1]) / samples, low = cuts[i - 1] + k * step, high = low + step;
-        const bool at_low = pulls(low);
-        if (pulls(high) != at_low)
-          cuts.push_back(last_before(low, high, 2.0 * epsilon, [&](double s) { return pulls(s) != at_low; }));
-      }
+    for (std::size_t i = 1; i < known; ++i) {
+      std::array<double, samples> ends;
+      for (int k = 0; k < samples; ++k) ends[k] = cuts[i - 1] + (k + 1) * (cuts[i] - cuts[i - 1]) / samples;
+      changes_between(cuts[i - 1], ends, pulls, [&cuts](double s, bool) {
+        cuts.push_back(s);
+        return false;
+      });
+    }
     std::sort(cuts.begin(), cuts.end());
   }
 
