@@ -247,11 +247,12 @@ def opened(path: Path, modified: int, fatal: int) -> tuple[ModelDescription, FMU
         identifier = description.coSimulation.modelIdentifier
         with _back_again(folder):
             library = version(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder))
-        if not (folder / "resources").exists():  # what is loaded needs no file any more
-            shutil.rmtree(folder, ignore_errors=True)
         return description, library
     except Exception as error:  # FMPy raises bare Exceptions for whatever is wrong with an archive
         raise FmuError(f"{path}: not a usable FMU: {' '.join(str(error).split())}") from error
+    finally:
+        if not (folder / "resources").exists():  # what is loaded needs no file any more
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _description(folder: Path) -> ModelDescription:
