@@ -39,7 +39,11 @@ def started(directory):
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 @pytest.mark.parametrize(
     ("number", "code", "status"),
-    [(signal.SIGTERM, 3, "interrupted"), (signal.SIGKILL, -signal.SIGKILL, "running")],
+    [
+        (signal.SIGTERM, 3, "interrupted"),
+        (signal.SIGHUP, 3, "interrupted"),
+        (signal.SIGKILL, -signal.SIGKILL, "running"),
+    ],
 )
 def test_a_run_that_is_ended_from_outside_leaves_what_it_has_computed(tmp_path, long, number, code, status):
     """Each file is, to the last byte, the beginning of that of the whole run."""

@@ -14,6 +14,7 @@ import sys
 import textwrap
 from functools import partial
 from importlib import import_module
+from io import TextIOWrapper
 from typing import Annotated, Any
 
 # Typer uses pydantic, which would search all installed packages for plugins.
@@ -52,6 +53,9 @@ def main() -> None:
     Modules and a picture are no garbage: to search them took a sixth of a run.
     """
     gc.set_threshold(300_000)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # with LANG=C, which has no ω
     try:
         app()
     except OSError as error:

@@ -40,7 +40,7 @@ _OFFERED = (
 
 def doctor(
     scene: Annotated[
-        str | None, typer.Argument(metavar="[SCENE]", help="Check the FMUs that this scene names instead.")
+        str | None, typer.Argument(metavar="SCENE", help="Check the FMUs that this scene names instead.")
     ] = None,
     settings: SettingsOption = None,
     as_json: JsonOption = False,

@@ -140,7 +140,22 @@ class Commands(TyperGroup):
 
 
 class Command(TyperCommand):
-    """A command that can be interrupted. A former option names its replacement."""
+    """A command that can be interrupted. A former option names its replacement.
+
+    Its help is text: what stands in brackets, ``[s]`` or ``[[loads]]``, is no markup of rich.
+    """
+
+    def __init__(self, *args: Any, **given: Any) -> None:
+        from rich.markup import escape
+
+        super().__init__(*args, **given)
+        described: list[Any] = [self, *self.params]
+        for one in described:
+            one.help = escape(one.help or "")
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Return the arguments of the usage, ``SCENE`` for Typer's ``{SCENE}``."""
+        return [piece.replace("{", "").replace("}", "") for piece in super().collect_usage_pieces(ctx)]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         _refuse_gone([word for word in args if word.startswith("--")])
@@ -290,7 +305,7 @@ def cause_of(error: BaseException, place: Path | str) -> str:
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """End the command with exit code 3 on Ctrl-C, and on SIGTERM, which batch systems send.
+    """End the command with exit code 3 on Ctrl-C, on SIGTERM, which batch systems send, and on SIGHUP.
 
     Python acts on a signal when the call into an FMU returns. The wakeup descriptor gets it at once: if Python has not
     acted within `PATIENCE`, the process ends, and the results so far are on disk. An exception that is raised in a
@@ -321,9 +336,9 @@ def interruptible() -> Iterator[None]:
 
     again = list[threading.Timer]()
     hook = sys.unraisablehook
-    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    numbers = (signal.SIGTERM,) if ignored else (signal.SIGINT, signal.SIGTERM)
-    before = {number: signal.signal(number, interrupt) for number in numbers}
+    numbers = [signal.SIGTERM, signal.SIGINT, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
+    heard = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]  # nohup ignores SIGHUP
+    before = {number: signal.signal(number, interrupt) for number in heard}
     wakeup = signal.set_wakeup_fd(sender, warn_on_full_buffer=False)
     watchdog = threading.Thread(target=watch, name="watchdog", daemon=True)
     watchdog.start()

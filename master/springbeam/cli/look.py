@@ -149,7 +149,7 @@ def _free(path: Path, force: bool) -> Path:
 def compare(
     runs: Annotated[
         list[Path],
-        typer.Argument(metavar="DIR…", help="Directories of two runs or more; or of one, and a file of measurements."),
+        typer.Argument(metavar="DIR", help="Directories of two runs or more; or of one, and a file of measurements."),
     ],
     names: MapOption = None,
     scale: ScaleOption = None,

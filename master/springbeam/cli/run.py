@@ -157,9 +157,12 @@ def carry_out(
         if not recorder.begun and not isinstance(stopped, RunStopped):
             raise
         cause = cause_of(stopped, directory.path)
-        what = cause if isinstance(stopped, KeyboardInterrupt) else f"the run stopped early: {cause}"
-        where = f"(reached t = {recorder.time:.9g} s of {t_end:g} s)"
-        error = f"{what} {where}; the results so far are in {directory.path}"
+        if isinstance(stopped, RunStopped):
+            what = f"the run {cause} (its end is t = {t_end:g} s)"
+        else:
+            early = "" if isinstance(stopped, KeyboardInterrupt) else "the run stopped early: "
+            what = f"{early}{cause} (reached t = {recorder.time:.9g} s of {t_end:g} s)"
+        error = f"{what}; the results so far are in {directory.path}"
     finally:
         if not recorder.begun:
             directory.discard()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,13 @@ def parse_value(text: str) -> Any:
     with suppress(ValueError):
         return float(text)  # ".5" and "1." are not TOML
     return text
+
+
+def write_tables(tables: Mapping[str, Any], title: str) -> str:
+    """Return a scene in TOML, with a first line that says what it is."""
+    import tomli_w
+
+    return f"# {title}\n" + tomli_w.dumps(tables)
 
 
 def beginning(title: str) -> str:

@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
+from math import inf
 from typing import Any, NamedTuple
 
 from .laws import LAW
@@ -214,6 +215,15 @@ def key_kind(table: str, key: str) -> type:
     if key.startswith("parameters.") and "parameters" in keys:
         return float
     raise SceneError(_unknown(f"[{table}] {key}", key, keys_of(next(iter(models.values())))))
+
+
+def key_bounds(table: str, key: str) -> tuple[float, float]:
+    """Return the lowest and the highest value that ``[table] key`` takes, infinite where there is no bound."""
+    said = keys_of(*models_of(table).values()).get(key, {})
+    parts = [said, *said.get("anyOf", ())]
+    low = (part[name] for part in parts for name in ("minimum", "exclusiveMinimum") if name in part)
+    high = (part[name] for part in parts for name in ("maximum", "exclusiveMaximum") if name in part)
+    return max(low, default=-inf), min(high, default=inf)
 
 
 def explain(error: Any) -> str:

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..pictures.diagrams import Diagram, draw_diagrams
 from ..results.totals import LOSS_NAMES, TOTALS, peak_force
-from ..results.trajectory import Trajectory
+from ..results.trajectory import Trajectory, columns_of
 from ..scene import Scene
+from ..signals.curves import unit_of
 from ..signals.measured import Measured, model, residuals, time_shift
 from ..signals.spectra import without_peak
 from .tables import Findings, table
@@ -43,7 +44,9 @@ def beside_measured(run: Trajectory, measured: Measured, shift: float | None) ->
     for name, curve in curves.items():
         both = {"measured": measured.values[name][covered], "run": curve}
         points = {which: np.column_stack([time, values]) for which, values in both.items()}
-        diagrams.append(Diagram("time t [s]", name, points, log=False, dots=("measured",)))
+        unit = unit_of(name, columns_of(run.scene))
+        label = f"{name} [{unit}]" if unit else name
+        diagrams.append(Diagram("time t [s]", label, points, log=False, dots=("measured",)))
     columns = ("curve", "points:", "rms:.4g", "of its spread:.2%", "largest:.4g", "at t [s]:.6g")
     by_what = ", found by correlation" * (shift is None)
     shown = [

@@ -34,6 +34,8 @@ _RATIO = 2
 #: Limits of the order: slower convergence has no reliable limit; a higher order is not used.
 _LEAST_ORDER = 0.5
 _MOST_ORDER = 20.0
+#: Largest ratio of two orders that agree.
+_STEADY = 1.25
 #: Changes below this part of the value are rounding.
 _ROUNDING = 1e-12
 
@@ -48,28 +50,38 @@ class Extrapolated(NamedTuple):
 
 
 def extrapolated(values: Sequence[float | None], sizes: Sequence[int], *, complete: bool = False) -> Extrapolated:
-    """Return the observed order and the limit of the last three of ``values``, at meshes of ascending ``sizes``.
+    """Return the observed order and the limit of the last four of ``values``, at meshes of ascending ``sizes``.
 
-    With errors e·n⁻ᵖ at the sizes n the order p follows from the two changes. Values that do not approach anything
-    monotonically have none. If the last mesh is ``complete``, as with all modes, its value is the limit.
+    With errors e·n⁻ᵖ at the sizes n the order p follows from two changes. Four values have two orders; they have a
+    limit only if these agree (`_STEADY`), so that they are known to be in the asymptotic range. If the last mesh is
+    ``complete``, as with all modes, its value is the limit.
     """
-    if len(values) < 2 or None in values[-3:]:
+    if len(values) < 2 or None in values[-4:]:
         return Extrapolated()
-    *_, coarser, last = (float(value) for value in values if value is not None)
-    change = last - coarser
-    if complete or abs(change) <= _ROUNDING * abs(last):
-        return Extrapolated(change, None, last, 0.0)
-    before = coarser - float(values[-3]) if len(values) > 2 and values[-3] is not None else 0.0
-    a, b = (math.log(n / sizes[-2]) for n in (sizes[-3:][0], sizes[-1]))  # a < 0 < b
+    known = [float(value) for value in values if value is not None]
+    change = known[-1] - known[-2]
+    if complete or abs(change) <= _ROUNDING * abs(known[-1]):
+        return Extrapolated(change, None, known[-1], 0.0)
+    orders = [_order(known[k - 3 : k], sizes[k - 3 : k]) for k in (len(known) - 1, len(known)) if k >= 3]
+    if len(orders) < 2 or None in orders or max(filter(None, orders)) > _STEADY * min(filter(None, orders)):
+        return Extrapolated(change)
+    order = float(orders[-1] or 0.0)
+    rest = change / math.expm1(math.log(sizes[-1] / sizes[-2]) * order)
+    return Extrapolated(change, order, known[-1] + rest, abs(rest))
+
+
+def _order(values: Sequence[float], sizes: Sequence[int]) -> float | None:
+    """Return the order of three values; ``None`` if they approach nothing, or more slowly than is reliable."""
+    before = values[1] - values[0]
+    change = values[2] - values[1]
+    a, b = (math.log(n / sizes[1]) for n in (sizes[0], sizes[2]))  # a < 0 < b
 
     def excess(p: float) -> float:
         return math.expm1(-a * p) / -math.expm1(-b * p) - before / change
 
     if before * change <= 0.0 or excess(_LEAST_ORDER) > 0.0:
-        return Extrapolated(change)
-    order = float(brentq(excess, _LEAST_ORDER, _MOST_ORDER)) if excess(_MOST_ORDER) > 0.0 else _MOST_ORDER
-    rest = change / math.expm1(b * order)
-    return Extrapolated(change, order, last + rest, abs(rest))
+        return None
+    return float(brentq(excess, _LEAST_ORDER, _MOST_ORDER)) if excess(_MOST_ORDER) > 0.0 else _MOST_ORDER
 
 
 def converge(scene: Scene, *, levels: int = 4, metric: Sequence[str] = (), done: Done = unseen) -> Findings:

@@ -87,7 +87,8 @@ class Findings:
             path = directory / name
             files += [write_csv(path.with_suffix(".csv"), rows), write_parquet(path.with_suffix(".parquet"), rows)]
         for name, text in self.texts.items():
-            (directory / name).write_text(text, encoding="utf-8")
+            files.append(directory / name)
+            files[-1].write_text(text, encoding="utf-8")
         for name, draw in self.pictures.items() if pictures else ():
             files.append(directory / f"{name}.png")
             draw().savefig(files[-1], dpi=_DPI)

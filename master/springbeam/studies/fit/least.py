@@ -36,6 +36,8 @@ _LEAST = 1e-9
 #: Longest step at first, and trials of one before it is shortened: as it is, and corrected.
 _FIRST = 0.5
 _TRIALS = 4
+#: Derivatives to both sides differ by more than this share of the smaller one where an impact passes a sample.
+_PASSED = 1.0
 #: A combination of unknowns that changes the curves by less than this share of the others is not determined.
 _UNDETERMINED = 1e-5
 
@@ -184,16 +186,22 @@ class Search:
     def _differences(self, before: float, after: float) -> tuple[np.ndarray, np.ndarray]:
         """Return derivatives of the residual, and of the shift eliminated in it, by differences around a place.
 
-        ``before`` and ``after`` say how far from it; derivatives are 0 where neither run can be made.
+        ``before`` and ``after`` say how far from it; derivatives are 0 where neither run can be made. Those to both
+        sides differ at a sample that an impact passes on one side: there a velocity jumps, and the smaller one counts.
         """
         columns = []
         moved = []
         for unit in np.eye(len(self.at)):
             sizes = [size for size in (before, 0.0, after) if not self._run(self.at + size * unit)["error"]]
+            ends = [self._eliminated(self._run(self.at + size * unit)) for size in sizes]
             width = (sizes[-1] - sizes[0]) or np.inf
-            ends = [self._eliminated(self._run(self.at + size * unit)) for size in (sizes[0], sizes[-1])]
-            columns.append((ends[1][0] - ends[0][0]) / width)
-            moved.append((ends[1][1] - ends[0][1]) / width)
+            slope = (ends[-1][0] - ends[0][0]) / width
+            if sizes == [before, 0.0, after] and before < 0.0 < after:
+                left, right = ((ends[k + 1][0] - ends[k][0]) / (sizes[k + 1] - sizes[k]) for k in (0, 1))
+                passed = np.abs(right - left) > _PASSED * np.minimum(np.abs(right), np.abs(left)) + np.abs(slope).mean()
+                slope = np.where(passed, np.where(np.abs(left) < np.abs(right), left, right), slope)
+            columns.append(slope)
+            moved.append((ends[-1][1] - ends[0][1]) / width)
         return np.transpose(columns), np.array(moved)
 
     def _ended(self, slopes: np.ndarray) -> bool:

@@ -34,6 +34,9 @@ _RIVAL = 4.0
 _CONFIDENCE = 0.95
 #: Share of a period by which another shift of the clock is away.
 _AWAY = 0.4
+#: Most searches that begin at other shifts, and how much larger than the best the mean square of a start may be.
+_SHIFTS = 4
+_PROMISING = 30.0
 #: Share of the run within which shifts of the clock belong together.
 _NEAR = 0.01
 #: Unknowns are alike that differ by no more, relative to the keys.
@@ -104,8 +107,8 @@ class MultiStart:
             waiting = sorted((search for search in begun if search not in chosen), key=partial(_promise, begun))
             first = waiting[: looks - 1]
             looked += [search.least(_FIRST_LOOK) for search in first]
-            other = self._elsewhere(min(looked, key=_cost)) if looked else None
-            second = [other] if other is not None else waiting[looks - 1 : looks]
+            second = self._elsewhere(begun, looked) if looked else []
+            second = second or waiting[looks - 1 : looks]
             looked += [search.least(_FIRST_LOOK) for search in second]
             looked.sort(key=_cost)
             chosen += first + second
@@ -141,16 +144,33 @@ class MultiStart:
         )
         return search if search.points > len(at) + self._free else None
 
-    def _elsewhere(self, last: Search) -> Search | None:
-        """Return a search that begins with the keys to which ``last`` has led, and another shift of the clock.
+    def _elsewhere(self, begun: Sequence[Search], looked: Sequence[Search]) -> list[Search]:
+        """Return searches that begin at other shifts of the clock than all that have ``looked``, at most `_SHIFTS`.
 
-        ``None`` where no other shift is.
+        A motion that nearly repeats itself fits at shifts a period apart, each with keys of its own. One search begins
+        with the best keys so far and their best other shift, others with keys and shift of a run that has ``begun``,
+        if its mean square is no hopeless multiple of the best.
         """
-        if not self._free:
-            return None
-        away = _AWAY * last.period
-        other = self._begun(last.at, {"beside": (last.row[SHIFT], away), "step": last.row["step"]})
-        return other if other is not None and abs(other.row[SHIFT] - last.row[SHIFT]) > away else None
+        best = min(looked, key=_cost)
+        last = self._begun(best.at, {"step": best.row["step"]}) if self._free else None
+        if last is None:
+            return []
+        away = _AWAY * best.period
+        taken = [search.row[SHIFT] for search in looked]
+
+        def starts(searches: Sequence[Search]) -> list[tuple[float, float, Search]]:
+            """Return mean squares, shifts away from those taken, and searches, the best first."""
+            found = [(square, shift, search) for search in searches for shift, square in search.row["ranked"]]
+            return sorted((one for one in found if _far(one[1], taken, away)), key=lambda one: one[0])
+
+        promising = [one for one in starts(begun) if one[0] <= _PROMISING * best.cost]
+        found = list[Search]()
+        for _, shift, search in [*starts([last])[:1], *promising]:
+            if len(found) < _SHIFTS and _far(shift, taken, away):
+                taken.append(shift)
+                other = self._begun(search.at, {"near": shift, "step": search.row["step"]})
+                found += [other] if other is not None else []
+        return found
 
     def _judged(self, looked: Sequence[Search]) -> Found:
         """Go on with the best of searches and with those that may end as well; return the evidence for the best.
@@ -177,7 +197,7 @@ class MultiStart:
         half = math.sqrt(counted) * _half(best) + OWN * np.abs(best.moved_by(changed))
         keys = self._intervals(best, [math.inf] * size if alike else half.tolist())
         rivals = [self._ranges.values(other.at) for other in as_well]
-        return Found(keys, self._ranges.ends, left, alike, rivals, best.ended)
+        return Found(keys, self._ranges.ends, left, alike, rivals, best.ended, best.row[SHIFT])
 
     def _ended(self, search: Search) -> Minimum:
         """Return the minimum to which a search leads, several curves weighed by what is left of each.
@@ -250,6 +270,10 @@ def _promise(begun: Sequence[Search], search: Search) -> tuple[bool, float]:
     nearest = sorted(begun, key=lambda other: float(np.linalg.norm(other.at - search.at)))
     around = nearest[1 : 2 * len(search.at) + 1]
     return any(other.cost < search.cost for other in around), search.cost
+
+
+def _far(shift: float, others: Sequence[float], away: float) -> bool:
+    return min(abs(shift - other) for other in others) > away
 
 
 def _cost(search: Search | Minimum) -> float:

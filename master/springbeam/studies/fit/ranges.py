@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...scene import ArgumentError, key_kind
+from ...scene.messages import key_bounds
 from ...scene.scene import split_key
 from ..design import parse_axis
 from ..tables import Row
@@ -43,7 +44,11 @@ class Ranges:
                     f"--vary {axis.name}: a guess is one value that has the sign and roughly the size of what is "
                     "sought, as in spring.linear_stiffness=800, or a range of one sign, as 500:1200; 0 has no size"
                 )
-            low, high = (low / _RANGE, low * _RANGE) if axis.values else (low, high)
+            if axis.values:
+                least, most = key_bounds(*key)
+                ends = sorted((low / _RANGE, low * _RANGE))
+                # A guess that is not allowed itself is refused with the scene.
+                low, high = (max(ends[0], least), min(ends[1], most)) if least <= low <= most else ends
             found[axis.name] = (min(low, high), max(low, high))
         if not found:
             raise ArgumentError("--vary: nothing varies; give at least one KEY=GUESS")

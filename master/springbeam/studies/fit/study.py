@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -17,17 +17,22 @@ import numpy as np
 from pydantic import PrivateAttr
 from rich.text import Text
 
-from ...results.trajectory import Trajectory
+from ...pictures.diagrams import Diagram, draw_diagrams
+from ...results.dense import rows_at
+from ...results.trajectory import Trajectory, columns_of
 from ...run.accuracy import prepared
 from ...run.outcome import RunStopped
 from ...run.simulate import simulate_to
 from ...scene import ArgumentError, Scene, SceneError, with_changes
+from ...scene.files import write_tables
 from ...scene.tables import TOLERANCE_KEYS
+from ...signals.curves import signal, unit_of
 from ...signals.measured import (
     Aligned,
     Measured,
     at_shift,
     measured_as,
+    model,
     period,
     rms,
     settled,
@@ -49,6 +54,8 @@ _MARGIN = 0.02
 _BEYOND = 1e-5
 #: Makes a tolerance or an accuracy tighter, as half the macro step does.
 _TIGHTER = 0.1
+#: Points of a curve that is drawn.
+_DRAWN = 2000
 #: Rows of runs that are kept for other shifts of the clock.
 _KEPT = 100_000
 
@@ -124,7 +131,7 @@ class Fit(Study):
         * ``clock``: the lowest shift of the clock [s], that from which the best one is sought, and the highest;
           ``points`` are those that count, from a number up to another. Without a clock it is sought anywhere, if it is
           not given;
-        * ``beside``: a shift, and how far from it [s] another one is sought at least;
+        * ``near``: without a clock, a shift [s] near which the best one is sought;
         * ``step``: the macro step [s] that was picked for the accuracy of the scene, so that it is not picked again;
         * ``finer``: the run has shorter steps;
         * ``repeat``: it is compared with the repeated measurement.
@@ -152,11 +159,12 @@ class Fit(Study):
     def _begun(self, run: Trajectory, data: Measured, case: Row) -> tuple[Aligned, Row]:
         """Return both at the best shift of the clock, and what a search from there takes.
 
-        These are the ``points`` that take part, from a number up to another, and the ``room`` of the clock: between
-        which shifts [s] the run covers them.
+        These are the ``points`` that take part, from a number up to another, the ``room`` of the clock: between which
+        shifts [s] the run covers them; and ``ranked``: other shifts [s] and mean squares (`shifts`).
         """
         free = self.shift is None
-        here = at_shift(run, data, self._best(run, data, case) if self.shift is None else self.shift)
+        ranked = shifts(run, data) if self.shift is None else [(self.shift, 0.0)]
+        here = at_shift(run, data, case.get("near", ranked[0][0]))
         covered = np.flatnonzero(data.covered(run, here.shift, _MARGIN * free))
         first, last = (int(covered[0]), int(covered[-1]) + 1) if len(covered) else (0, 0)
         room = (here.shift, here.shift)
@@ -164,16 +172,8 @@ class Fit(Study):
             room = (float(run.time[0] - data.time[first]), float(run.time[-1] - data.time[last - 1]))
         quarter = 0.25 * period(here.slope, data)
         limits = (max(room[0], here.shift - quarter), min(room[1], here.shift + quarter))
-        return settled(run, data, here, slice(first, last), limits), {"points": (first, last), "room": room}
-
-    def _best(self, run: Trajectory, data: Measured, case: Row) -> float:
-        """Return the best shift of the clock [s], that of a case ``beside`` another one if there is one."""
-        ranked = shifts(run, data)
-        if "beside" in case:
-            shift, away = case["beside"]
-            others = [pair for pair in ranked if abs(pair[0] - shift) > away]
-            ranked = sorted(others, key=lambda pair: pair[1]) or ranked
-        return ranked[0][0]
+        found = settled(run, data, here, slice(first, last), limits)
+        return found, {"points": (first, last), "room": room, "ranked": ranked}
 
     def _run(self, case: Row, last: float) -> Trajectory:
         """Return the run of a case, at least up to the time ``last`` [s] if that is in it.
@@ -203,7 +203,7 @@ class Fit(Study):
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Return the values found with their intervals, and why the data does not determine them (exit code 1)."""
         found = self._search(lambda case: records[name_of(case)]).found()
-        kept = ("step", "off", "slope", "points", "room")
+        kept = ("step", "off", "slope", "points", "room", "ranked")
         runs = [{name: value for name, value in row.items() if name not in kept} for row in records.values()]
         if found is None:
             first = next(iter(records.values()))["error"]
@@ -218,7 +218,38 @@ class Fit(Study):
             *(Text(f"not determined: {doubt}", style="bold red") for doubt in why),
         ]
         document = {"keys": found.keys, "left": left, "undetermined": why}
-        return Findings(document, shown, code=_DISAGREES * bool(why), tables={self.kind: runs})
+        values = {row["key"]: row["value"] for row in found.keys if row["key"] != SHIFT}
+        fitted = with_keys(self.scene, values)
+        what = f"fitted to {self.file}" + "; the data do not determine it" * bool(why)
+        texts = {"fitted.toml": write_tables(fitted.model_dump(exclude_none=True), what)}
+        pictures = {self.kind: partial(self._drawn, fitted, found.shift)}
+        return Findings(
+            document, shown, code=_DISAGREES * bool(why), tables={self.kind: runs}, texts=texts, pictures=pictures
+        )
+
+    def _drawn(self, fitted: Scene, shift: float) -> Any:
+        """Return a figure of the curves, measured and of the fitted scene, each above what is left of it."""
+        run = self._run({name: fitted.flat()[name] for name in self.ranges.ends}, float(self.data.time[-1]) + shift)
+        covered, curves = model(run, self.data, shift)
+        time = self.data.time[covered] + shift
+        units = columns_of(self.scene)
+        dense = np.linspace(time[0], time[-1], _DRAWN)
+        between = rows_at(run, dense)
+        diagrams = []
+        for name, curve in curves.items():
+            measured = self.data.values[name][covered]
+            unit = unit_of(name, units)
+            in_unit = f" [{unit}]" * bool(unit)
+            both = {
+                "measured": np.column_stack([time, measured]),
+                "fitted": np.column_stack([dense, signal(between, name)]),
+            }
+            left = {"fitted less measured": np.column_stack([time, curve - measured])}
+            diagrams += [
+                Diagram("", f"{name}{in_unit}", both, log=False, dots=("measured",)),
+                Diagram("time t [s]", f"left of {name}{in_unit}", left, log=False, dots=tuple(left)),
+            ]
+        return draw_diagrams(diagrams, self.scene.title, (8.2, 2.2), wide=1)
 
     def _search(self, make: Callable[[Row], Row]) -> MultiStart:
         return MultiStart(self.ranges, self.data, self.repeated, self.shift, self.scene.duration, make)

@@ -46,6 +46,7 @@ class Found(NamedTuple):
     alike: Sequence[str]  #: which unknowns change nothing, or the curves in the same way
     rivals: Sequence[Row]  #: values elsewhere in the ranges that fit as well
     ended: bool  #: whether no further step of the search would gain anything
+    shift: float  #: of the clock in the run at these values [s]
 
 
 def undetermined(found: Found) -> list[str]:
