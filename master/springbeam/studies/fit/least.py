@@ -36,8 +36,9 @@ _LEAST = 1e-9
 #: Longest step at first, and trials of one before it is shortened: as it is, and corrected.
 _FIRST = 0.5
 _TRIALS = 4
-#: Derivatives to both sides differ by more than this share of the smaller one where an impact passes a sample.
-_PASSED = 1.0
+#: The mean of the derivatives to both sides is so many times the smaller one, and those of other samples, where an
+#: impact passes a sample.
+_PASSED = 5.0
 #: A combination of unknowns that changes the curves by less than this share of the others is not determined.
 _UNDETERMINED = 1e-5
 
@@ -198,8 +199,9 @@ class Search:
             slope = (ends[-1][0] - ends[0][0]) / width
             if sizes == [before, 0.0, after] and before < 0.0 < after:
                 left, right = ((ends[k + 1][0] - ends[k][0]) / (sizes[k + 1] - sizes[k]) for k in (0, 1))
-                passed = np.abs(right - left) > _PASSED * np.minimum(np.abs(right), np.abs(left)) + np.abs(slope).mean()
-                slope = np.where(passed, np.where(np.abs(left) < np.abs(right), left, right), slope)
+                smaller = np.where(np.abs(left) < np.abs(right), left, right)
+                passed = np.abs(slope) > _PASSED * np.maximum(np.abs(smaller), np.median(np.abs(slope)))
+                slope = np.where(passed, smaller, slope)
             columns.append(slope)
             moved.append((ends[-1][1] - ends[0][1]) / width)
         return np.transpose(columns), np.array(moved)
