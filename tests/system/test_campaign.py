@@ -46,7 +46,8 @@ def run_of(name):
 
 def counts(run):
     """Return the numbers of a summary that no clock gives."""
-    return {name: value for name, value in run.summary.items() if name not in ("wall_time", "setup_time")}
+    found = {name: value for name, value in run.summary.items() if name not in ("wall_time", "setup_time")}
+    return found | {"errors": {**found.get("errors", {}), "wall_time": None}}
 
 
 def same(one, other):
