@@ -52,4 +52,4 @@ def test_a_scene_is_told_by_the_numbers_of_hand_calculation():
     assert (p["omega_1"], p["omega_max"]) == pytest.approx((omega[0], omega[-1]), rel=1e-14)
     assert p["frequencies"] == pytest.approx(omega[:3] / (2.0 * np.pi), rel=1e-14)
     assert p["frequencies"][0] == pytest.approx(told["frequency"], rel=1e-3)  # which has no mesh
-    assert (p["modes"], p["resolved_modes"], p["static_shapes"]) == (5, 3, 3)
+    assert (p["modes"], p["slow_modes"], p["static_shapes"]) == (5, 3, 3)

@@ -110,16 +110,18 @@ def predict(
     settings: SettingsOption = None,
     as_json: JsonOption = False,
 ) -> Findings:
-    """Check a scene without a run: mass, frequencies, first contact, probable mistakes, resolution, stability.
+    """Check a scene without a run: mass, frequencies, first contact, probable mistakes, stability, cost.
 
     Example: springbeam predict soft --set coupling.macro_step=4e-3
     """
     from ..scene import load_scene
+    from ..studies.predict import cost_of
     from ..studies.predict import predict as prediction_of
 
     what = load_scene(scene, settings or ())
     with progress("modes and stability", None, silent=as_json):
         p = prediction_of(what)
+        p["cost"] = cost_of(what)
     shown: list[Any] = [Text(what.title or "(untitled scene)", style="bold")]
     shown += [f"{name:<10}{text}" for name, text in _lines(p)]
     shown += [f"note      {note}" for note in p["notes"]]
@@ -151,13 +153,16 @@ def _lines(p: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if p["omega_1"] is not None:
         beside = f" and {p['static_shapes']} static shapes" if p["static_shapes"] else ""
         yield "beam", (f"ω₁H = {p['omega_1'] * H:.3g}, ω_max H = {p['omega_max'] * H:.3g}; "
-                       f"{p['resolved_modes']} of {p['modes']} modes resolved (ωH ≤ 1){beside}")  # fmt: skip
+                       f"{p['slow_modes']} of {p['modes']} modes with ωH ≤ 1{beside}")  # fmt: skip
         yield "", f"tip mass {p['tip_mass']:.3g} kg, impedance Z = {p['impedance']:.3g} N·s/m"
     for name in ("spring", "contact"):
         if p[f"{name}_frequency"] is not None:
             yield name, f"ωH = {p[f'{name}_frequency'] * H:.3g} at its stiffest"
     if p["exchange"] is not None:
         yield "scheme", _exchange(**p["exchange"])
+    seconds = p["cost"]["seconds"]
+    about = "" if seconds is None else f", about {seconds:.2g} s with the companion run"
+    yield "run", f"{p['cost']['macro_steps']} macro steps{about}"
 
 
 def _listed(*parts: tuple[str, float | None]) -> str:

@@ -1,4 +1,4 @@
-"""Predict stability and resolution of a scene before a run.
+"""Predict stability and cost of a scene before a run.
 
 The scene is linearised where it is stiffest: the hardening spring at the largest deflection and the contact law at the
 largest penetration that the energy at first contact allows; a softening spring at rest.
@@ -12,20 +12,24 @@ impulse and S_j its j-fold integral (S₋₁ = Ṡ), a step of size h under F(τ
     ξ(h) = (Ṡ + cS) ξ₀ + S ξ̇₀ + b Σ F_j S_{j+1}      ∫ξ, ∫∫ξ: each index one, two higher
     ξ̇(h) = −ω²S ξ₀ + Ṡ ξ̇₀ + b Σ F_j S_j
 
-Nothing here uses the bodies or the solvers of a run.
+Nothing here uses the bodies or the solvers of a run, but `cost_of`, which times them.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from ..monolithic.semi_discrete import ModalBeam, modal_beam
-from ..scene import Beam, Scene
+from ..run.companion import LONGER
+from ..run.outcome import RunStopped
+from ..run.runner import Simulation
+from ..scene import Beam, Scene, with_changes
 from ..scene.laws import depth
 from ..scene.linearised import contact_energy, spring_frequency, spring_stiffness
 from ..scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
@@ -37,8 +41,10 @@ THRESHOLD = 1e-3
 MOST_MODES = 128
 #: Modes with less than this share of 1/m_tip are left out: the tip neither excites nor shows them.
 _UNMOVED = 1e-12
-#: ωH up to which a mode is called resolved: 2π steps a period.
-RESOLVED = 1.0
+#: ωH up to which a mode is slow: 2π steps a period.
+_SLOW = 1.0
+#: Steps that are made to see how long one takes.
+_TIMED = 64
 #: The search for a critical macro step begins here, in units of 1/(rate of the contact).
 _SEARCH = 1e-2
 
@@ -58,7 +64,7 @@ def predict(scene: Scene) -> dict[str, Any]:
           linearised spring, 0 where it does not oscillate; ``contact_frequency`` of tip and spring top on the
           linearised contact law [rad/s];
         * ``tip_mass`` [kg]; ``impedance`` Z = √(KAG ρA) [N·s/m];
-        * ``modes`` of the beam, ``resolved_modes`` among them, with ωH ≤ `RESOLVED`, and ``static_shapes``, which are
+        * ``modes`` of the beam, ``slow_modes`` among them, with ωH ≤ 1, and ``static_shapes``, which are
           kept in addition if not all modes are;
         * ``exchange``: for a scheme that can be unstable, ``scheme``, ``degree``, ``spectral_radius`` at H,
           ``critical_step``, the smallest unstable H [s], and ``threshold`` of the spectral radius above 1, from which
@@ -69,7 +75,7 @@ def predict(scene: Scene) -> dict[str, Any]:
     beam = scene.beam
     modal = None
     pair = None
-    names = ("omega_1", "omega_max", "tip_mass", "resolved_modes", "modes", "static_shapes", "contact_frequency")
+    names = ("omega_1", "omega_max", "tip_mass", "slow_modes", "modes", "static_shapes", "contact_frequency")
     found: dict[str, Any] = {
         "estimates": _estimates(scene),
         "frequencies": [],
@@ -82,24 +88,21 @@ def predict(scene: Scene) -> dict[str, Any]:
     notes += [f"[{table}] is not our own body: its frequencies are not known beforehand" for table in scene.partners]
     if scene.accuracy is not None:
         notes.append(f"accuracy = {scene.accuracy:g} picks scheme and macro step by itself; this is about those given")
-    rates = {f"loads.{i} turns": load.rate for i, load in enumerate(scene.loads) if load.rate * H > RESOLVED}
     if scene.massless:
         notes.append("a quasi-static beam has no inertia and no step of its own: nothing to predict")
     elif beam is not None:
         reduced = _reduced(beam)
         modal = modal_beam(reduced)
         kept = reduced.modes_kept
-        resolved = int(np.sum(modal.omega[:kept] * H <= RESOLVED))
+        slow = int(np.sum(modal.omega[:kept] * H <= _SLOW))
         frequencies = modal.omega / (2.0 * math.pi)
         ends = (float(modal.omega[0]), float(modal.omega[-1]), 1.0 / modal.inverse_tip_mass)
-        found |= dict(zip(names, (*ends, resolved, kept, len(modal.omega) - kept), strict=False))
+        found |= dict(zip(names, (*ends, slow, kept, len(modal.omega) - kept), strict=False))
         found["frequencies"] = frequencies[:3].tolist()
         if reduced is not beam:
             notes.append(f"predicted with the lowest {MOST_MODES} modes of the beam")
         if beam.integrator == "midpoint":
             notes.append("predicted for exact modes; the midpoint rule adds no energy of its own")
-        if not resolved:
-            rates["the beam's lowest mode turns"] = ends[0]
     if modal is not None:
         pair = linear_pair(scene, modal)
     if pair is not None:
@@ -117,12 +120,25 @@ def predict(scene: Scene) -> dict[str, Any]:
             }
     elif not notes:
         notes.append("nothing to couple: a scene with one body and no stop under its tip")
-    notes += [
-        f"the motion is not resolved: {what} {rate * H:.3g} rad in a macro step; H <= {RESOLVED / rate:.3g} s resolves "
-        "it"
-        for what, rate in rates.items()
-    ]
     return found | {"notes": notes}
+
+
+def cost_of(scene: Scene) -> dict[str, float | None]:
+    """Return how many ``macro_steps`` a run of ``scene`` takes, and about how many ``seconds`` with its companion.
+
+    Some steps are made, and timed; ``None`` where they fail. Raises the errors of `springbeam.Simulation`.
+    """
+    scene = with_changes(scene, accuracy=None)
+    number = math.ceil(scene.duration / scene.coupling.H)
+    with Simulation(scene) as simulation:
+        times = [perf_counter()]
+        try:
+            while len(times) <= _TIMED and simulation.step():
+                times.append(perf_counter())
+        except RunStopped:
+            return {"macro_steps": number, "seconds": None}
+    a_step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    return {"macro_steps": number, "seconds": (1.0 + 1.0 / LONGER) * number * a_step}
 
 
 def _estimates(scene: Scene) -> dict[str, float | None]:
