@@ -183,7 +183,7 @@ def installed(monkeypatch, *faults):
     """
     script = Script(faults)
     release()  # what is kept would not be loaded
-    monkeypatch.setattr(fmus, "_opened", lru_cache(fmus._opened.__wrapped__))  # what is loaded is not scripted
+    monkeypatch.setattr(fmus, "opened", lru_cache(fmus.opened.__wrapped__))  # what is loaded is not scripted
     monkeypatch.setattr(functions, "Library", type("Scripted", (Library,), {"_script": script}))
 
     def watch(owner, name, where):
