@@ -30,7 +30,7 @@ HEAD = (
     "",
     "compared",
     "wrong, warned",
-    "wrong, unwarned (twice as far)",
+    "wrong without a warning (by twice the bound)",
     "right, warned",
     "stopped, refused",
     "doSteps",
@@ -168,6 +168,6 @@ def lines(runs):
             median = statistics.median(ratios)
             shown += [
                 "",
-                f"{name} takes {median:.2g} times the steps that it needs (median), at most {max(ratios):.2g}.",
+                f"{name} takes {median:.2g} times as many steps as would do (median), at most {max(ratios):.2g}.",
             ]
     return shown
