@@ -1,8 +1,6 @@
 // Value references of FMI 3.0: the table's variables, the time, then the first derivatives of inputs, then the second.
 #pragma once
 
-#include <cstddef>
-
 #include "table.hpp"
 
 namespace fmi {
@@ -13,9 +11,6 @@ struct Reference3 {
 };
 
 inline unsigned time_index() { return static_cast<unsigned>(table().variables.size()); }
-inline unsigned reference3(std::size_t index, int order = 0) {
-  return static_cast<unsigned>(index) + static_cast<unsigned>(order) * (time_index() + 1);
-}
 inline Reference3 meant_by(unsigned reference) {
   const unsigned order = reference / (time_index() + 1);
   // What is too large is no variable's index either.

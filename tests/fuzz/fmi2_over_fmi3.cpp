@@ -28,6 +28,10 @@ struct Adapter {
   double reached = 0.0;
 };
 
+fmi3ValueReference reference3(unsigned index, int order) {
+  return index + static_cast<unsigned>(order) * (fmi::time_index() + 1);
+}
+
 Adapter* adapter(fmi2Component c, const char* function) {
   static thread_local Adapter none;
   Adapter* const a = c ? static_cast<Adapter*>(c) : &none;
@@ -195,7 +199,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
   if (!vr || !order || !value) return refuse(a);
   for (size_t i = 0; i < n; ++i) {
     if (order[i] < 1 || order[i] > 2 || vr[i] >= fmi::time_index()) return refuse(a);
-    const unsigned r = fmi::reference3(vr[i], order[i]);
+    const unsigned r = reference3(vr[i], order[i]);
     const fmi3Status status = fmi3SetFloat64(a->c, &r, 1, value + i, 1);
     if (status != fmi3OK) return to2(status);
   }
@@ -241,7 +245,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean) {
   constexpr int most_events = 100;
   Adapter* const a = adapter(c, __func__);
-  const unsigned clock = fmi::reference3(fmi::time_index());
+  const unsigned clock = fmi::time_index();
   double began = 0.0;
   fmi3FMUState before = nullptr;
   fmi3Boolean event = false, end = false, early = true;
