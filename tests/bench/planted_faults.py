@@ -202,10 +202,11 @@ def main():
         if there is None:
             print(what)
             continue
-        text = (ROOT / path).read_text(encoding="utf-8")
-        (there.root / path).write_text(with_fault(text, line, column, token), encoding="utf-8")
+        planted = there.root / path
+        text = planted.read_text(encoding="utf-8")
+        planted.write_text(with_fault(text, line, column, token), encoding="utf-8")
         found = finds_native(there) if kind == "c++" else finds(there, covered.passing(path, line))
-        (there.root / path).write_text(text, encoding="utf-8")
+        planted.write_text(text, encoding="utf-8")
         print(f"{found or 'NOT FOUND'}: {what}", flush=True)
         missed += [what] * (not found)
     if there is not None:

@@ -117,17 +117,6 @@ def test_impacts_that_die_out_are_a_few_events_and_end_at_rest(spring):
     assert k.get("displacement") == pytest.approx(-0.1 + 0.1 * 0.3**2 / 2, rel=1e-9)
 
 
-def test_a_state_saved_in_event_mode_is_one_between_steps_where_there_is_no_event_mode(case):
-    k = case.instance(events=True).start()
-    plain = started(case, events=False)
-    assert k.call("EnterStepMode") == OK
-    k.step(0.0, 0.1)
-    assert k.call("EnterEventMode") == OK
-    plain.restore(plain.deserialized(k.serialized()))
-    assert plain.outputs() == k.outputs()
-    plain.step(0.1, 0.1)
-
-
 def test_event_mode_takes_inputs_and_no_parameters(spring):
     """An input acts after an update, too."""
     k = spring.instance(events=True).start(mass=2.0)

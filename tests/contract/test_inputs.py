@@ -102,29 +102,6 @@ def test_contact_force_is_ignored_by_the_law_inside(spring):
     assert plain.outputs() == pressed.outputs()
 
 
-def test_a_derivative_of_the_tip_that_is_zero_is_none(spring):
-    """Importers write every input at each step: what an input reads changes nothing when it is written."""
-    law = {"contact_law": 2, "mass": 1e9, "linear_stiffness": 0.0, "compliance_stiffness": 1e3}
-    reactions = []
-    for what, *derivatives in (("displacement",), ("displacement", 0.0), ("displacement", 0.25),
-                               ("displacement", 0.0, 2.0), ("velocity", 2.0)):  # fmt: skip
-        k = spring.running(**law, compliance_exponent=1.0)
-        k.set("tip_displacement", -0.1)
-        k.set("tip_velocity", -0.2)
-        token = k.state()
-        for order, value in enumerate(derivatives, 1):
-            k.derive(f"tip_{what}", order, value)
-        copied = k.deserialized(k.serialized())  # what is set belongs to the state
-        k.restore(token)
-        k.restore(copied)
-        k.step(0.0, 0.1)
-        reactions.append(k.get("reaction"))
-        k.set("tip_displacement", -0.1)
-        k.step(0.1, 0.1)
-        assert k.get("reaction") == pytest.approx(120.0, rel=1e-6)  # by the velocity that stays
-    assert reactions == pytest.approx([120.0, 120.0, 75.0, 110.0, 110.0], rel=1e-6)
-
-
 DAMPED_LAW = {"contact_law": 2, "compliance_stiffness": 100.0, "compliance_exponent": 1.0, "compliance_damping": 0.5}
 
 
@@ -140,20 +117,6 @@ def test_derivatives_of_inputs_are_seen_as_soon_as_they_are_set(spring):
     acceleration = -(0.1 + force) + 3.0
     rate = 100.0 * rise * (1.0 + 0.5 * rise) + 5.0 * 0.5 * acceleration
     assert k.derivative("reaction") == pytest.approx(rate)
-
-
-def test_a_tip_that_is_not_set_after_a_step_is_where_that_left_it(spring):
-    """C = k δ (1 + χ δ̇) as above, for a top that stays at 0.1 m, and a tip at 0.05 m − 0.1 s · 0.2 m/s."""
-    k = spring.running(**DAMPED_LAW, mass=1e12, displacement=0.1, tip_displacement=0.05, tip_velocity=-0.2)
-    k.step(0.0, 0.1)
-    assert k.get("reaction") == pytest.approx(7.0 * 1.1)
-    token = k.state()
-    k.set("tip_displacement", 0.0)
-    k.restore(token)
-    k.set("external_force", 0.0)  # which makes the outputs due
-    assert k.get("reaction") == pytest.approx(7.0 * 1.1)
-    k.set("tip_velocity", 1.0)
-    assert k.get("reaction") == pytest.approx(7.0 * 0.5)
 
 
 @pytest.mark.parametrize("arrives", ["tip_displacement", "tip_velocity", "tip_velocity_forecast", "tip_response"])

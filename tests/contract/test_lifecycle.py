@@ -154,21 +154,6 @@ def test_reset_starts_all_over(case):
         assert used.outputs() == fresh.outputs()
 
 
-@pytest.mark.parametrize("version", ["3.0"])
-def test_event_mode_applies_an_impulse_at_once_and_once(case):
-    k = case.instance(events=True).start()
-    flags = [ct.byref(ct.c_bool(True)) for _ in range(5)]
-    mass = k.get("tip_mass") if case.name == "beam" else 1.0
-    after = k.get(case.velocity) + 0.5 / mass
-    k.set(case.impulse, 0.5)
-    for _ in range(2):
-        assert k.call("UpdateDiscreteStates", *flags, ct.byref(ct.c_double())) == OK
-        assert [flag._obj.value for flag in flags] == [False] * 5
-        assert k.get(case.velocity, case.impulse) == [pytest.approx(after), 0.0]
-    assert k.try_step(0.0, 0.01) == ERROR
-    assert "not allowed in event mode" in k.message
-
-
 def test_an_output_that_inputs_drive_out_of_range_is_an_error(beam):
     k = beam.running()
     k.set("tip_load", 1e308)

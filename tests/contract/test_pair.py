@@ -242,41 +242,6 @@ def test_pair_with_the_law_integrated_under_the_extrapolated_tip_converges_at_fi
     assert 1.5 < errors[0] / errors[1] < 5.0  # H ratio 2.5: first order
 
 
-def test_a_step_that_was_tried_is_the_step_of_an_instance_that_has_tried_none(beam, spring):
-    """Each step ends where the last trial of the step before has ended; another instance integrates it."""
-    pair = Pair(beam, spring, 1e-3).start()
-    touching = 0
-    for _ in range(60):
-        other = spring.running()
-        other.restore(other.deserialized(pair.spring.serialized()))
-        time = pair.time
-        pair.run(time + pair.size)
-        other.step(time, pair.size)
-        for name in pair.connected:
-            other.set(name, pair.beam.get(name))
-        touching += other.get("reaction") > 0.0
-        assert other.outputs() == pair.spring.outputs()
-        other.free()
-    assert touching > 10
-
-
-def test_a_last_step_of_rounding_is_made_under_the_held_force(beam, spring):
-    size = 1e-3
-    pair = Pair(beam, spring, size).start()
-    twin = Pair(beam, spring, size).start()
-    for one in (pair, twin):
-        one.run(0.05)
-    before = pair.energy()
-    for k in (pair.beam, pair.spring):
-        k.step(pair.time, 3e-14)
-    pair.exchange()
-    assert pair.energy() == pytest.approx(before, abs=1e-12)
-    assert pair.spring.get("reaction") == twin.spring.get("reaction")
-    pair.time += 3e-14
-    assert pair.run(0.1)[1] == pytest.approx(twin.run(0.1)[1], abs=1e-10)  # 1 m/s times the rounding, and its effect
-    pair.spring.step(pair.time, size * (1 + 1e-9))  # as a tool's times may have it
-
-
 def warnings(pair):
     return [message for k in (pair.beam, pair.spring) for status, _, message in k.messages if status == 1]
 

@@ -146,23 +146,6 @@ def test_a_state_carries_its_phase_parameters_and_time(case, entered):
         assert finish(one) == expected
 
 
-@pytest.mark.parametrize("same", [True, False], ids=["same parameters", "others"])
-def test_a_state_carries_the_set_up_of_the_run_and_derivatives_of_inputs(case, same):
-    """When the run ends, its tolerance, and both orders: bytes in an instance that is built without them."""
-    loose = {"relative_tolerance": 1e-3, "absolute_tolerance": 1e-3} if case.name == "spring" else {}
-    k = case.moving(**loose, stop_time=0.15, tolerance=1e-13)
-    other = case.moving(**loose) if same else case.running(tolerance=1e-13)
-    k.set(case.force, 0.3)
-    k.derive(case.force, 1, 50.0)
-    k.derive(case.force, 2, -700.0)
-    other.restore(other.deserialized(k.serialized()))
-    for one in (k, other):
-        one.step(0.0, 0.1)
-    assert other.outputs() == k.outputs()
-    assert other.try_step(0.1, 0.1) == ERROR
-    assert "goes past the stop time 0.15" in other.message
-
-
 def damaged(blob, position):
     return blob[:position] + bytes([blob[position] ^ 0x55]) + blob[position + 1 :]
 

@@ -110,43 +110,6 @@ def with_steps_inside(kind, inner, **parameters):
     return {"parameters": {"m": M2, "k": K, "c": C, "lie": oscillator.LIES[kind], "inner": inner, **parameters}}
 
 
-class Unknown(SpringDamper):
-    """A body of one's own that does not say how stiff it is."""
-
-    def stiffness(self, displacement):
-        return None
-
-
-#: By how much a body may leave its seat too early or too late, of steps of 30 ms [s]: trial steps that tell the
-#: acceleration of the FMU are of second order.
-SEATED = {"element": 1e-7, "function": 1e-7, "fmu": 1e-6}
-
-
-@pytest.mark.parametrize("degree", [0, 1, 2])
-@pytest.mark.parametrize("kind", SEATED)
-def test_a_damped_body_leaves_its_seat_when_its_load_does(fmu, kind, degree):
-    """N = 30 cos(πt/2) N, whatever k and c are: it vanishes at 1 s. Ends have a mismatch of velocities until then."""
-    started = {"displacement": 0.01, "velocity": -1.0}
-    body = {"element": "spring_damper", "mass": M1, "stiffness": K, "damping": 50.0, **started}
-    if kind == "fmu":
-        parameters = {"m": M1, "k": K, "c": 50.0, "x0": 0.01, "v0": -1.0}
-        body = {**oscillator.ALL, "fmu": fmu(), "parameters": parameters}
-    load = {"on": "tip", "signal": "harmonic", "frequency": 0.25, "amplitude": -30.0, "phase": np.pi / 2}
-    scene = scene_from_dict(
-        {
-            "time": {"t_end": 1.2},
-            "beam": body,
-            "stop": {"position": 0.0, "restitution": 0.0},
-            "loads": [load],
-            "coupling": {"degree": degree, "macro_step": 0.03},
-        }
-    )
-    own = {"upper": Unknown(M1, K, 50.0, **started)} if kind == "function" else {}
-    run = simulate(scene, **own)
-    assert kinds(run) == ["seated", "separation"]
-    assert run.events[1].time == pytest.approx(1.0, abs=SEATED[kind])
-
-
 @pytest.mark.parametrize("without", WITHOUT)
 def test_link_and_tie_are_exact_and_keep_the_interface_energy(fmu, without):
     """An end that takes no impulse starts as fast as the other."""
@@ -232,21 +195,6 @@ def test_an_fmu_that_cannot_be_used_is_refused_before_the_run(fmu, what):
     with pytest.raises((FmuError, SceneError)) as caught:
         simulate(pair(fmu(**made), **case))
     assert any(all(text in line for text in said) for line in str(caught.value).splitlines())
-
-
-def test_an_fmu_that_refuses_short_steps_is_used_with_long_ones(fmu):
-    """The check tries shorter steps than those of the run."""
-    parameters = {"m": M2, "k": K, "c": C, "lie": oscillator.LIES["short"]}
-    run = simulate(pair(fmu(), spring={"parameters": parameters}, coupling={"macro_step": 1e-3}))
-    assert error(run, linked) < 1e-12
-
-
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_an_fmu_knows_when_the_run_ends(fmu, version):
-    """It refuses steps beyond its stop time, and all if it has none."""
-    spring = {"parameters": {"m": M2, "k": K, "lie": oscillator.LIES["past"]}}
-    run = simulate(pair(fmu(version=version), spring=spring, coupling={"degree": 0}))
-    assert (run.summary["status"], run.time[-1]) == ("done", 1.0)
 
 
 #: Contacts between a mass and what is below: their tables, the most that displacements [m] and forces [N] may miss by

@@ -11,7 +11,7 @@ from references import reference
 
 from springbeam.motion.events import EventKind
 from springbeam.run.runner import run_in_memory
-from springbeam.scene import SceneError, scene_from_dict
+from springbeam.scene import scene_from_dict
 from springbeam.scene.statics import tip_compliance
 
 G = 9.81
@@ -107,25 +107,6 @@ def test_a_spring_that_would_rest_below_its_stop_rests_on_it(lower, law):
         beside = reference(what)
         assert beside.foundation_force[-1] == pytest.approx(run.foundation_force[-1], rel=1e-8)
         assert {event.kind for event in beside.events} <= {EventKind.IMPACT}
-
-
-def test_a_softening_spring_does_not_start_at_rest_at_an_unstable_height_or_past_its_hilltop():
-    """No height holds 0.6 N, more than 2/3 √(1/3) N, but 1.22 m, where the spring pushes away; the stop is past −1 m.
-
-    The stop pushes with −1.5 + 1.5³ + 0.6 = 2.475 N there; a pulse of 3 N lifts the top where that is 0.
-    """
-    scene = scene_from_dict({
-        "time": {"t_end": 2.0, "initial_state": "static"},
-        "spring": {"mass": 1.0, "linear_stiffness": 1.0, "cubic_stiffness": -1.0, "external_force": -0.6},
-        "stop": {"position": -1.5, "restitution": 0.5},
-        "loads": [{"on": "spring", "signal": "half_sine", "amplitude": 3.0, "start": 1.0, "duration": 2.0}],
-    })  # fmt: skip
-    with pytest.raises(SceneError, match=r"would rest on \[stop\] position = -1.5, beyond .* = 1 m"):
-        run_in_memory(scene)
-    event = reference(scene).events[0]
-    assert event.kind is EventKind.UNSEATED
-    assert event.y == pytest.approx(-1.5, rel=1e-12)
-    assert event.time == pytest.approx(1.0 + 2.0 / np.pi * np.arcsin(2.475 / 3.0), rel=1e-9)
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-3])

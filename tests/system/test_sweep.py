@@ -9,7 +9,7 @@ from springbeam.motion.events import Event, EventKind
 from springbeam.run.runner import run_in_memory
 from springbeam.scene import load_scene, with_changes
 from springbeam.studies import sweep
-from springbeam.studies.design import design, parse_axis, with_keys
+from springbeam.studies.design import parse_axis, with_keys
 from springbeam.studies.metrics import METRICS as METRICS_THERE_ARE
 
 METRICS = ("y_min", "first_stop_impact", "energy_residual")
@@ -42,18 +42,6 @@ def test_an_axis(text, values):
     axis = parse_axis(text)
     assert axis.values == pytest.approx(values, rel=1e-14) if isinstance(values[0], float) else axis.values == values
     assert [type(v) for v in axis.values] == [type(v) for v in values]
-
-
-def test_a_latin_hypercube_has_one_sample_in_each_of_its_rows():
-    axes = [parse_axis("spring.mass=1:1000:log"), parse_axis("spring.damping=0:1"), parse_axis("beam.n_elements=1,2,4")]
-    values = design(axes, 30, 7, "latin_hypercube")
-    rows = np.sort(np.floor(30.0 * np.log([v[0] for v in values]) / np.log(1000.0)))
-    np.testing.assert_array_equal(rows, np.arange(30))
-    assert sorted(v[2] for v in values) == [1] * 10 + [2] * 10 + [4] * 10
-    assert design(axes, 30, 7, "latin_hypercube") == values
-    assert design(axes, 30, 8, "latin_hypercube") != values
-    by_chance = design(axes, 300, 7, "random")
-    assert np.mean([v[1] for v in by_chance]) == pytest.approx(0.5, abs=3.0 / np.sqrt(12.0 * 300.0))
 
 
 def test_each_metric_is_the_number_that_it_names():

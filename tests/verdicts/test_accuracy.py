@@ -11,9 +11,7 @@ from scenes import scene_from_dict
 
 from springbeam import RunStopped, SceneError, load_scene, with_changes
 from springbeam.results.distance import distance
-from springbeam.results.recording import MemoryRecorder
 from springbeam.run import accuracy as search
-from springbeam.run.runner import run
 from springbeam.run.simulate import simulate
 from springbeam.scene.files import tomllib
 
@@ -99,14 +97,6 @@ def test_curves_that_a_campaign_found_wrong_between_right_rows_warn(name):
     assert found["warns"]
 
 
-@pytest.mark.parametrize("name", FOUND["parts late"])
-def test_ends_that_close_a_little_before_they_part_do_part(name):
-    scene = scene_from_dict(FOUND["parts late"][name])
-    run = simulate(with_changes(scene, coupling={"degree": 0}))
-    finer = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": scene.coupling.H / 8.0}))
-    assert distance(run, finer, np.inf).motion <= 5e-3
-
-
 @pytest.mark.parametrize("name", FOUND["hard"])
 def test_runs_agree_where_rounding_decides(name):
     tables = dict(FOUND["hard"][name])
@@ -120,19 +110,6 @@ def test_runs_agree_where_rounding_decides(name):
 
 
 # -- a scene that asks for an accuracy, in the studies ---------------------------------------------------------------
-
-ASKING = {
-    "accuracy": 1e-4,
-    "time": {"t_end": 0.05},
-    "beam": {"young_modulus": 100.0, "shear_modulus": 100.0, "n_elements": 6, "initial_velocity_slope": -1.0},
-    "spring": {"linear_stiffness": 3.0},
-}
-
-
-def test_what_runs_a_scene_as_it_is_wants_the_accuracy_picked():
-    scene = scene_from_dict(ASKING)
-    with pytest.raises(SceneError, match=r"accuracy = 0\.0001"):
-        run(scene, MemoryRecorder(scene))
 
 
 @pytest.mark.parametrize(

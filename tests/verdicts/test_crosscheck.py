@@ -12,7 +12,6 @@ from draw import USUAL, drawn, scene_dict
 from springbeam import load_scene, with_changes
 from springbeam.monolithic import event_driven
 from springbeam.scene import scene_from_dict
-from springbeam.studies import comparison
 from springbeam.studies.comparison import _judged, compare
 from springbeam.studies.crosscheck import crosscheck
 
@@ -125,12 +124,6 @@ def test_quick_compares_the_first_quarter(here, unpainted):
     assert [float(row["error"]) for row in rows] == [row["error"] for row in found["quantities"]]
 
 
-def test_quick_counts_from_the_arrival_of_the_tip():
-    """It arrives at 0.1 s."""
-    late = with_changes(SOFT, beam={"initial_deflection_slope": 0.1, "n_elements": 3}, time={"t_end": 0.3})
-    assert crosscheck(late, quick=True).document["t_end"] == pytest.approx(0.15, rel=1e-14)
-
-
 def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
     """Results stay as they are until they are to be replaced."""
     out = tmp_path / "both"
@@ -144,19 +137,6 @@ def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
         monkeypatch.setattr(event_driven, "integrate", heavier)
         assert command(*arguments, *options).exit_code == code
     assert (out / "crosscheck.png").stat().st_size > 10_000
-
-
-def test_a_right_run_that_rests_away_from_its_events_agrees():
-    """The bound of a_tip was a share of what is left there, 3e-13 m/s², and the run differed."""
-    found = compare(load_scene("beam-on-stop", ["time.t_end=0.05"]))
-    assert [row["quantity"] for row in found["quantities"] if not row["passed"]] == []
-    assert found["verdict"] != "differs"
-
-
-def test_a_right_run_from_rest_under_a_load_that_begins_at_zero_agrees():
-    """The reference took the first step for one in which nothing moves: its rows there were wrong by 7e-6."""
-    scene = load_scene("vibro-impact", ["time.t_end=0.003", "beam.n_elements=6"])
-    assert compare(scene)["verdict"] == "agrees"
 
 
 #: A tenth of scenes that a campaign draws, at coarse steps, and the verdict on each. In the first, the waves of impacts
@@ -187,16 +167,3 @@ def test_a_reference_of_a_beam_that_is_a_little_heavier_fails_at_coarse_steps(mo
 
     monkeypatch.setattr(event_driven, "integrate", heavier)
     assert compare(tenth(number))["verdict"] == "differs"
-
-
-def test_a_third_run_is_made_only_where_two_do_not_agree_with_the_reference(monkeypatch):
-    """Without it a comparison has a run and its companion, whose bound is that of steps 2.3 times as long."""
-    sizes = []
-    simulated = comparison.run_in_memory
-    monkeypatch.setattr(comparison, "run_in_memory", lambda s: sizes.append(s.coupling.H) or simulated(s))
-    H = tenth(8).coupling.H
-    compare(tenth(8))
-    assert sizes == [H, H / 4]
-    sizes.clear()
-    compare(with_changes(SOFT, time={"t_end": 0.05}, coupling={"macro_step": 1e-3}))
-    assert sizes == [1e-3]
