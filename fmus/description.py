@@ -209,6 +209,7 @@ class Description:
                 else:
                     names = v["initial_dependencies"]
                     known = [[name, 0] for name in (self._settable() if names is None else names)]
+                    known += [[name, order] for name, order in v["dependencies"] if order > 0]
                 on = {(self.number[name], order) for name, order in known if self.version == 3 or order == 0}
                 numbers = {str(j + 1) if self.version == 2 else self._reference3(j, order) for j, order in on}
                 unknown.set("dependencies", " ".join(sorted(numbers, key=int)))
@@ -221,6 +222,7 @@ def build_description(table: dict[str, Any], source_files: list[str]) -> ET.Elem
     files = ET.SubElement(configuration, "SourceFileSet", language="C++17")
     for name in source_files:
         ET.SubElement(files, "SourceFile", name=name)
+    ET.SubElement(files, "IncludeDirectory", name=".")
     return root
 
 

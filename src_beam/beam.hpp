@@ -63,7 +63,7 @@ class Loads {
     count = 11
   };
   static constexpr std::array<const char*, count> names{
-      "distributed_load", "distributed_load_1", "distributed_load_2",  "distributed_load_3",
+      "distributed_load", "distributed_load_x", "distributed_load_x2", "distributed_load_x3",
       "point_force[1]",   "point_force[2]",     "point_force[3]",      "point_force[4]",
       "tip_load",         "base_acceleration",  "tip_load_coefficient"};
   static bool is_point(std::size_t shape);  ///< or one of those in between

@@ -40,6 +40,8 @@ class Spring::Step {
         happened_ = false;
         if (state_.seated != 0.0)
           stay();
+        else if (rests())
+          rest();
         else
           fly();
       }
@@ -116,6 +118,23 @@ class Spring::Step {
     meeting_ = false;
   }
 
+  /// Whether nothing moves the top, out of reach of a tip, for the rest of the step: for as long as that may be.
+  bool rests() const {
+    const double held = spring_.equation_.spring_force(state_.y), &force = now_.force[0];
+    const bool constant = now_.force[1] == 0.0 && now_.force[2] == 0.0;
+    const bool out_of_reach = !parameters_.compliant() || (depth_ < 0.0 && now_.tip[1] == 0.0 && now_.tip[2] == 0.0);
+    return state_.z == 0.0 && constant && out_of_reach &&
+           std::abs(force - held) <= 4.0 * epsilon * (std::abs(force) + std::abs(held));
+  }
+
+  void rest() {
+    const double left = size_ - t_;
+    state_.integral_2 += (state_.integral + state_.y * left / 2) * left;
+    state_.integral += state_.y * left;
+    t_ = size_;
+    released_ = meeting_ = happened_ = false;
+  }
+
   void fly() {
     const double gap = parameters_.stop_enabled ? state_.y - parameters_.stop_position : 1.0;
     if (work_ >= most_work) fail("it spans too much of the motion", state_.y, t_);
@@ -164,7 +183,9 @@ class Spring::Step {
 };
 
 Spring::Spring(const Parameters& p)
-    : parameters_((check(p), p)), equation_(p), flight_(equation_, parameters_), state_{p.displacement, p.velocity} {}
+    : parameters_((check(p), p)), equation_(p), flight_(equation_, parameters_), state_{p.displacement, p.velocity} {
+  state_.seated = can_rest() ? 1.0 : 0.0;
+}
 
 Spring::Reached Spring::step_to_event(double size, const Inputs& inputs, double time, bool to_event) {
   if (size < smallest_step)
@@ -210,6 +231,15 @@ void Spring::observe(const Loads& loads, bool extrapolated) {
 void Spring::apply_impulse(double impulse) {
   state_.z += impulse / parameters_.mass;
   if (state_.z != 0.0) state_.seated = 0.0;
+}
+
+/// The sign of the force that holds the top decides, or what was where that is rounding.
+bool Spring::seated() const {
+  if (!can_rest()) return false;
+  const Loads now{{state_.observed.force, 0.0, 0.0}, tip()};
+  const double N = equation_.holding_force(state_.y, now, depth() > 0.0, depth())[0];
+  const double terms = std::abs(state_.observed.force) + std::abs(spring_force()) + std::abs(reaction());
+  return std::abs(N) > 8.0 * epsilon * terms ? N > 0.0 : state_.seated != 0.0;
 }
 
 double Spring::acceleration() const {

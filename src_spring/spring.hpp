@@ -64,12 +64,13 @@ class Spring {
   double velocity() const { return state_.z; }                          ///< z [m/s]
   double displacement_integral() const { return state_.integral; }      ///< ∫ y dτ over the last step [m·s]
   double displacement_integral_2() const { return state_.integral_2; }  ///< ∫∫ y dτ dτ over the last step [m·s²]
-  double stop_force() const { return state_.stop_force; }           ///< mean of N over the last step, law inside [N]
-  double stop_impulse() const { return state_.stop_impulse; }       ///< sum of stop impulses over the last step [N·s]
-  double dissipated_energy() const { return state_.dissipated; }    ///< by α_s and χ since the start [J]
-  double load_work() const { return state_.load_work; }             ///< of f_s and −m a since the start [J]
-  double impact_loss() const { return state_.impact_loss; }         ///< in stop impacts since the start [J]
-  bool seated() const { return state_.seated != 0.0; }              ///< held on the foundation by the law inside
+  double stop_force() const { return state_.stop_force; }         ///< mean of N over the last step, law inside [N]
+  double stop_impulse() const { return state_.stop_impulse; }     ///< sum of stop impulses over the last step [N·s]
+  double dissipated_energy() const { return state_.dissipated; }  ///< by α_s and χ since the start [J]
+  double load_work() const { return state_.load_work; }           ///< of f_s and −m a since the start [J]
+  double impact_loss() const { return state_.impact_loss; }       ///< in stop impacts since the start [J]
+  /// Held on the foundation by the law inside, under the inputs at the end of the last step, or as observed since.
+  bool seated() const;
   double internal_steps() const { return state_.steps; }            ///< of flights, since the start
   int impacts() const { return static_cast<int>(state_.impacts); }  ///< on the foundation inside, since the start
   double last_impact() const { return state_.last_impact; }         ///< when [s]; −1: there was none
@@ -94,7 +95,7 @@ class Spring {
     double integral = 0.0, integral_2 = 0.0;
     double dissipated = 0.0, impact_loss = 0.0, load_work = 0.0;
     double stop_force = 0.0, stop_impulse = 0.0;
-    double seated = 0.0;  ///< 1 on the foundation
+    double seated = 0.0;  ///< 1 on the foundation, where nothing says otherwise since
     double impacts = 0.0, last_impact = -1.0;
     double steps = 0.0;    ///< internal ones, since the start
     double meeting = 0.0;  ///< 1: the last step ended early where contact begins or ends
@@ -112,6 +113,7 @@ class Spring {
  private:
   class Step;
   void observe(const Loads& loads, bool extrapolated);
+  bool can_rest() const { return parameters_.stop_enabled && state_.y == parameters_.stop_position && state_.z == 0.0; }
   double depth() const { return parameters_.compliant() ? state_.y - tip()[0] : -1.0; }
   bool finite() const;
 

@@ -127,8 +127,14 @@ void Component::serialize(void* state, void* bytes, std::size_t size) {
 void Component::deserialize(const void* bytes, std::size_t size, void** state) {
   require(bytes, "serializedState");
   require(state, "the FMU state");
+  Snapshot read = deserialized({static_cast<const char*>(bytes), size}, instance.n_values());
+  try {
+    instance.check(read);
+  } catch (const std::exception& e) {
+    throw std::invalid_argument(std::string("the bytes are not a saved state of this FMU: ") + e.what());
+  }
   // Purely an output, unlike get_state's: importers leave anything in it.
-  *state = keep(deserialized({static_cast<const char*>(bytes), size}, instance.n_values()));
+  *state = keep(std::move(read));
 }
 
 void Component::refuse_all(std::size_t n, const char* type) const {

@@ -23,10 +23,13 @@ double finite(const Variable& v, double value, const char* why = " is not finite
 
 constexpr const char* too_large = " is not finite: the inputs are too large";
 
+/// @throws std::invalid_argument if it is not finite, Discarded if it is out of range
 void require_allowed(const Variable& v, double value) {
   finite(v, value);
-  if (value <= 0.0 && v.min == std::numeric_limits<double>::min()) refuse(v, value, " is not > 0");
-  if (value < v.min || value > v.max) refuse(v, value, " is not in [" + number(v.min) + ", " + number(v.max) + "]");
+  if (value >= v.min && value <= v.max) return;
+  const bool zero = value <= 0.0 && v.min == std::numeric_limits<double>::min();
+  throw Discarded("'" + v.name + "' = " + number(value) +
+                  (zero ? " is not > 0" : " is not in [" + number(v.min) + ", " + number(v.max) + "]"));
 }
 
 bool is_setting(const Variable& v) { return v.causality == Causality::parameter || v.exact; }
@@ -63,6 +66,7 @@ void Instance::setup(double start, double stop, double tolerance) {
   progress.time = start;
   progress.stop_time = stop;
   progress.tolerance = tolerance > 0.0 && tolerance < 1.0 ? tolerance : 0.0;
+  built_ = false;  // it may be, as outputs can be read before
 }
 
 void Instance::ensure_built() {
@@ -120,10 +124,12 @@ const Variable& Instance::variable(unsigned reference, Type type, const char* wh
 double Instance::get(unsigned reference, Type type) {
   const Variable& v = variable(reference, type, "get");
   if (!v.get || (progress.phase == instantiated && v.exact)) return values_[place_[reference]][0];
-  if (progress.phase == instantiated) {
-    throw std::invalid_argument("'" + v.name + "' is not known before initialization mode");
+  if (progress.phase != instantiated) return finite(v, evaluated(v), too_large);
+  try {  // as it would be at the start; what else is to be set may be missing
+    return finite(v, evaluated(v), too_large);
+  } catch (const std::exception& e) {
+    throw Discarded(e.what());
   }
-  return finite(v, evaluated(v), too_large);
 }
 
 const Variable& Instance::continuous_input(unsigned reference, const char* what) const {
@@ -135,8 +141,10 @@ const Variable& Instance::continuous_input(unsigned reference, const char* what)
 void Instance::set(unsigned reference, Type type, double value) {
   const Variable& v = variable(reference, type, "set");
   if (v.get && !v.exact) throw std::invalid_argument("'" + v.name + "' is calculated and cannot be set");
-  if (is_setting(v) && (progress.phase & ~(instantiated | initialization)) != 0)
+  if (is_setting(v) && (progress.phase & ~(instantiated | initialization)) != 0) {
+    if (value == values_[place_[reference]][0]) return;  // importers write all that they know
     throw std::invalid_argument("'" + v.name + "' can only be set before the end of initialization mode");
+  }
   require_allowed(v, value);
   values_[place_[reference]][0] = value;
   changed(place_[reference]);
@@ -174,6 +182,7 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
   const Variable& by = variable(place, Type::real, "differentiate by");
   if (of.causality != Causality::output) throw std::invalid_argument("'" + of.name + "' is not an output");
   const bool starting = progress.phase == initialization;
+  if (by.consumed || of.discrete) return 0.0;  // an impulse acts in the next step
   if (!by.continuous_input() && !(is_setting(by) && starting && order == 0))
     throw std::invalid_argument("'" + by.name + "' is not a continuous input");
   const auto& at_start = of.initial_dependencies;
@@ -198,6 +207,8 @@ double Instance::difference(const Variable& of, unsigned known, std::size_t orde
       value = there;
       changed(place_[known]);
       return std::pair{there, evaluated(of)};
+    } catch (const Discarded&) {
+      return here;
     } catch (const std::invalid_argument&) {
       return here;  // that side is out of bounds, its own or those that other parameters set
     }
@@ -218,16 +229,23 @@ Model::Reached Instance::step(double time, double size, bool to_event) {
   if (!std::isfinite(size) || size <= 0.0) {
     throw std::invalid_argument("communicationStepSize = " + number(size) + ": must be finite and > 0");
   }
-  // Importers add up or multiply their times; both round.
+  // Importers add up or multiply their times, or count in other units; all that rounds. The step ends where they say,
+  // and has their size, but for what is too much of it.
+  constexpr double same = 1e-6, beside = 1e-3;
   const double rounding =
       64.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(time), std::abs(progress.time));
-  if (std::abs(time - progress.time) > 1e-9 * size + rounding) {
+  const double late = time - progress.time, end = time + size;
+  if (std::abs(late) > beside * size + rounding) {
     throw std::invalid_argument("currentCommunicationPoint = " + number(time) + ", but the slave is at " +
                                 number(progress.time));
   }
-  if (time + size > progress.stop_time + 1e-6 * size + 1e-9 * std::abs(progress.stop_time)) {
-    throw std::invalid_argument("a step from " + number(time) + " to " + number(time + size) +
-                                " goes past the stop time " + number(progress.stop_time));
+  if (end > progress.stop_time + beside * size + 1e-9 * std::abs(progress.stop_time)) {
+    throw std::invalid_argument("a step from " + number(time) + " to " + number(end) + " goes past the stop time " +
+                                number(progress.stop_time));
+  }
+  if (std::abs(late) > same * size + rounding) {
+    time = progress.time;
+    size = end - time;
   }
   evaluate();
   Model::Reached reached{};
@@ -242,7 +260,7 @@ Model::Reached Instance::step(double time, double size, bool to_event) {
   }
   refused_.reset();
   drop_used(true);
-  progress.time = time + reached.size;
+  progress.time = reached.size == size ? end : time + reached.size;
   return reached;
 }
 
@@ -273,6 +291,23 @@ void Instance::save(Snapshot& s) {
   s.values = values_;
   s.numerics.clear();
   if (built_) model_->save(s.numerics);
+}
+
+void Instance::check(const Snapshot& s) const {
+  const Progress& p = s.progress;
+  const unsigned phase = p.phase;
+  const bool known = phase != 0 && (phase & (phase - 1)) == 0 && phase <= event_mode;
+  const bool in_time = std::isfinite(p.time) && p.stop_time >= p.time && p.tolerance >= 0.0 && p.tolerance < 1.0;
+  if (!known || !in_time) throw std::invalid_argument("its phase and time are those of none");
+  for (std::size_t i = 0; i < settable_.size(); ++i) {
+    const Variable& v = *settable_[i];
+    for (const double derivative : s.values[i]) finite(v, derivative);
+    require_allowed(v, s.values[i][0]);
+    const bool whole = v.type == Type::real || s.values[i][0] == std::trunc(s.values[i][0]);
+    if (!whole) refuse(v, s.values[i][0], " is no whole number");
+  }
+  for (const double value : s.numerics)
+    if (!std::isfinite(value)) throw std::invalid_argument("a number of its motion is not finite");
 }
 
 void Instance::restore(const Snapshot& s) {

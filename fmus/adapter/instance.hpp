@@ -48,6 +48,8 @@ class Instance {
   /// Into a snapshot that may hold an earlier state: its memory is used again.
   void save(Snapshot& snapshot);
   void restore(const Snapshot& snapshot);
+  /// @throws std::exception if it holds what no instance of this FMU does
+  void check(const Snapshot& snapshot) const;
 
   std::size_t n_values() const { return values_.size(); }
 

@@ -43,6 +43,7 @@ Snapshot deserialized(std::string_view bytes, std::size_t n_values) {
   if (numbers.size() < progress_count + 3 * n_values) refuse("some are missing");
   std::memcpy(numbers.data(), doubles.data(), numbers.size() * sizeof(double));
   auto p = numbers.cbegin();
+  if (!(p[0] >= 1.0 && p[0] <= event_mode)) refuse("it has no phase");
   Snapshot s;
   s.progress = {static_cast<Phase>(static_cast<unsigned>(p[0])), p[1], p[2], p[3]};
   p += progress_count;

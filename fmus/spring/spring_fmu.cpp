@@ -151,9 +151,18 @@ fmi::Table fmi::make_table() {
   add.output("acceleration", "m/s2", "acceleration of the top", of(&Spring::acceleration), [](M m) { return m.jerk(); })
       .from(motion);
   t.variables.back().initial_dependencies->emplace_back("contact_force");
-  follows({"contact_force", "tip_displacement", "tip_velocity", "tip_velocity_forecast", "tip_response",
-           "foundation_force", "external_force", "base_acceleration"});
-  add.output("seated", "", "1 while the top rests on the foundation, otherwise 0", of(&Spring::seated)).steps_only();
+  const std::vector<std::string> pressing{"contact_force",         "tip_displacement", "tip_velocity",
+                                          "tip_velocity_forecast", "tip_response",     "foundation_force",
+                                          "external_force",        "base_acceleration"};
+  follows(pressing);
+  add.output("seated", "",
+             "1 while the top rests on the foundation inside, otherwise 0: the sign of the force that holds it there, "
+             "under the present inputs, decides",
+             of(&Spring::seated))
+      .steps_only()
+      .from(motion);
+  t.variables.back().initial_dependencies->emplace_back("contact_force");
+  follows(pressing);
   add.output("number_of_impacts", "", "number of impacts on the foundation since the start", of(&Spring::impacts))
       .steps_only();
   add.output("last_impact_time", "s", "time of the last impact; -1 if there was none", of(&Spring::last_impact));

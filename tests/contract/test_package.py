@@ -206,3 +206,22 @@ def test_windows_binary_under_wine(case, linux_host, wine_prefix, tmp_path):
     # Another compiler and C library: elementary functions may differ in the last place.
     for mine, its in zip(ours, theirs, strict=True):
         assert float(its[3]) == pytest.approx(float(mine[3]), rel=1e-10, abs=1e-14)
+
+
+def test_sources_have_what_importers_do_not_bring(case):
+    """Sources include headers by their path from sources/; those of FMI 3.0 are the importer's."""
+    sources = case.folder / "sources"
+    headers = {p.name for p in sources.rglob("fmi*unctions.h")}
+    assert headers == ({"fmi2Functions.h"} if case.version == "2.0" else set())
+    if case.version == "3.0":
+        folder = Path(fmpy.__file__).parent / "schema" / "fmi3"
+        description = etree.parse(sources / "buildDescription.xml")
+        etree.XMLSchema(etree.parse(folder / "fmi3BuildDescription.xsd")).assertValid(description)
+        assert [element.get("name") for element in description.iter("IncludeDirectory")] == ["."]
+
+
+@pytest.mark.parametrize("among", ["[^A-Za-z0-9_]", "[^A-Za-z0-9_]+"])
+def test_names_differ_where_tools_spell_them_in_letters(case, among):
+    """der(q_2) and der(q,2) were one variable, of two loads, in tools that write _ for each bracket."""
+    plain = [re.sub(among, "_", name).strip("_") for name in case.variables]
+    assert len(set(plain)) == len(plain)

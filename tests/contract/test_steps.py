@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from springbeam.scene.files import tomllib
@@ -16,7 +17,7 @@ ERROR = 3
 
 def test_no_step_past_the_stop_time_nor_from_another_time(case):
     k, other = (case.running(stop_time=0.3) for _ in range(2))
-    assert other.try_step(1e-9, 0.1) == ERROR
+    assert other.try_step(1.1e-4, 0.1) == ERROR
     assert "the slave is at 0" in other.message
     # 0.1 + 0.1 + 0.1 > 0.3 in floating point: rounding is no reason to refuse.
     time = 0.0
@@ -175,3 +176,83 @@ def test_a_state_of_the_other_fmu_is_refused(beam, spring):
     k = spring.running()
     assert k.status(k.deserialized, blob) == ERROR
     assert f"not written by the FMU {spring.description.guid}" in k.message
+
+
+@pytest.mark.parametrize(
+    ("beside", "ratio"), [(3e-12, 0.0), (-3e-12, 0.0), (0.9e-6, 0.0), (1e-3, 1e-3), (-1e-3, -1e-3)]
+)
+def test_a_step_from_a_rounded_time_ends_where_the_importer_says(spring, beside, ratio):
+    """A free top goes v H. Up to a millionth of H it goes as far; beyond it, for as long as is left to that time."""
+    k = spring.running(linear_stiffness=0.0, velocity=1.0)
+    H = 1e-3
+    k.step(0.0, H)
+    k.step(H * (1.0 + beside), H)
+    assert k.reached() == H * (1.0 + beside) + H
+    assert k.get("displacement") == pytest.approx((2.0 + ratio) * H, rel=1e-12)
+    k.step(k.reached(), H)
+
+
+def test_a_top_that_rests_rests_for_as_long_as_one_likes(spring):
+    """Neither at its equilibrium nor under a load is there a motion that a step could miss: it was refused."""
+    k = spring.running(linear_stiffness=300.0, displacement=0.25, external_force=75.0)
+    k.step(0.0, 3e5)
+    assert k.get("displacement", "velocity", "load_work") == [0.25, 0.0, 0.0]
+    assert k.get("displacement_integral") == pytest.approx(0.25 * 3e5)
+    k.set("external_force", 75.0 * (1.0 + 1e-9))
+    assert k.try_step(3e5, 3e5) == DISCARD
+
+
+def fnv(data):
+    """FNV-1a, the checksum of a saved state."""
+    value = 0xCBF29CE484222325
+    for byte in data:
+        value = (value ^ byte) * 0x100000001B3 % 2**64
+    return value.to_bytes(8, "little")
+
+
+def test_a_state_is_refused_whose_numbers_no_instance_has(case):
+    """The checksum is right, each number in turn is none; then numbers out of the limits of the description.
+
+    A negative mass had ended the process.
+    """
+    k = case.moving()
+    k.step(0.0, 0.01)
+    blob = k.serialized()
+    before = k.outputs()
+    end = len(case.description.guid) + 8
+    numbers = np.frombuffer(blob[end:])
+    first = {"beam": {"density": 4}, "spring": {"mass": 4, "contact_law": 4 + 3 * 7}}[case.name]
+    assert numbers[4] == float(case.parameters.get("mass", case.variables[next(iter(first))].start))
+    wrong = [(i, np.nan) for i in range(len(numbers))]
+    wrong += [(0, 3.0), (0, 64.0), (1, np.inf), (2, -1.0), (3, 1.0), (4, -1.0), (4, 0.0), (5, np.inf)]
+    wrong += [(first["contact_law"], value) for value in (1.5, 3.0)] if case.name == "spring" else []
+    for i, value in wrong:
+        changed = numbers.copy()
+        changed[i] = value
+        data = changed.tobytes()
+        assert k.status(k.deserialized, blob[: end - 8] + fnv(data) + data) == ERROR, (i, value)
+        assert "the bytes are not a saved state of this FMU: " in k.message
+    k.restore(k.deserialized(blob))
+    assert k.outputs() == before
+
+
+def test_whether_a_top_rests_on_its_foundation_follows_its_inputs(spring):
+    """1 kg under 9.81 N, held by the foundation; 20 N lift it, with 10.19 m/s², as soon as they are set."""
+    values = {"mass": 1.0, "linear_stiffness": 0.0, "gravity": 9.81, "stop_enabled": True, "stop_position": 0.0}
+    rests = [1.0, 0.0]
+    lifted = [0.0, pytest.approx(10.19)]
+    k = spring.instance().enter(**values)
+    assert k.get("seated", "acceleration") == rests
+    k.slave.exitInitializationMode()
+    time = 0.0
+    for _ in range(2):
+        for force, then in ((0.0, rests), (20.0, lifted), (9.8, rests), (0.0, rests)):
+            k.set("external_force", force)
+            assert k.get("seated", "acceleration") == then
+            assert k.partials(["acceleration"], "contact_force") == [-1.0 if then is lifted else 0.0]
+        k.step(time, 0.1)
+        time += 0.1
+        assert k.get("seated", "acceleration", "stop_force") == [*rests, pytest.approx(9.81)]
+    k.set("external_force", 20.0)
+    k.step(time, 0.1)
+    assert k.get("displacement") == pytest.approx(10.19 * 0.1**2 / 2)

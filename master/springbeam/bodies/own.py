@@ -31,6 +31,8 @@ _INSTANT = 1e-8
 _INTEGRATORS = {"modal": 1, "midpoint": 2}
 _MASS_MATRICES = {"consistent": 1, "averaged": 2}
 _AT_REST = 2
+#: Loads along the beam in powers of x/L.
+_DISTRIBUTED = ("distributed_load", "distributed_load_x", "distributed_load_x2", "distributed_load_x3")
 #: Variables of `InnerForces` and of `Body.shape`, and their sizes.
 _INNER_FORCES = ("tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
 _ALONG = ("deflection", "bending_moment", "shear_force")
@@ -195,7 +197,7 @@ class FmuBeam(OwnBody):
         if load.at is not None:
             return [(f"point_force[{self._points.index(load.at) + 1}]", 1.0)]
         shape = load.shape or [1.0]
-        return [(f"distributed_load_{i}" if i else "distributed_load", s) for i, s in enumerate(shape) if s != 0.0]
+        return [(name, share) for name, share in zip(_DISTRIBUTED, shape, strict=False) if share != 0.0]
 
     def stiffness(self, displacement: Any) -> float:
         return 1.0 / tip_compliance(self._beam)
