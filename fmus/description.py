@@ -175,7 +175,7 @@ class Description:
             if array:
                 ET.SubElement(element, "Dimension", start=str(v["elements"]))
         for i, v in enumerate(self.variables):
-            if not is_continuous_input(v):
+            if not is_continuous_input(v) or v["held"]:
                 continue
             for order in ORDERS:  # FMI 3.0 has no input derivatives of its own: they are inputs
                 derivative = {

@@ -49,6 +49,7 @@ std::string variable(const Variable& v) {
                  {"nominal", quoted(v.nominal)},
                  {"exact", yes(v.exact)},
                  {"consumed", yes(v.consumed)},
+                 {"held", yes(v.held)},
                  {"discrete", yes(v.discrete)},
                  {"elements", std::to_string(v.elements)},
                  {"dependencies", array(v.dependencies, dependency)},

@@ -46,6 +46,7 @@ struct Variable {
   bool discrete = false;     ///< an output that changes at steps only. It is a Real: some tools read all outputs so
   bool on_demand = false;    ///< an output that costs too much to be computed where it is not read
   bool consumed = false;     ///< an input that acts once: read back as 0 after the step that used it
+  bool held = false;         ///< an input whose derivatives do nothing: no variables of FMI 3.0
   std::size_t elements = 1;  ///< of the array that begins here, where variables can be arrays; 0: within one
 
   std::function<void(Model&, const Polynomial&)> set;  ///< parameters, inputs, exact outputs
@@ -64,6 +65,7 @@ struct Variable {
   Variable& positive() { return min = std::numeric_limits<double>::min(), *this; }
   Variable& only_read() { return on_demand = true, *this; }
   Variable& steps_only() { return discrete = true, *this; }
+  Variable& value_only() { return held = true, *this; }
   Variable& typical(double value) { return nominal = value, *this; }
   Variable& from(std::vector<std::string> names) { return initial_dependencies = std::move(names), *this; }
   Variable& from_all() { return initial_dependencies.reset(), *this; }

@@ -111,15 +111,18 @@ fmi::Table fmi::make_table() {
             });
   add.input("tip_velocity_forecast", "m/s",
             "tip_velocity_forecast of the beam, used when tip_response > 0; its derivatives are not used",
-            &SpringModel::forecast);
+            &SpringModel::forecast)
+      .value_only();
   add.input("tip_response", "m/N",
             "tip_response of the beam. If > 0 and contact_law > 1, the tip is predicted, and reaction is constant over "
             "each step at the value that does the work of the contact law: no step size adds energy. If 0, the contact "
             "law acts with the extrapolated tip. Its derivatives are not used",
             &SpringModel::response)
-      .typical(1e-4);
+      .typical(1e-4)
+      .value_only();
   add.input("tip_response_2", "m/N", "tip_response_2 of the beam, as tip_response", &SpringModel::response_2)
-      .typical(1e-4);
+      .typical(1e-4)
+      .value_only();
 
   add.output("displacement", "m", "position y of the top", of(&Spring::displacement), of(&Spring::velocity));
   add.exact_start(&SpringModel::parameters, &FmuParameters::displacement);
