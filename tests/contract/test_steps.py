@@ -221,11 +221,13 @@ def test_a_state_is_refused_whose_numbers_no_instance_has(case):
     before = k.outputs()
     end = len(case.description.guid) + 8
     numbers = np.frombuffer(blob[end:])
-    first = {"beam": {"density": 4}, "spring": {"mass": 4, "contact_law": 4 + 3 * 7}}[case.name]
-    assert numbers[4] == float(case.parameters.get("mass", case.variables[next(iter(first))].start))
+    parameters = case.named("parameter")
+    assert numbers[4] == float(case.parameters.get(parameters[0], case.variables[parameters[0]].start))
     wrong = [(i, np.nan) for i in range(len(numbers))]
     wrong += [(0, 3.0), (0, 64.0), (1, np.inf), (2, -1.0), (3, 1.0), (4, -1.0), (4, 0.0), (5, np.inf)]
-    wrong += [(first["contact_law"], value) for value in (1.5, 3.0)] if case.name == "spring" else []
+    choice = {"beam": "integrator", "spring": "contact_law"}[case.name]
+    at = 4 + 3 * parameters.index(choice)
+    wrong += [(at, 1.5), (at, float(case.variables[choice].max) + 1.0)]
     for i, value in wrong:
         changed = numbers.copy()
         changed[i] = value
