@@ -154,9 +154,9 @@ fmi::Table fmi::make_table() {
   add.output("acceleration", "m/s2", "acceleration of the top", of(&Spring::acceleration), [](M m) { return m.jerk(); })
       .from(motion);
   t.variables.back().initial_dependencies->emplace_back("contact_force");
-  const std::vector<std::string> pressing{"contact_force",         "tip_displacement", "tip_velocity",
-                                          "tip_velocity_forecast", "tip_response",     "foundation_force",
-                                          "external_force",        "base_acceleration"};
+  const std::initializer_list<const char*> pressing{"contact_force",         "tip_displacement", "tip_velocity",
+                                                    "tip_velocity_forecast", "tip_response",     "foundation_force",
+                                                    "external_force",        "base_acceleration"};
   follows(pressing);
   add.output("seated", "",
              "1 while the top rests on the foundation inside, otherwise 0: the sign of the force that holds it there, "
