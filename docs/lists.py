@@ -31,7 +31,7 @@ def options() -> list[str]:
     for option in cli.common.Commands.makers["run"]().params:
         if option.opts[0].startswith("-"):
             name = " ".join(filter(None, (option.opts[0], option.metavar)))
-            rows.append((", ".join(f"`{word}`" for word in (name, *option.opts[1:])), option.help))
+            rows.append((", ".join(f"`{word}`" for word in (name, *option.opts[1:])), option.help.replace("\\[", "[")))
     return table(("option of `run`", "meaning, the same in all commands that have it"), rows)
 
 

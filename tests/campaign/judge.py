@@ -17,7 +17,7 @@ from springbeam.run.outcome import RunStopped
 from springbeam.run.peaks import PEAK_DOUBTED
 from springbeam.run.runner import Simulation
 from springbeam.scene import Scene, SceneError
-from springbeam.scene.suspicions import suspicions
+from springbeam.scene.plausibility import warnings_of
 from springbeam.studies.comparison import perturbed
 from springbeam.studies.tables import Row
 
@@ -159,7 +159,7 @@ def judged(run: Trajectory, cause: str = "", reference: Reference | None = None)
 
 def warns(run: Trajectory) -> bool:
     """Return whether ``run`` is not resolved, or has a warning that its computation gave."""
-    others = set(run.summary["warnings"]).difference(suspicions(run.scene))
+    others = set(run.summary["warnings"]).difference(warnings_of(run.scene))
     return not run.summary["resolved"] or any(not text.startswith(PEAK_DOUBTED) for text in others)
 
 

@@ -9,8 +9,8 @@ from scenes import table
 
 from springbeam import SceneError, load_scene, with_changes
 from springbeam.bodies.protocol import NO_FORCE, Abilities, Body, Motion
-from springbeam.run.gate import admit, refusals, tried
 from springbeam.run.setup import set_up
+from springbeam.run.validation import refusals, tried, validate
 
 # -- what a scene needs of its bodies -------------------------------------------------------------------------------
 
@@ -76,4 +76,4 @@ def test_bodies_are_admitted_where_they_can_begin(lower, why):
     """Above a foundation at −15 mm, to rounding; and struck, if the law is rigid."""
     scene = with_changes(load_scene("soft"), beam={"approach": "elastic"})
     with pytest.raises(SceneError, match=why) if why else nullcontext():
-        admit(set_up(scene), Upper(1.0, y=0.1), lower)
+        validate(set_up(scene), Upper(1.0, y=0.1), lower)

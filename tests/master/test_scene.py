@@ -10,7 +10,7 @@ from scenes import TABLE, scene_from_dict, without_false
 
 import springbeam
 from springbeam.scene import Beam, SceneError, load_scene, with_changes
-from springbeam.scene.suspicions import suspicions
+from springbeam.scene.plausibility import warnings_of
 
 DOUBTS = scenes.table("bad_inputs.toml")["doubts"]
 
@@ -83,17 +83,19 @@ def test_a_softening_spring_may_start_with_the_energy_of_its_lower_rim(load, sto
     rims = (high,) if stop == -1.0 else (low, high)
     depth = min(0.5 * k1 * y**2 + 0.25 * k2 * y**4 - load * y for y in rims)
     with_beam = changed(beam={"initial_velocity_slope": -9.0}, stop=None)  # ρA L³ s₁²/6 beside a well of k1²/4|k2|
-    assert "starts with 13.5 J, the softening spring's well is 11.2 J deep" in suspicions(scene_from_dict(with_beam))[0]
+    assert (
+        "starts with 13.5 J, the softening spring's well is 11.2 J deep" in warnings_of(scene_from_dict(with_beam))[0]
+    )
     for factor in (1.0 - 1e-9, 1.0 + 1e-9):
         spring = {"external_force": load, "initial_velocity": factor * math.sqrt(2.0 * depth)}
         scene = changed(beam=None, stop=stop and {"position": stop}, spring=spring)
         if factor < 1.0:
-            assert suspicions(scene_from_dict(scene)) == []
+            assert warnings_of(scene_from_dict(scene)) == []
             continue
         with pytest.raises(SceneError, match=r"escapes from a well .* J deep"):
             scene_from_dict(scene)
         scene["spring"]["damping"] = 0.1
-        assert "J deep; the run stops if it escapes" in suspicions(scene_from_dict(scene))[0]
+        assert "J deep; the run stops if it escapes" in warnings_of(scene_from_dict(scene))[0]
 
 
 @pytest.mark.parametrize(
@@ -129,6 +131,6 @@ def test_what_can_hardly_be_meant_is_told(name):
     changes = dict(DOUBTS[name])
     scene = load_scene(changes.pop("of"))
     said = changes.pop("said")
-    lines = suspicions(with_changes(scene, **without_false(changes)))
+    lines = warnings_of(with_changes(scene, **without_false(changes)))
     assert len(lines) == len(said), lines
     assert all(fragment in line for fragment, line in zip(said, lines, strict=True)), lines

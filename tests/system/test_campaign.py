@@ -24,7 +24,7 @@ from springbeam.bodies.fmu import release
 from springbeam.results.files import load_trajectory
 from springbeam.run.ledger import bounds
 from springbeam.scene import load_scene, shipped_scenes
-from springbeam.scene.suspicions import EFFECTS, suspicions
+from springbeam.scene.plausibility import EFFECTS, warnings_of
 
 #: Algorithm 1 is compared with what the paper reports, in test_paper.py.
 SHIPPED = [name for name in shipped_scenes() if not name.startswith("paper")]
@@ -137,7 +137,9 @@ def test_a_key_that_plays_no_part_is_named_and_only_that(name, place):
         changed = with_changes(scene, **{table: {key: OTHERS[place]}})
     except SceneError:
         return
-    named = [line for line in suspicions(changed) if line.startswith(f"[{table}] {key} = ") and "plays no part" in line]
+    named = [
+        line for line in warnings_of(changed) if line.startswith(f"[{table}] {key} = ") and "plays no part" in line
+    ]
     if getattr(scene.under(table), key) != OTHERS[place]:
         run = run_of(f"effects/{name}")
         other = simulate(changed)

@@ -106,8 +106,8 @@ def _examine(scene: Scene) -> Findings:
     """Return the abilities of the bodies of ``scene``; it is an error if the scene cannot be run with them."""
     from ..bodies.factory import findings
     from ..bodies.units import described
-    from ..run.gate import refusals
     from ..run.setup import set_up
+    from ..run.validation import refusals
     from ..scene.partners import kind_of
 
     found = findings(scene)

@@ -84,7 +84,7 @@ def run(
     """
     from ..results.recording import FileRecorder
     from ..scene import load_scene
-    from ..scene.suspicions import implausible
+    from ..scene.plausibility import implausible
 
     what = load_scene(scene, settings or (), accuracy)
     _refuse_options(what, interval)

@@ -15,14 +15,14 @@ from ..results.recording import MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, as_scene
 from ..scene.frequencies import fastest_frequency, shear_frequency, slowest_frequency
-from ..scene.suspicions import suspicions
+from ..scene.plausibility import warnings_of
 from ..version import __version__
-from .gate import admit, tried
 from .master import Master
 from .outcome import Progress, RunStopped
 from .setup import set_up
 from .stepping import State
 from .summary import summary
+from .validation import tried, validate
 
 
 class Simulation(AbstractContextManager["Simulation"]):
@@ -74,7 +74,7 @@ class Simulation(AbstractContextManager["Simulation"]):
         beam, spring, contact_force = load_bodies(of_scene, setup.start, setup.degree, found)
         self._bodies = beam, spring
         try:
-            admit(setup, upper or beam, lower or spring, able)
+            validate(setup, upper or beam, lower or spring, able)
             self._master = Master(setup, upper or beam, lower or spring, self.recorder, contact_force)
         except BaseException:
             self.close()
@@ -206,7 +206,7 @@ class Simulation(AbstractContextManager["Simulation"]):
             **{f"{name}_rollbacks": body.rewinds for name, body in counting.items()},
             "setup_time": self._setup_time,
             "wall_time": wall_time,
-            "warnings": [*suspicions(self.scene), *amounts["warnings"]],
+            "warnings": [*warnings_of(self.scene), *amounts["warnings"]],
         }
 
 

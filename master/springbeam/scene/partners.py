@@ -12,7 +12,7 @@ from .tables import Beam, OneOf, Spring, Table, key
 class ForeignFmu(Table):
     """A co-simulation FMU of FMI 2.0 or 3.0 with one end that a force moves, and the names of its variables.
 
-    Missing names limit the couplings that are possible (`springbeam.run.gate`).
+    Missing names limit the couplings that are possible (`springbeam.run.validation`).
     """
 
     INPUTS: ClassVar = ("force", "impulse")

@@ -14,10 +14,10 @@ from .linearised import hilltop, largest_load, spring_energy, well_depth
 from .loads import MOST_POINTS, Load
 from .messages import at, either, filled
 from .partners import MovingWallElement, RigidWallElement, SpringDamperElement
+from .plausibility import warnings_of
 from .scene import Scene
 from .schemes import DEFAULT_STEP
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
-from .suspicions import suspicions
 from .tables import ALL_MODES_UP_TO, MOST_ELEMENTS, MOST_MODE_VALUES, MOST_MODES, Beam, Spring, Table
 
 #: More are a mistyped macro step: two weeks at a microsecond a step.
@@ -31,7 +31,7 @@ def impossible(scene: Scene) -> list[str]:
         for number, load in enumerate(scene.loads):
             found += [filled(scene, text, number) for text in _load(scene, load)]
         if not found and (scene.beam is None or _is_finite(scene.beam)):
-            suspicions(scene)  # what is certain to overflow once the scene runs overflows here
+            warnings_of(scene)  # what is certain to overflow once the scene runs overflows here
             return []
     except ArithmeticError:
         found = []

@@ -32,8 +32,8 @@ from ..run.runner import Simulation
 from ..scene import Beam, Scene, with_changes
 from ..scene.laws import depth
 from ..scene.linearised import contact_energy, spring_frequency, spring_stiffness
+from ..scene.plausibility import warnings_of
 from ..scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
-from ..scene.suspicions import suspicions
 
 #: A coupling is called unstable where its spectral radius exceeds 1 by more than this: e-fold growth in 1000 steps.
 THRESHOLD = 1e-3
@@ -84,7 +84,7 @@ def predict(scene: Scene) -> dict[str, Any]:
         "impedance": None if beam is None else math.sqrt(shear_stiffness(beam) * beam.density * beam.area),
         "exchange": None,
     } | dict.fromkeys(names)
-    notes = suspicions(scene)
+    notes = warnings_of(scene)
     notes += [f"[{table}] is not our own body: its frequencies are not known beforehand" for table in scene.partners]
     if scene.accuracy is not None:
         notes.append(f"accuracy = {scene.accuracy:g} picks scheme and macro step by itself; this is about those given")

@@ -1,6 +1,6 @@
 """Reject bodies with which a run cannot be made: our FMUs, FMUs of others, bodies of the caller.
 
-The rules of the scene check its keys. This gate checks the bodies, once, before the first step: their abilities,
+The rules of the scene check its keys. This module checks the bodies, once, before the first step: their abilities,
 initial positions and velocities.
 """
 
@@ -160,7 +160,9 @@ _SAME_SPEED, _SAME_SPEED_MEASURED = 1e-13, 1e-6
 _SAME_PLACE = 1e-12
 
 
-def admit(setup: Setup, upper: Body | None, lower: Body | None, found: Mapping[str, Abilities] | None = None) -> None:
+def validate(
+    setup: Setup, upper: Body | None, lower: Body | None, found: Mapping[str, Abilities] | None = None
+) -> None:
     """Raise SceneError if a run cannot be made with these bodies as they are at its start.
 
     That is if a body lacks a needed ability, or if the contact law, the foundation or an undeformed approach cannot

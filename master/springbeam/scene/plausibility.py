@@ -34,7 +34,7 @@ _MATERIALS = (
 )
 
 
-def suspicions(scene: Scene) -> list[str]:
+def warnings_of(scene: Scene) -> list[str]:
     """Return warnings about values that can be run but are probably mistakes, or have no effect."""
     found = [*implausible(scene)]
     found += [filled(scene, text) for subject in (_spring, _beam, _without_effect) for text in subject(scene)]
