@@ -106,9 +106,11 @@ class Bench:
         )
         by = moved - free
         if self.spec.velocity:
-            faster, scale = by[1, 1], abs(free[1, 1])
+            faster = by[1, 1]
+            scale = abs(free[1, 1])
         else:
-            faster, scale = (by[2, 0] - by[1, 0]) / size, abs(free[2, 0]) / size
+            faster = (by[2, 0] - by[1, 0]) / size
+            scale = abs(free[2, 0]) / size
         return float(by[1, 0]), float(faster) if abs(faster) > _SEEN * scale else 0.0
 
     def extrapolated(self, inertia: Callable[[float], float | None]) -> float | None:

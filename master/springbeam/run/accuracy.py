@@ -17,7 +17,8 @@ from .outcome import Progress, RunStopped
 from .runner import run_in_memory
 
 #: Macro steps of the first run, and the most.
-_FEWEST, _MOST = 8.0, 50_000.0
+_FEWEST = 8.0
+_MOST = 50_000.0
 #: The parts of a `Distance` that an accuracy bounds.
 KEPT = ("motion", "times", "impulses", "force")
 #: The coupling's and IDA's relative tolerance over the accuracy.

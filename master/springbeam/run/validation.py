@@ -98,8 +98,10 @@ def _lacking(setup: Setup, needs: Iterable[Need], table: str, body: Abilities) -
         yield f"{degree}, {_LACKS['integrals']}; use degree = {followed}"
 
 
-#: Length of a trial step over a macro step; displacement by a force in it, over that of the body or 1 m.
-_TRIAL, _MOVED = 2.0**-8, 1e-6
+#: Length of a trial step over a macro step.
+_TRIAL = 2.0**-8
+#: Displacement by a force in it, over that of the body or 1 m.
+_MOVED = 1e-6
 #: Length of a trial step that shows the order of a solver, over a macro step: also the fastest waves are slow in it.
 _SHORT = 2.0**-14
 #: Largest relative difference of a displacement by a force from that of a free mass.
@@ -155,7 +157,8 @@ def tried(body: Body, time: float, macro_step: float) -> Abilities:
 # -- starts ------------------------------------------------------------------------------------------------------------
 
 #: Velocities closer than this share are equal for an end without impulses: given, and measured from displacements.
-_SAME_SPEED, _SAME_SPEED_MEASURED = 1e-13, 1e-6
+_SAME_SPEED = 1e-13
+_SAME_SPEED_MEASURED = 1e-6
 #: Heights closer than this share are equal.
 _SAME_PLACE = 1e-12
 

@@ -5,7 +5,6 @@ values is a file of two columns, time and value (``recorded``).
 """
 
 from collections.abc import Callable
-from functools import lru_cache
 from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -14,7 +13,7 @@ from pydantic import Field, model_validator
 from typing_extensions import Self
 
 from ..lazily import Later
-from .recorded import Reading, Recorded
+from .recorded import Reading, curve_of
 from .tables import OfProgram, OneOf, Table, key
 
 if TYPE_CHECKING:
@@ -334,7 +333,7 @@ class TableLoad(Reading, _Started):
         path = Path(self.file)
         reading = Reading(**{name: getattr(self, name) for name in Reading.model_fields})
         try:
-            return _record(path, path.stat().st_mtime_ns, self.interpolation, self.unit, reading)
+            return curve_of(path, path.stat().st_mtime_ns, self.interpolation, self.unit, reading)
         except (OSError, ValueError) as error:
             why = f"{error.strerror}; give a file of numbers" if isinstance(error, OSError) else error
             raise ValueError(f'file = "{path}": {why}') from error
@@ -418,20 +417,3 @@ SIGNALS: dict[str, type[Load]] = {
     "table": TableLoad,
 }
 SIGNAL = OneOf(Load, "signal", "value over time", SIGNALS, "constant")
-
-
-@lru_cache(maxsize=16)
-def _record(path: Path, modified: int, interpolation: str, unit: str, reading: Reading) -> "tuple[PPoly, list[str]]":
-    recorded = Recorded(path, reading)
-    if len(recorded.units) != 2:
-        raise ValueError(f"{len(recorded.units)} columns; a table has two, time and value")
-    value = 1 - recorded.time
-    times, columns = recorded.read({value: unit})
-    values = columns[value]
-    notes = recorded.notes
-    from scipy.interpolate import CubicSpline, PPoly  # takes half a second to load: only if there is a table
-
-    if interpolation == "cubic":
-        spline = CubicSpline(times, values)
-        return PPoly(spline.c, spline.x), notes
-    return PPoly(np.array([np.diff(values) / np.diff(times), values[:-1]]), times), notes

@@ -11,6 +11,7 @@ import csv
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from functools import lru_cache
 from io import BytesIO
 from itertools import count
 from math import nan
@@ -24,6 +25,7 @@ from .units import factor
 
 if TYPE_CHECKING:
     import numpy as np
+    from scipy.interpolate import PPoly
 else:
     np = Later("numpy")
 
@@ -329,3 +331,24 @@ class Recorded:
 
     def _note(self, lines: Any, what: str) -> None:
         self.notes.append(f"{np.count_nonzero(lines)} lines of {len(self._numbers)} {what}")
+
+
+@lru_cache(maxsize=16)
+def curve_of(path: Path, modified: int, interpolation: str, unit: str, reading: Reading) -> "tuple[PPoly, list[str]]":
+    """Return a file of two columns, time [s] and value in ``unit``, as a curve, and notes; ``modified`` is its time.
+
+    Raises ValueError if it is no such file.
+    """
+    recorded = Recorded(path, reading)
+    if len(recorded.units) != 2:
+        raise ValueError(f"{len(recorded.units)} columns; a table has two, time and value")
+    value = 1 - recorded.time
+    times, columns = recorded.read({value: unit})
+    values = columns[value]
+    notes = recorded.notes
+    from scipy.interpolate import CubicSpline, PPoly  # takes half a second to load: only if there is a table
+
+    if interpolation == "cubic":
+        spline = CubicSpline(times, values)
+        return PPoly(spline.c, spline.x), notes
+    return PPoly(np.array([np.diff(values) / np.diff(times), values[:-1]]), times), notes
