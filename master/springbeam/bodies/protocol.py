@@ -238,8 +238,8 @@ class Body:
     def apply_impulse(self, impulse: float) -> None:
         """Apply an upward impulse [N·s] on the end.
 
-        The law ``transmission``, ``[stop]`` and a tie of ends of two velocities need it. An impulse within rounding
-        counts as none.
+        The laws ``transmission`` and ``unilateral``, ``[stop]`` and a tie of ends of two velocities need it. An impulse
+        within rounding counts as none.
         """
         if abs(impulse) > ROUNDED_IMPULSE * self.mass * abs(self.motion().velocity):
             raise BodyFailed(f"{type(self).__name__} has no apply_impulse, and meets an impulse of {impulse:.6g} N·s")

@@ -28,7 +28,7 @@ _PACKAGES = (
 
 #: Abilities in words: (ability, how a body shows it, possible couplings with it, and without it).
 _OFFERED = (
-    ("state", "canGetAndSetFMUstate", 'scheme "energy", tie, transmission, foundation', '"jacobi", "gauss_seidel"'),
+    ("state", "canGetAndSetFMUstate", 'scheme "energy", rigid laws, foundation', '"jacobi", "gauss_seidel"'),
     ("any_size", "canHandleVariableCommunicationStepSize", "events, adaptive steps", "equal macro steps only"),
     ("slopes", "canInterpolateInputs", "degree 1, 2", "degree 0"),
     ("integrals", "integral, integral_2", "degree 1, 2; adaptive steps", "degree 0"),

@@ -39,7 +39,7 @@ COLUMNS = {
     "y": Column("m", "spring", "position of the spring top"),
     "z": Column("m/s", "spring", "velocity of the spring top, or the common velocity"),
     "contact_force": Column("N", "pair", "contact force C; it lifts the tip and presses the spring"),
-    "compliance_force": Column("N", "pair", "transmission: λ_nc(Ψ − u_tip)₊^p; soft laws: C; tie: 0"),
+    "compliance_force": Column("N", "pair", "transmission: λ_nc(Ψ − u_tip)₊^p; soft laws: C; tie, unilateral: 0"),
     "tie_reaction": Column("N", "pair", "contact_force − compliance_force"),
     "foundation_force": Column("N", "stop", "force N of the foundation, upward; 0 unless seated"),
     "gap": Column("m", "gap", "u_tip − y; without a spring u_tip − φ"),

@@ -145,7 +145,7 @@ def _beam_without_inertia(scene: Scene) -> Iterator[str]:
     if scene.lower is None:
         yield '[beam.fidelity]: a beam without inertia needs a [spring]; use fidelity = "dynamic"'
     if contact.soft:
-        rigid = "tie" if contact.lasting else "transmission"
+        rigid = "tie" if contact.lasting else "unilateral"
         yield (
             "[beam.fidelity]: the tip between the beam and [contact.law] would have no inertia; use "
             f'law = "{rigid}" or fidelity = "dynamic"'
