@@ -21,8 +21,9 @@ constexpr std::array<Description, Wiring::faults> descriptions{
       "tip_response_2 swapped: exchange values between the steps only, for both FMUs alike (Jacobi), or delay by one "
       "step what is exchanged within a step"},
      {1,
-      "no values were exchanged before the first step: the tip made it without a contact force. Exchange values before "
-      "the first step, too, or give the inputs these start values"},
+      "no values were exchanged before the first step, or reaction before those of the tip: the tip made it without a "
+      "contact force. Exchange before the first step, too, first the five of the tip, or all twice; or give the inputs "
+      "these start values"},
      {1,
       "values of the beam's tip arrive, but contact_law = 1: there is no contact. Set contact_law = 2, or connect only "
       "contact_force"},

@@ -311,13 +311,16 @@ fmi::Table fmi::make_table() {
   add.output("warnings", "", "number of discarded steps; restoring a state does not lower it",
              [](const BeamModel& m) { return m.refused; })
       .steps_only();
+  std::vector<std::string> discretised{"density",        "area",    "second_moment_of_area", "young_modulus",
+                                       "shear_modulus",  "length",  "shear_coefficient",     "n_elements",
+                                       "element_degree", "n_modes", "reduced_integration",   "integrator",
+                                       "mass_matrix"};
   add.output("tip_mass", "kg",
              "effective mass of the tip, 1/(e'M^-1 e) of the discrete beam: an impulse J on the tip changes "
              "tip_velocity by J/tip_mass",
              of(&Beam::tip_mass))
-      .from({"density", "area", "second_moment_of_area", "young_modulus", "shear_modulus", "length",
-             "shear_coefficient", "n_elements", "element_degree", "n_modes", "reduced_integration", "integrator",
-             "mass_matrix"});
+      .from(discretised);
+  discretised.emplace_back("alpha_b");
   add.output(
          "tip_velocity_forecast", "m/s",
          "predicted mean velocity of the tip over the next two steps without a tip_force; steps have the size of the "
@@ -327,11 +330,6 @@ fmi::Table fmi::make_table() {
       .only_read()
       .from_all();
   for (const std::string& name : load_names) add.depends(name);
-  const std::vector<std::string> discretised{"density",        "area",          "second_moment_of_area",
-                                             "young_modulus",  "shear_modulus", "shear_coefficient",
-                                             "length",         "alpha_b",       "n_elements",
-                                             "element_degree", "n_modes",       "reduced_integration",
-                                             "integrator",     "mass_matrix"};
   add.output(
          "tip_response", "m/N",
          "change of tip_displacement at the end of a step, per newton of constant tip force in that step; for steps "

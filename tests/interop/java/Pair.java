@@ -58,7 +58,7 @@ final class Pair {
             }
         }
         for (Slave slave : slaves.values()) slave.enterInitialization();
-        exchange();
+        for (int i = 0; i < 2; i++) exchange(); // the force follows the tip
         for (Slave slave : slaves.values()) slave.exitInitialization();
         StringBuilder rows = new StringBuilder("ROWS");
         for (int i = 0; i < steps; i++) {
