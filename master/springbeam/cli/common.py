@@ -145,13 +145,16 @@ class Command(TyperCommand):
     Its help is text: what stands in brackets, ``[s]`` or ``[[loads]]``, is no markup of rich.
     """
 
-    def __init__(self, *args: Any, **given: Any) -> None:
+    def format_help(self, ctx: Any, formatter: Any) -> None:
         from rich.markup import escape
 
-        super().__init__(*args, **given)
         described: list[Any] = [self, *self.params]
-        for one in described:
-            one.help = escape(one.help or "")
+        texts = [one.help or "" for one in described]
+        for one, text in zip(described, texts, strict=True):
+            one.help = escape(text)
+        super().format_help(ctx, formatter)
+        for one, text in zip(described, texts, strict=True):
+            one.help = text
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Return the arguments of the usage, ``SCENE`` for Typer's ``{SCENE}``."""
