@@ -76,6 +76,14 @@ SettingsOption = Annotated[
         autocompletion=complete_key,
     ),
 ]
+AccuracyOption = Annotated[
+    float | None,
+    typer.Option(
+        "--accuracy",
+        metavar="RELATIVE",
+        help="Largest relative error of motion, contact times and impulses; sets degree and steps.",
+    ),
+]
 RunArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Directory with the results of springbeam run.")]
 MeasuredArgument = Annotated[
     Path,

@@ -20,6 +20,7 @@ from ..studies.tables import Findings, table
 from .common import (
     BAD_INPUT,
     STOPPED,
+    AccuracyOption,
     ForceOption,
     JsonOption,
     NoPlotsOption,
@@ -54,14 +55,7 @@ def run(
         ),
     ] = None,
     settings: SettingsOption = None,
-    accuracy: Annotated[
-        float | None,
-        typer.Option(
-            "--accuracy",
-            metavar="RELATIVE",
-            help="Largest relative error of motion, contact times and impulses; sets degree and steps.",
-        ),
-    ] = None,
+    accuracy: AccuracyOption = None,
     interval: Annotated[
         float | None,
         typer.Option(

@@ -22,6 +22,7 @@ from ..results.directory import ResultsExist, RunDirectory
 from ..studies.tables import Findings
 from .common import (
     STOPPED,
+    AccuracyOption,
     ForceOption,
     JsonOption,
     MapOption,
@@ -243,6 +244,7 @@ def sweep(
         ),
     ] = None,
     settings: SettingsOption = None,
+    accuracy: AccuracyOption = None,
     samples: Annotated[
         int, typer.Option("--samples", metavar="N", min=0, help="Number of samples of the ranges, instead of a grid.")
     ] = 0,
@@ -259,7 +261,7 @@ def sweep(
     from ..studies.sweep import Sweep
 
     return Sweep(
-        scene=scenes.load_scene(scene, settings or ()),
+        scene=scenes.load_scene(scene, settings or (), accuracy),
         vary=tuple(vary or ()),
         samples=samples,
         sampling=sampling,

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
@@ -26,6 +27,7 @@ from .drawing import (
     event_marks,
     mark,
     power_of_ten,
+    readable_unit,
     shaded_phases,
     time_unit,
 )
@@ -208,10 +210,14 @@ def line_style(look: Look) -> dict[str, Any]:
 
 
 def figure_for(trajectory: Trajectory, title: str, height: float) -> Figure:
-    """Return an empty figure of ``height`` [inch] with title, scene and, where the motion is not resolved, its mark."""
-    figure = Figure(figsize=(_WIDTH, height), layout="constrained")
+    """Return an empty figure, ``height`` [inch] below title, scene and the mark of a motion that is not resolved."""
+    heading = _heading(title, trajectory)
+    whole = height + _LINE * len(heading.splitlines()) + _ROOM
+    # The title has a place of its own, which the layout does not know.
+    layout = ConstrainedLayoutEngine(rect=(0.0, 0.0, 1.0, height / whole))
+    figure = Figure(figsize=(_WIDTH, whole), layout=layout)
     FigureCanvasAgg(figure)
-    _title(figure, _heading(title, trajectory), trajectory)
+    _title(figure, heading, trajectory)
     return figure
 
 
@@ -231,4 +237,5 @@ def _heading(title: str, trajectory: Trajectory) -> str:
 @matplotlib.rc_context(STYLE)
 def draw_compared(runs: Mapping[str, Trajectory]) -> Figure:
     """Return the figure of runs by their names, in the panels for which any of them has data."""
-    return _painted(compared(runs), Unit(1.0, "s"), _ROOM, 0.0)[0]
+    clock = readable_unit([run["time"] for run in runs.values()], "s")
+    return _painted(compared(runs), clock, _ROOM, 0.0)[0]

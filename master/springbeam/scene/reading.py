@@ -17,6 +17,9 @@ from .scene import TABLES, Scene, split_key
 from .schemes import PICKED_BY_ACCURACY
 from .tables import ArgumentError, OfProgram, SceneError
 
+#: Keys outside of tables.
+_OUTSIDE = ("accuracy", "title")
+
 
 def load_scene(
     path_or_name: str | Path, changes: Mapping[str, Any] | Iterable[str] = (), accuracy: float | None = None
@@ -78,11 +81,14 @@ def _scene_file(path_or_name: str | Path) -> Path:
     raise SceneError(f"{one_line(str(path))}: {what}, and no shipped scene; {near}shipped scenes: {', '.join(shipped)}")
 
 
-def _settings(overrides: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Return values by table and key; the last of two for one key counts."""
-    settings: dict[str, dict[str, Any]] = {}
+def _settings(overrides: Iterable[str]) -> dict[str, Any]:
+    """Return values by table and key, and those outside of tables; the last of two for one key counts."""
+    settings: dict[str, Any] = {}
     for override in overrides:
         target, separator, value = override.partition("=")
+        if separator and target.strip() in _OUTSIDE:
+            settings[target.strip()] = parse_value(value.strip())
+            continue
         split = split_key(target)
         if not separator or split is None:
             raise ArgumentError(f"--set {override}: must be TABLE.KEY=VALUE, as in coupling.macro_step=1e-3")

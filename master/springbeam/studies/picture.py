@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..pictures.diagrams import figure_with
-from ..pictures.drawing import BLUE
+from ..pictures.drawing import BLUE, Unit, readable_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Rows = Sequence[Mapping[str, Any]]
+#: Units that take a prefix.
+_PREFIXED = ("m", "s", "N", "J", "Pa", "Hz", "N·m", "N·s", "m/s", "m/s²", "N/m", "N·s/m", "W")
 #: Values of an axis that are named on it, and columns of small multiples.
 _FEW = 8
 _MOST = 6
@@ -59,6 +61,30 @@ def _short(value: Any) -> str:
 def column(rows: Rows, name: str) -> np.ndarray:
     """Return a column of numbers, NaN where there is none."""
     return np.array([np.nan if row.get(name) is None else row[name] for row in rows], dtype=float)
+
+
+def readable(rows: Rows, units: Mapping[str, str]) -> tuple[Rows, dict[str, str]]:
+    """Return ``rows`` with the columns of ``units`` in prefixes that read well, as in pictures of a run, and headings.
+
+    Only a unit that has no power takes a prefix.
+    """
+    factors = {}
+    headings = {}
+    for name, unit in units.items():
+        values = [row[name] for row in singly(rows, name)]
+        numbers = [value for value in values if isinstance(value, (int, float)) and np.isfinite(value)]
+        found = readable_unit([np.array(numbers)], unit) if numbers and unit in _PREFIXED else Unit(1.0, unit)
+        headings[name] = f"{name} [{found.name}]" if unit not in ("", "–") else name
+        if found.factor != 1.0:
+            factors[name] = found.factor
+
+    def scaled(value: Any, factor: float) -> Any:
+        if isinstance(value, list):
+            return [scaled(one, factor) for one in value]
+        return factor * value if isinstance(value, (int, float)) else value
+
+    changed = [{**row, **{name: scaled(row.get(name), factor) for name, factor in factors.items()}} for row in rows]
+    return changed, headings
 
 
 def singly(rows: Rows, name: str) -> Rows:

@@ -15,8 +15,8 @@ import numpy as np
 from ..scene import ArgumentError, Load, Scene
 from ..scene.messages import unit_of
 from .design import Axis, Sampling, design, parse_axis, with_keys
-from .metrics import PRINCIPAL, USUAL, Metric, heading, metrics_of
-from .picture import Scale, column, multiples, singly
+from .metrics import METRICS, PRINCIPAL, USUAL, Metric, metrics_of
+from .picture import Scale, column, multiples, readable, singly
 from .study import Study, measured
 from .tables import Findings, Row, table
 
@@ -83,9 +83,12 @@ class Sweep(Study):
         ]
         if self.metric:
             names = [*(axis.name for axis in self.axes), *self._shown]
-            cells = [[row[name] for name in names] for row in rows[:_FIRST_ROWS]]
+            first, headings = readable(rows[:_FIRST_ROWS], {name: self._unit(name) for name in names})
+            cells = [[row[name] for name in names] for row in first]
             several = f"the first {_FIRST_ROWS} of {len(rows)} rows" * (len(rows) > _FIRST_ROWS)
-            shown.append(table([f"{name}:.6g" for name in names], cells, several))
+            shown.append(
+                table([f"{headings[name].replace(' [', chr(10) + '[')}:.6g" for name in names], cells, several)
+            )
         code = 2 if counts.keys() == {"refused"} else 0
         document = {"runs": {status: counts[status] for status in STATUSES}}
         return Findings(document, shown, code=code, tables={self.kind: rows}, pictures=self._pictures(rows))
@@ -93,14 +96,22 @@ class Sweep(Study):
     def _pictures(self, rows: Sequence[Row]) -> dict[str, Callable[[], Any]]:
         """Return a picture of the metrics that change over the axes."""
         words = [any(isinstance(row[axis.name], str) for row in rows) for axis in self.axes]
-        scales = [Scale(a.name, self._labelled(a), a.log, word) for a, word in zip(self.axes, words, strict=True)]
-        shown = {name: heading(name) for name in self._shown if _varies(column(singly(rows, name), name))}
-        return {self.kind: partial(multiples, rows, scales, shown, self.scene.title or self.kind)} if shown else {}
+        varied = [name for name in self._shown if _varies(column(singly(rows, name), name))]
+        shown_rows, headings = readable(
+            rows, {name: self._unit(name) for name in (*(a.name for a in self.axes), *varied)}
+        )
+        scales = [Scale(a.name, headings[a.name], a.log, word) for a, word in zip(self.axes, words, strict=True)]
+        shown = {name: headings[name] for name in varied}
+        return (
+            {self.kind: partial(multiples, shown_rows, scales, shown, self.scene.title or self.kind)} if shown else {}
+        )
 
-    def _labelled(self, axis: Axis) -> str:
-        table, _, key = axis.name.rpartition(".")
-        unit = self._load(table).unit if key == "amplitude" else unit_of(table, key)
-        return f"{axis.name} [{unit}]" if unit != "–" else axis.name
+    def _unit(self, name: str) -> str:
+        """Return the unit of an axis or of a metric, "" or "–" where there is none."""
+        if name not in {axis.name for axis in self.axes}:
+            return METRICS[name].unit if name in METRICS else ""
+        table, _, key = name.rpartition(".")
+        return self._load(table).unit if key == "amplitude" else unit_of(table, key)
 
     def _load(self, table: str) -> Load:
         """Return a load by its table, as loads.0."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from io import BytesIO, StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from rich.console import Console
 from rich.table import Table
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 _DPI = 110
+#: Most characters of a name that is not wrapped.
+_NAME = 40
 #: Of printed findings [characters].
 _WIDTH = 120
 
@@ -103,9 +105,13 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = ""
     """
     made = Table(box=None, pad_edge=False, header_style="bold", title=title or None, title_justify="left")
     forms = []
-    for column in columns:
+    rows = list(rows)
+    for number, column in enumerate(columns):
         heading, colon, form = column.rpartition(":")
-        made.add_column(Text(heading if colon else column), justify="right" if colon else "left", overflow="fold")
+        # Names are not cut: other columns wrap.
+        name = not colon and all(len(str(row[number])) <= _NAME and " " not in str(row[number]) for row in rows)
+        justify: Literal["left", "right"] = "right" if colon else "left"
+        made.add_column(Text(heading if colon else column), justify=justify, overflow="fold", no_wrap=name)
         forms.append(form)
     for row in rows:
         made.add_row(*(Text(in_words(value, form)) for value, form in zip(row, forms, strict=True)))
