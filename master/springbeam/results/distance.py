@@ -10,7 +10,7 @@ import numpy as np
 
 from .contact_changes import contact_time_difference, impulse_difference
 from .dense import ends_at
-from .spans import ROUNDING, rounding_of, span
+from .spans import FLOOR, ROUNDING, energy_of_force, rounding_of, span
 from .trajectory import Trajectory
 
 #: Shares of the time from one row to the next, of either run, at which two runs are compared.
@@ -64,12 +64,17 @@ def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
     impulses = [impulse_difference(run, exact), impulse_difference(exact, run)]
     late = contact_time_difference(run, exact, window)
     found, beside = (_ends_at(of, times) for of in (run, exact))
+    speeds = None
+    if curves:
+        speeds = _velocities_apart(found, beside, times, _moments(run, exact, late), rounding / _step(exact))
     return Distance(
         motion(found, beside, rounding),
         late / duration,
         max(np.nan_to_num(impulses).tolist()),
         None if exact.scene.contact.rigid else _peaks_apart(run, exact),
-        _velocities_apart(found, beside, times, _moments(run, exact, late)) if curves else None,
+        _velocities_apart(found, beside, times, _moments(run, exact, late), rounding / _step(exact))
+        if curves
+        else None,
         _energies_apart(run, exact) if curves else None,
     )
 
@@ -88,15 +93,22 @@ def apart(values: np.ndarray, exact: np.ndarray, rounding: float = 0.0) -> np.nd
 
 
 def _velocities_apart(
-    columns: Mapping[str, np.ndarray], exact: Mapping[str, np.ndarray], times: np.ndarray, moments: np.ndarray
+    columns: Mapping[str, np.ndarray],
+    exact: Mapping[str, np.ndarray],
+    times: np.ndarray,
+    moments: np.ndarray,
+    rounding: float,
 ) -> float:
-    """Return the largest difference of a velocity, `apart`, but within ``moments`` [s], shape (n, 2)."""
+    """Return the largest difference of a velocity, `apart`, but within ``moments`` [s], shape (n, 2).
+
+    ``rounding`` [m/s] is that of positions over a step.
+    """
     inside = np.searchsorted(moments[:, 0], times, "right") > np.searchsorted(moments[:, 1], times, "left")
     found = [0.0]
     for name in (name for name in _SPEEDS if name in columns and name in exact):
-        # Velocities are differences of positions, and as exact as the fastest.
-        fastest = ROUNDING * max(float(np.abs(exact[of]).max(initial=0.0)) for of in _SPEEDS if of in exact)
-        found.append(float(apart(columns[name], exact[name], fastest)[~inside].max(initial=0.0)))
+        fastest = max(float(np.abs(exact[of]).max(initial=0.0)) for of in _SPEEDS if of in exact)
+        off = apart(columns[name], exact[name], max(rounding, ROUNDING * fastest))
+        found.append(float(off[~inside].max(initial=0.0)))
     return max(found)
 
 
@@ -108,13 +120,23 @@ def _moments(run: Trajectory, exact: Trajectory, late: float) -> np.ndarray:
 
 
 def _energies_apart(run: Trajectory, exact: Trajectory) -> float:
-    """Return the largest difference of an energy at the end of two runs, over the largest energy until then."""
-    largest = 0.0
+    """Return the largest difference of an energy at the end of two runs, over the largest energy until then.
+
+    That is at least the rounding of works that cancel, as of `span`.
+    """
+    assert exact.steps is not None
+    largest = FLOOR * ROUNDING * float(energy_of_force(exact.steps).sum())
     found = 0.0
     for name in (name for name in exact.columns if name.startswith("e_")):
         largest = max(largest, float(np.abs(exact[name]).max()))
         found = max(found, abs(float(run[name][-1] - exact[name][-1])))
     return found / (largest or 1.0)
+
+
+def _step(run: Trajectory) -> float:
+    """Return the longest step of a run [s]."""
+    assert run.steps is not None
+    return float(run.steps["size"].max())
 
 
 def _ends_at(run: Trajectory, times: np.ndarray) -> Mapping[str, np.ndarray]:

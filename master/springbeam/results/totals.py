@@ -53,7 +53,7 @@ LOSS_NAMES = {
     "loss_stop": "impacts on the stop",
 }
 #: Numbers of `TOTALS` that belong to others.
-_BESIDE = ("contact_force_window", "contact_force_max_time", "deepest_tip_time")
+BESIDE = ("contact_force_window", "contact_force_max_time", "deepest_tip_time")
 #: Impulses that differ by less than this share of the total are equal: well above rounding.
 _ALIKE = 1e-13
 
@@ -61,7 +61,7 @@ _ALIKE = 1e-13
 def in_words(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield words and values of the numbers in a ``summary`` that are not 0, and of any count."""
     for name, (words, unit) in TOTALS.items():
-        if name in summary and name not in _BESIDE and (summary[name] or not unit):
+        if name in summary and name not in BESIDE and (summary[name] or not unit):
             if name == "contact_force_max":
                 words = words.replace("the window", f"{summary['contact_force_window']:.4g} s")
             yield words, f"{summary[name]:.5g} {unit}".rstrip()
