@@ -51,7 +51,7 @@ def _html(run: Trajectory) -> str:
     rows = [
         ("rows, events", f"{len(run)}, {len(run.events)}"),
         ("status", str(summary.get("status", "no summary"))),
-        *totals.in_words(summary),
+        *((words, f"{value} {error}".rstrip()) for words, value, error in totals.in_words(summary)),
         *(("warning", str(warning)) for warning in summary.get("warnings", ())),
     ]
     body = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)

@@ -219,15 +219,15 @@ def _in_words(scene: Scene, summary: Mapping[str, Any], events: list[Event]) -> 
         yield f"events    {', '.join(f'{number} {kind}' for kind, number in kinds.most_common())}"
         yield "          (on tip, of stop: impulses, upward; lost: energy)"
     results = Table.grid(padding=(0, 2))
-    for words, value in in_words(summary):
-        results.add_row(Text(words), Text(value))
+    for cells in in_words(summary):
+        results.add_row(*map(Text, cells))
     yield results
     yield from _lines(summary, scene.duration)
 
 
 def _lines(summary: Mapping[str, Any], duration: float) -> Iterator[str]:
     """Yield cost, residuals, accuracy, errors and warnings of a run of a ``duration`` [s]."""
-    from ..run.companion import judged_in_words
+    from ..results.judged import judged_in_words
 
     if "macro_steps" in summary and "wall_time" in summary:
         yield f"run       {summary['macro_steps']} macro steps in {summary['wall_time']:.3g} s"

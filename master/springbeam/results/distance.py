@@ -72,9 +72,7 @@ def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
         late / duration,
         max(np.nan_to_num(impulses).tolist()),
         None if exact.scene.contact.rigid else _peaks_apart(run, exact),
-        _velocities_apart(found, beside, times, _moments(run, exact, late), rounding / _step(exact))
-        if curves
-        else None,
+        speeds,
         _energies_apart(run, exact) if curves else None,
     )
 

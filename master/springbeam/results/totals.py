@@ -58,16 +58,22 @@ BESIDE = ("contact_force_window", "contact_force_max_time", "deepest_tip_time")
 _ALIKE = 1e-13
 
 
-def in_words(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield words and values of the numbers in a ``summary`` that are not 0, and of any count."""
-    for name, (words, unit) in TOTALS.items():
-        if name in summary and name not in BESIDE and (summary[name] or not unit):
-            if name == "contact_force_max":
-                words = words.replace("the window", f"{summary['contact_force_window']:.4g} s")
-            yield words, f"{summary[name]:.5g} {unit}".rstrip()
-    for name, words in LOSS_NAMES.items():
-        if summary.get(name):
-            yield f"energy lost by {words}", f"{summary[name]:.4g} J"
+def in_words(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Yield words, value and error of the numbers in a ``summary`` that are not 0, and of any count.
+
+    The error is "" where the run is not judged, or has none.
+    """
+    errors = summary.get("errors", {}).get("quantities", {})
+    units = {name: unit for name, (_, unit) in TOTALS.items()} | dict.fromkeys(LOSS_NAMES, "J")
+    for name, unit in units.items():
+        if name in BESIDE or summary.get(name) is None or (unit and not summary[name]):
+            continue
+        words = TOTALS[name].words if name in TOTALS else f"energy lost by {LOSS_NAMES[name]}"
+        if name == "contact_force_max":
+            words = words.replace("the window", f"{summary['contact_force_window']:.4g} s")
+        digits = ".5g" if name in TOTALS else ".4g"
+        error = errors.get(name, 0.0)
+        yield words, f"{summary[name]:{digits}} {unit}".rstrip(), f"± {error:.1g}" if error > 0.0 else ""
 
 
 def totals(

@@ -10,9 +10,10 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
+from ..results.judged import WORDS
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, with_changes
-from .companion import LIMITS, LONGER, WORDS, Check, compared
+from .companion import LIMITS, LONGER, Check, compared
 from .outcome import Progress, RunStopped
 from .runner import run_in_memory
 

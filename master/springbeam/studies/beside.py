@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..pictures.diagrams import Diagram, draw_diagrams
+from ..results.judged import WORDS
 from ..results.totals import LOSS_NAMES, TOTALS, peak_force
 from ..results.trajectory import Trajectory, columns_of
 from ..scene import Scene
@@ -27,10 +28,20 @@ def beside_one_another(names: list[str], runs: list[Trajectory]) -> Findings:
 
     keys = differing_keys([run.scene for run in runs])
     results = results_of(runs)
-    titles = {"keys that differ": keys, "results": results}
+    errors = errors_of(runs)
     columns = ("", *(f"{name}:.5g" for name in names))
-    shown = [table(columns, [(name, *of) for name, of in found.items()], title) for title, found in titles.items()]
-    return Findings({"runs": names, "keys": keys, "results": results}, shown, pictures={"comparison": draw})
+    beside = ("", *(heading for name in names for heading in (f"{name}:.5g", "±:.1g")))
+    unknown = [None] * len(runs)
+    rows = [
+        (name, *(cell for both in zip(values, errors.get(name, unknown), strict=True) for cell in both))
+        for name, values in results.items()
+    ]
+    shown = [
+        table(columns, [(name, *values) for name, values in keys.items()], "keys that differ"),
+        table(beside, rows, "results, with the errors that companion runs have shown"),
+    ]
+    document = {"runs": names, "keys": keys, "results": results, "errors": errors}
+    return Findings(document, shown, pictures={"comparison": draw})
 
 
 def beside_measured(run: Trajectory, measured: Measured, shift: float | None) -> Findings:
@@ -75,6 +86,17 @@ def results_of(runs: list[Trajectory]) -> dict[str, list[Any]]:
     found = {f"{name} [{unit}]" if unit else name: [s.get(name) for s in summaries] for name, unit in units.items()}
     found = {name: values for name, values in found.items() if any(values)}
     return {**found, "warnings": [len(run.summary.get("warnings", ())) for run in runs]}
+
+
+def errors_of(runs: list[Trajectory]) -> dict[str, list[Any]]:
+    """Return the errors of `results_of` that companion runs have shown, by run; relative ones under their own names."""
+    judged = [run.summary.get("errors", {}) for run in runs]
+    units = {name: unit for name, (_, unit) in TOTALS.items()} | dict.fromkeys(LOSS_NAMES, "J")
+    found = {
+        f"{name} [{unit}]" if unit else name: [errors.get("quantities", {}).get(name) for errors in judged]
+        for name, unit in units.items()
+    }
+    return found | {name: [errors.get(name) for errors in judged] for name in WORDS}
 
 
 def _over_one_window(runs: list[Trajectory]) -> list[dict[str, Any]]:

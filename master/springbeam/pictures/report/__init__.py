@@ -14,6 +14,7 @@ import jinja2
 import numpy as np
 import tomli_w
 
+from ...results.judged import judged_in_words
 from ...results.totals import in_words
 from ...results.trajectory import Trajectory, cascades, rounded
 from ...scene import Scene
@@ -81,6 +82,7 @@ def page(trajectory: Trajectory) -> str:
         numbers=list(_numbers(trajectory)),
         described=list(described(scene)),
         results=list(in_words(trajectory.summary)),
+        judged=judged_in_words(trajectory.summary, trajectory.scene.duration),
         events=list(cascades(events)),
         event_values=values,
         event_scales={name: max((abs(getattr(e, name) or 0.0) for e in events), default=0.0) for name in values},
