@@ -38,7 +38,7 @@ def beside_one_another(names: list[str], runs: list[Trajectory]) -> Findings:
     ]
     shown = [
         table(columns, [(name, *values) for name, values in keys.items()], "keys that differ"),
-        table(beside, rows, "results, with the errors that companion runs have shown"),
+        table(beside, rows, "results"),
     ]
     document = {"runs": names, "keys": keys, "results": results, "errors": errors}
     return Findings(document, shown, pictures={"comparison": draw})
