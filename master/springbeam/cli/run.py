@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
-from math import inf
+from math import floor, inf, log10
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any
@@ -34,6 +34,7 @@ from .common import (
 
 if TYPE_CHECKING:
     from ..motion.events import Event
+    from ..results.contacts import Contact
     from ..results.recording import FileRecorder
     from ..results.trajectory import Trajectory
     from ..run.outcome import Progress
@@ -44,6 +45,10 @@ _MOST_ROWS = 10_000_000
 _REFRESH_SECONDS = 0.1
 #: Events and cascades of a kind that the table shows; others of this kind are one line, and all are in events.csv.
 _FIRST_OF_KIND = 8
+#: So many contacts are shown one by one.
+_CONTACTS = 10
+#: Columns of a contact before its velocities.
+_VELOCITIES = 7
 
 
 def run(
@@ -132,6 +137,7 @@ def carry_out(
     Raises what keeps the run from recording anything.
     """
     from ..bodies.protocol import FmuError
+    from ..results.contacts import contacts
     from ..results.files import load_events, load_summary
     from ..run.outcome import RunStopped
     from ..run.runner import run as run_scene
@@ -161,7 +167,9 @@ def carry_out(
         if not recorder.begun:
             directory.discard()
     summary = load_summary(directory.path)
-    shown = list(_in_words(recorder.scene, summary, load_events(directory.path)))
+    events = load_events(directory.path)
+    found = contacts(recorder.scene, recorder.steps(), events, summary.get("contact_force_window"))
+    shown = list(_in_words(recorder.scene, summary, events, found))
     document = {"directory": directory.path, **summary}
     files = [("results", directory.path)]
     draw = None if no_plots else partial(_drawn, directory.path, pictures)
@@ -208,8 +216,10 @@ def progress_of_run(t_end: float, what: str, *, silent: bool) -> Iterator[Progre
 # -- in words ----------------------------------------------------------------------------------------------------------
 
 
-def _in_words(scene: Scene, summary: Mapping[str, Any], events: list[Event]) -> Iterator[str | Text | Table]:
-    """Yield the events, totals, residuals and warnings of a run."""
+def _in_words(
+    scene: Scene, summary: Mapping[str, Any], events: list[Event], contacts: list[Contact]
+) -> Iterator[str | Text | Table]:
+    """Yield the events, contacts, totals, residuals and warnings of a run."""
     from ..results.totals import in_words
 
     yield Text(scene.title or "(untitled scene)", style="bold")
@@ -218,6 +228,9 @@ def _in_words(scene: Scene, summary: Mapping[str, Any], events: list[Event]) -> 
         kinds = Counter(event.kind for event in events)
         yield f"events    {', '.join(f'{number} {kind}' for kind, number in kinds.most_common())}"
         yield "          (on tip, of stop: impulses, upward; lost: energy)"
+    if contacts:
+        yield _contact_table(contacts)
+        yield "          (contacts; velocities: of the ends against each other)"
     results = Table.grid(padding=(0, 2))
     for cells in in_words(summary):
         results.add_row(*map(Text, cells))
@@ -279,6 +292,34 @@ def _event_table(events: list[Event], scene: Scene) -> Table:
     for kind, some in hidden.items():
         rows.append((f"+{len(some)} {kind}, until", some[-1].time, None, None, *_sums(some)))
     return table(columns, rows)
+
+
+def _contact_table(contacts: list[Contact]) -> Table:
+    """Return the first contacts as a table, and sums or the largest of the others."""
+    rows = [(*contact[:_VELOCITIES], -contact.closing, contact.opening) for contact in contacts[:_CONTACTS]]
+    if others := contacts[_CONTACTS:]:
+        highest = max(others, key=lambda contact: contact.peak_force or 0.0)
+        length, impulse, loss = (sum(getattr(c, name) for c in others) for name in ("duration", "impulse", "loss"))
+        depth = max(contact.depth for contact in others)
+        peak = highest.peak_force, highest.peak_time
+        rows.append((others[-1].begin, length, impulse, *peak, depth, loss, None, others[-1].opening))
+    heads = ("begin", "length", "impulse", "peak", "at", "depth", "lost", "before", "after")
+    columns = [""]
+    scaled = []
+    for head, unit, values in zip(
+        heads, ("s", "s", "N·s", "N", "s", "m", "J", "m/s", "m/s"), zip(*rows, strict=True), strict=True
+    ):
+        power = _thousands(max(abs(value or 0.0) for value in values))
+        prefix = f"{'pnµm kMGT'[power + 4].strip()}{unit}"
+        columns.append(f"{head}\n[{prefix}]:.4g")
+        scaled.append([None if value is None else value * 1000.0**-power for value in values])
+    numbers = [*range(1, min(len(contacts), _CONTACTS) + 1), *([f"+{len(others)}"] if others else [])]
+    return table(columns, [(str(number), *row) for number, row in zip(numbers, zip(*scaled, strict=True), strict=True)])
+
+
+def _thousands(largest: float) -> int:
+    """Return the power of 1000 that reads well of a number: −1 of 0.15."""
+    return 0 if largest == 0.0 or 1.0 <= largest < 1e4 else min(max(floor(log10(largest) / 3.0), -4), 4)
 
 
 def _sums(events: list[Event]) -> tuple[float | None, ...]:

@@ -143,9 +143,10 @@ def forces(trajectory: Trajectory) -> Panel:
     if "contact_force_max_time" in summary and curves and curves[0].name == "contact_force":
         begin = float(summary["contact_force_max_time"])
         peak = float(summary["contact_force_max"])
-        window = np.array([begin, begin + float(summary["contact_force_window"])])
-        clock = readable_unit([np.diff(window)], "s")
-        words = f"largest mean, over {clock.factor * np.diff(window)[0]:.3g}\u00a0{clock.name}"
+        length = float(summary.get("contact_force_window", 0.0))
+        window = np.array([begin, begin + length])
+        clock = readable_unit([np.array([length])], "s")
+        words = f"largest mean, over {clock.factor * length:.3g}\u00a0{clock.name}" if length else "largest"
         curves.append(Curve("contact_force_max", Look(VERMILLION, words, Line(2.2)), window, np.array([peak, peak])))
     return Panel("forces", "Forces", "force", "N", curves, 2.0)
 

@@ -30,9 +30,9 @@ PICTURES = {
     "moments": "g_moments.png",
 }
 OVERVIEW = "overview"
-#: The tables: rows, events and shapes, as CSV, and as `springbeam export --format parquet` leaves them there.
-TABLES = ("trajectory.csv", "events.csv", "shapes.csv")
-PARQUET = ("trajectory.parquet", "events.parquet", "shapes.parquet")
+#: The tables: rows, events, contacts and shapes, as CSV, and as `springbeam export --format parquet` leaves them there.
+TABLES = ("trajectory.csv", "events.csv", "contacts.csv", "shapes.csv")
+PARQUET = ("trajectory.parquet", "events.parquet", "contacts.parquet", "shapes.parquet")
 #: What `springbeam report` and `springbeam animate` may leave there.
 REPORT = "report.html"
 ANIMATIONS = ("animation.gif", "animation.mp4")

@@ -19,6 +19,7 @@ from pydantic_core import to_json
 from ..motion.events import Event
 from ..scene import scene_from_dict
 from .columns import trajectory_of
+from .contacts import contacts_as_array
 from .directory import PARQUET, TABLES, ResultsUnreadable, RunDirectory
 from .document import as_json
 from .records import EVENT, SHAPE, STEP, array_of, events_as_array, events_of
@@ -40,15 +41,15 @@ def lines(rows: Iterable[Sequence[Any]]) -> bytes:
 
 
 def tables_of(run: Trajectory) -> list[np.ndarray]:
-    """Return the tables of a run beside its rows: its events and, with a beam, its shapes."""
-    found = [events_as_array(run.events)]
+    """Return the tables of a run beside its rows: its events, its contacts and, with a beam, its shapes."""
+    found = [events_as_array(run.events), contacts_as_array(run.contacts)]
     if run.shape_table is not None:
         found.append(np.ascontiguousarray(run.shape_table).view(SHAPE)[:, 0])
     return found
 
 
 def write_tables(run: RunDirectory, tables: Iterable[Iterable[Mapping[str, np.ndarray]]]) -> list[Path]:
-    """Write rows, events and shapes of a run as CSV, each in blocks of columns, and return their files.
+    """Write rows, events, contacts and shapes of a run as CSV, each in blocks of columns, and return their files.
 
     Raises OSError; a table that was there is then as before.
     """

@@ -13,6 +13,7 @@ import numpy as np
 from ..motion.events import Event
 from ..scene import Scene
 from .columns import blocks, trajectory_of
+from .contacts import contacts, contacts_as_array
 from .dense import at_multiples
 from .directory import RunDirectory
 from .files import (
@@ -163,7 +164,10 @@ class FileRecorder(AbstractContextManager["FileRecorder"]):
         self._close_files()
         write_summary(directory, _with_scene({**summary, "files": directory.sizes()}, self.scene))
         shapes = [chunks(mapped(directory.shapes, SHAPE))] * (self.scene.beam is not None)
-        write_tables(directory, [rows, chunks(mapped(directory.events, EVENT)), *shapes])
+        found = contacts(self.scene, steps, self.events(), summary.get("contact_force_window"))
+        write_tables(
+            directory, [rows, chunks(mapped(directory.events, EVENT)), chunks(contacts_as_array(found)), *shapes]
+        )
 
     def amend(self, entries: Mapping[str, Any]) -> None:
         """Replace ``entries`` of the summary of a finished run, or add them. Raises OSError."""

@@ -7,17 +7,17 @@ without the part of the mismatch of velocities (`impulse`).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.polynomial.polynomial import polyder, polyval
 
 from ..motion.events import Event
-from ..motion.paths import EPS
 from ..scene import Scene
-from .contact_times import foundation_contacts, kicks, tip_contacts
+from .contact_times import foundation_contacts, tip_contacts
 from .dense import Extremes
-from .records import FORCE_COLUMNS, impulse, joined
+from .law_peak import peak_of_law
+from .records import impulse, joined
+from .window_peak import gained, peak_force
 
 
 class Quantity(NamedTuple):
@@ -30,13 +30,13 @@ class Quantity(NamedTuple):
 #: The numbers of `totals`, in the order in which they are shown.
 TOTALS = {
     "contact_impulse": Quantity("impulse of the contact, ∫ C dt and impacts", "N·s"),
-    "contact_force_max": Quantity("peak contact force, mean over the window", "N"),
-    "contact_force_window": Quantity("window of the peak contact force", "s"),
-    "contact_force_max_time": Quantity("beginning of that window", "s"),
+    "contact_force_max": Quantity("peak contact force; of a rigid contact the mean over the window", "N"),
+    "contact_force_window": Quantity("window of the peak force of a rigid contact", "s"),
+    "contact_force_max_time": Quantity("time of the peak contact force, or beginning of its window", "s"),
     "contact_duration": Quantity("longest contact", "s"),
     "contact_duration_total": Quantity("all contacts together", "s"),
     "number_of_contacts": Quantity("contacts", ""),
-    "bounce_time": Quantity("time from the first contact until the last opening", "s"),
+    "bounce_time": Quantity("time from the first contact until the last one begins, in which the run ends", "s"),
     "last_impact_time": Quantity("last impact", "s"),
     "rebound_velocity": Quantity("upward velocity of the tip after the last contact", "m/s"),
     "deepest_tip": Quantity("lowest position of the tip", "m"),
@@ -54,8 +54,6 @@ LOSS_NAMES = {
 }
 #: Numbers of `TOTALS` that belong to others.
 BESIDE = ("contact_force_window", "contact_force_max_time", "deepest_tip_time")
-#: Impulses that differ by less than this share of the total are equal: well above rounding.
-_ALIKE = 1e-13
 
 
 def in_words(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
@@ -70,14 +68,15 @@ def in_words(summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
             continue
         words = TOTALS[name].words if name in TOTALS else f"energy lost by {LOSS_NAMES[name]}"
         if name == "contact_force_max":
-            words = words.replace("the window", f"{summary['contact_force_window']:.4g} s")
+            window = summary.get("contact_force_window")
+            words = "peak contact force" + ("" if window is None else f", mean over {window:.4g} s")
         digits = ".5g" if name in TOTALS else ".4g"
         error = errors.get(name, 0.0)
         yield words, f"{summary[name]:{digits}} {unit}".rstrip(), f"± {error:.1g}" if error > 0.0 else ""
 
 
 def totals(
-    scene: Scene, steps: np.ndarray, events: Iterable[Event], window: float, tip: Extremes
+    scene: Scene, steps: np.ndarray, events: Iterable[Event], window: float | None, tip: Extremes
 ) -> dict[str, float | int]:
     """Return the numbers of `TOTALS` that the scene has, and the energies lost in impacts [J].
 
@@ -90,7 +89,8 @@ def totals(
     events
         Of the whole run.
     window
-        Over which the contact force is averaged [s]; the run may be shorter.
+        Over which the force of a rigid contact is averaged [s]; the run may be shorter. ``None`` for a soft law, whose
+        peak is that of the law along the path of the ends.
     tip
         Of the positions of the tip.
     """
@@ -117,14 +117,15 @@ def totals(
     }
 
 
-def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float) -> dict[str, float | int]:
-    largest, since = peak_force(steps, events, window)
-    found: dict[str, float | int] = {
-        "contact_impulse": _gained(steps, events).sum(),
-        "contact_force_max": largest,
-        "contact_force_window": window,
-        "contact_force_max_time": since,
-    }
+def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float | None) -> dict[str, float | int]:
+    found: dict[str, float | int] = {"contact_impulse": gained(steps, events).sum()}
+    if window is None:
+        assert scene.soft_law is not None
+        largest, since = peak_of_law(scene.soft_law, steps)
+    else:
+        largest, since = peak_force(steps, events, window)
+        found["contact_force_window"] = window
+    found |= {"contact_force_max": largest, "contact_force_max_time": since}
     if scene.contact.lasting and scene.coupled:
         return found
     end = float(steps["time"][-1])
@@ -138,53 +139,3 @@ def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float
     if left := [event.v_tip for event in events if event.time == opened and event.v_tip is not None]:
         found["rebound_velocity"] = left[-1]
     return found
-
-
-def _gained(steps: np.ndarray, events: Iterable[Event]) -> np.ndarray:
-    """Return the impulse of the contact over each of ``steps`` and its events [N·s]."""
-    return np.asarray(impulse(steps) + kicks(steps["time"], events))
-
-
-def peak_force(steps: np.ndarray, events: Iterable[Event], window: float) -> tuple[float, float]:
-    """Return the largest mean of C [N] over windows of ``window`` [s] in the run, and when the first of these begins.
-
-    A run that is shorter is one window, without a force after it. An impact at the edge of a window belongs to it if
-    that makes the mean larger.
-    """
-    rows = steps["time"]
-    # The impulse up to each row, including impacts there, and the powers of the time since then up to the next row;
-    # before the run and after it there is no force.
-    begins = np.append(rows[0] - 2.0 * window, rows)
-    passed = np.zeros((4, len(begins)))
-    passed[0, 1:] = np.cumsum(_gained(steps, events))
-    passed[1:, 1:-1] = [steps[name][1:] / power for name, power in zip(FORCE_COLUMNS, (1.0, 2.0, 6.0), strict=True)]
-
-    def upto(times: np.ndarray, side: Literal["left", "right"], *orders: int) -> np.ndarray:
-        """Return derivatives of ∫ C dt before the impulses of ``times`` [s] (left) or after them (right)."""
-        row = np.searchsorted(begins, times, side) - 1
-        since = times - begins[row]
-        powers = passed[:, row]
-        return np.array([polyval(since, polyder(powers, order), tensor=False) for order in orders])
-
-    # Inside steps the mean is largest where C is the same at both edges of the window: between `edges` both forces are
-    # of degree 2. The root of a τ² + b τ + c at which it falls is 2 c / (√(b² − 4 a c) − b), also where a is 0.
-    edges = np.sort(np.concatenate([rows, rows - window]))
-    half = 0.5 * np.diff(edges)
-    middle = edges[:-1] + half
-    c, b, twice_a = upto(middle + window, "right", 1, 2, 3) - upto(middle, "right", 1, 2, 3)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        root = 2.0 * c / (np.sqrt(b**2 - 2.0 * twice_a * c) - b)
-    inside = np.where(np.abs(root) < half, middle + root, edges[:-1])
-    first = np.maximum(np.concatenate([rows - window, rows, inside]), rows[0])
-    last = np.minimum(np.concatenate([rows, rows + window, inside + window]), rows[-1])
-    # Where the ends pull at each other, a window that the run cuts short would have the larger mean.
-    rounding = 4.0 * EPS * np.abs(rows).max()
-    whole = last - first >= min(window, rows[-1] - rows[0]) - rounding
-    first = first[whole]
-    last = last[whole]
-    (most,) = np.maximum(upto(last, "left", 0), upto(last, "right", 0))
-    (least,) = np.minimum(upto(first, "left", 0), upto(first, "right", 0))
-    found = most - least
-    largest = found.max()
-    since = first[found >= largest - _ALIKE * np.abs(passed[0]).max()].min()  # of a constant force all are alike
-    return max(0.0, float(largest)) / window, float(since)

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
+    from .contacts import Contact
+
 
 class Column(NamedTuple):
     """A column of a run: its unit, the part of a scene without which it is left out, and its meaning."""
@@ -144,6 +146,14 @@ class Trajectory:
         if name == "columns" or name not in self.columns:  # the former while it is unpickled
             raise AttributeError(name)
         return self.columns[name]
+
+    @property
+    def contacts(self) -> list[Contact]:
+        """Each contact in its order; none of a run without steps, as by a reference."""
+        from .contacts import contacts  # which follows from dense output
+
+        steps = np.empty(0) if self.steps is None else self.steps
+        return contacts(self.scene, steps, self.events, self.summary.get("contact_force_window"))
 
     @property
     def do_steps(self) -> int:

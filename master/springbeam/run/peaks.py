@@ -1,4 +1,4 @@
-"""Over which time the contact force is averaged before its peak is taken, and what a rigid peak depends on."""
+"""Over which time the force of a rigid contact is averaged before its peak is taken, and what the peak depends on."""
 
 from __future__ import annotations
 
@@ -19,18 +19,14 @@ PEAK_DOUBTED = "the peak contact force "
 def force_window(pair: Pair, steps: np.ndarray, slowest: float) -> float:
     """Return over which time the contact force is averaged before its peak is taken [s].
 
-    It is ``contact.force_window``, or `WINDOW` of a period: of both ends on a soft law that opens, where it is deepest;
-    else of our beam, by its ``slowest`` frequency [rad/s]; of another upper body; of both ends as one. Where none of
+    It is ``contact.force_window``, or `WINDOW` of a period: of our beam, by its ``slowest`` frequency [rad/s]; of another upper body; of both ends as one. Where none of
     these is known, or oscillates, it is that share of the run.
     """
     if pair.setup.force_window is not None:
         return pair.setup.force_window
     masses = [body.mass for body in pair.bodies]
     omega = slowest
-    if pair.opens_softly and pair.law is not None:
-        deepest = float((steps["y"] - steps["u_tip"]).max(initial=0.0))
-        omega = sqrt(pair.law.slope(deepest) * sum(1.0 / mass for mass in masses if mass > 0.0))
-    elif omega == 0.0:
+    if omega == 0.0:
         known = [body.stiffness(steps[name]) for body, name in zip(pair.bodies, ("u_tip", "y"), strict=True)]
         upper, lower = (0.0 if k is None else float(np.max(k, initial=0.0)) for k in known)
         if upper > 0.0 and 0.0 < masses[0] < inf:
@@ -47,7 +43,7 @@ def depends_on_mesh(pair: Pair, window: float, fastest: float) -> str | None:
     longer than `SETTLED` periods of the ``fastest`` wave kept [rad/s] (``docs/choose.md`` has the numbers).
     """
     meets = pair.setup.law is not None or pair.setup.floor is not None
-    needed = SETTLED * 2.0 * pi / fastest if pair.law is None and meets and fastest > 0.0 else 0.0
+    needed = SETTLED * 2.0 * pi / fastest if meets and fastest > 0.0 else 0.0
     if window >= needed:
         return None
     return (

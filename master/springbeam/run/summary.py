@@ -9,6 +9,7 @@ import numpy as np
 
 from ..bodies.protocol import Body
 from ..results.columns import not_shown
+from ..results.contacts import contacts
 from ..results.dense import inside
 from ..results.recording import Recorder
 from ..results.totals import totals
@@ -39,7 +40,7 @@ def summary(master: Master, recorder: Recorder, slowest: float = 0.0, fastest: f
     made = int(np.count_nonzero(np.diff(steps["time"])))
     energies, warnings, changed = master.balance.report(steps)
     places, between = inside(pair.law is None, steps, *PLACES) if len(steps) else ({}, 0.0)
-    window = force_window(pair, steps, slowest)
+    window = None if pair.law is not None else force_window(pair, steps, slowest)
     amounts = totals(scene, steps, events, window, places["u_tip"]) if len(steps) else {}
     warnings += [said for body in pair.bodies for said in body.warnings]
     doubts = [f"{what}: an event was missed; {_SHORTER}" for what in contradictions(
@@ -50,7 +51,12 @@ def summary(master: Master, recorder: Recorder, slowest: float = 0.0, fastest: f
             f"between the rows an end may have an error of {100.0 * between:.2g} % of its motion, since it oscillates "
             "within a step; take a shorter one"
         )
-    others = (depends_on_mesh(pair, window, fastest), not_shown(scene, steps), _coarse_force(pair))
+    others = [not_shown(scene, steps), _coarse_force(pair)]
+    if window is not None:
+        others.append(depends_on_mesh(pair, window, fastest))
+    if scene.coupled and scene.contact.damped and not scene.contact.lasting:
+        closing = max((each.closing for each in contacts(scene, steps, events, None)), default=0.0)
+        others.append(scene.contact.doubted(closing))
     warnings += filter(None, others)
     warnings += [f"{NOT_RESOLVED}: {doubt}" for doubt in doubts]
     return {

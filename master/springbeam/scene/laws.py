@@ -196,8 +196,8 @@ class Contact(Table):
 
     law: str
     force_window: float | None = key(
-        "s", "time over which the force is averaged before its peak is taken", None, gt=0.0,
-        otherwise="a fiftieth of the period of a compliant contact, else of the beam's slowest",
+        "s", "time over which the force of a rigid contact is averaged before its peak is taken", None, gt=0.0,
+        otherwise="a fiftieth of the beam's slowest period",
     )  # fmt: skip
     gap: float = key(
         "m", "height of the unbent beam above the unloaded spring: equilibrium and unloaded of [spring] are −gap", 0.0
@@ -250,6 +250,10 @@ class Contact(Table):
         """Whether ends that meet have an impact: different velocities before it, one velocity after it."""
         return self.rigid and not self.lasting
 
+    def doubted(self, speed: float) -> str | None:
+        """Return in words what is improbable of the law where ends meet at ``speed`` [m/s], ``None`` if nothing is."""
+        return None
+
     @property
     def damped(self) -> bool:
         """Whether the law dissipates."""
@@ -295,6 +299,16 @@ class ComplianceContact(Contact):
 
     def force(self) -> Compliance:
         return Compliance(self.stiffness, self.exponent, self.damping)
+
+    def doubted(self, speed: float) -> str | None:
+        ratio = self.damping * speed
+        if ratio <= 1.0:
+            return None
+        return (
+            f"contact.damping = {self.damping:g} s/m: where the ends meet, at {speed:.3g} m/s, the damping force is "
+            f"{ratio:.3g} times the elastic one; above 1 is improbable of a solid. A damper in N·s/m is "
+            'law = "kelvin_voigt"'
+        )
 
 
 class KelvinVoigtContact(Contact):

@@ -36,6 +36,23 @@ def bent_energy(scene: Scene, beam: Beam) -> float:
     return 0.5 * shear_stiffness(beam) * beam.length * slope**2
 
 
+def closing_speed(scene: Scene) -> float:
+    """Estimate the speed [m/s] at which the ends meet first: that of the start, and of a fall under constant forces."""
+    rates = []
+    for body in (scene.upper, scene.lower):
+        names = ("velocity", "initial_velocity")
+        rates.append(next((getattr(body, name) for name in names if hasattr(body, name)), 0.0))
+    if scene.beam is not None:
+        rates[0] = scene.beam.initial_velocity_slope * scene.beam.length
+    closing = max(rates[1] - rates[0], 0.0)
+    mass = getattr(scene.upper, "mass", 0.0)
+    heights = [scene.at_start(table) for table in ("beam", "spring")]
+    if not mass or None in heights:
+        return closing
+    gap = heights[0].value - heights[1].value  # type: ignore[union-attr]
+    return sqrt(max(closing**2 - 2.0 * getattr(scene.upper, "external_force", 0.0) / mass * max(gap, 0.0), 0.0))
+
+
 def _load_energy(scene: Scene) -> float:
     """Estimate the energy of loads that begin at once [J]: twice the static deflection under their peaks, 2 F²/k.
 

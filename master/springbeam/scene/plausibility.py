@@ -182,8 +182,8 @@ def _is_coupled(scene: Scene) -> bool:
     return scene.coupled
 
 
-def _has_peak_force(scene: Scene) -> bool:
-    return scene.coupled or (scene.upper is not None and scene.stop is not None)
+def _has_window(scene: Scene) -> bool:
+    return scene.soft_law is None and scene.upper is not None and (scene.coupled or scene.stop is not None)
 
 
 _IN_DYNAMICS = 'it counts with fidelity = "dynamic"'
@@ -199,7 +199,11 @@ EFFECTS: tuple[tuple[tuple[str, ...], Callable[[Scene], bool], str], ...] = (
     (("beam.n_elements",), _has_elements, f"{_IN_DYNAMICS}, or for a tip_load_coefficient"),
     (("beam.n_modes",), _has_modes, f'{_IN_DYNAMICS} and integrator = "modal", the midpoint rule keeps all modes'),
     (("contact.stiffness", "contact.exponent", "contact.damping"), _is_coupled, _JOINS),
-    (("contact.force_window",), _has_peak_force, "it counts where the run has a peak contact force"),
+    (
+        ("contact.force_window",),
+        _has_window,
+        "it counts where a contact is rigid",
+    ),
 )
 
 

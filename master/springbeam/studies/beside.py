@@ -9,8 +9,9 @@ import numpy as np
 
 from ..pictures.diagrams import Diagram, draw_diagrams
 from ..results.judged import WORDS
-from ..results.totals import LOSS_NAMES, TOTALS, peak_force
+from ..results.totals import LOSS_NAMES, TOTALS
 from ..results.trajectory import Trajectory, columns_of
+from ..results.window_peak import peak_force
 from ..scene import Scene
 from ..signals.curves import unit_of
 from ..signals.measured import Measured, model, residuals, time_shift

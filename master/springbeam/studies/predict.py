@@ -31,7 +31,7 @@ from ..run.outcome import RunStopped
 from ..run.runner import Simulation
 from ..scene import Beam, Scene, with_changes
 from ..scene.laws import depth
-from ..scene.linearised import contact_energy, spring_frequency, spring_stiffness
+from ..scene.linearised import closing_speed, contact_energy, spring_frequency, spring_stiffness
 from ..scene.plausibility import warnings_of
 from ..scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
 
@@ -85,6 +85,8 @@ def predict(scene: Scene) -> dict[str, Any]:
         "exchange": None,
     } | dict.fromkeys(names)
     notes = warnings_of(scene)
+    if scene.coupled and (doubted := scene.contact.doubted(closing_speed(scene))) is not None:
+        notes.append(doubted)
     notes += [f"[{table}] is not our own body: its frequencies are not known beforehand" for table in scene.partners]
     if scene.accuracy is not None:
         notes.append(f"accuracy = {scene.accuracy:g} picks scheme and macro step by itself; this is about those given")

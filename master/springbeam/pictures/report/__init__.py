@@ -14,6 +14,7 @@ import jinja2
 import numpy as np
 import tomli_w
 
+from ...results.contacts import CONTACT_UNITS
 from ...results.judged import judged_in_words
 from ...results.totals import in_words
 from ...results.trajectory import Trajectory, cascades, rounded
@@ -84,6 +85,9 @@ def page(trajectory: Trajectory) -> str:
         results=list(in_words(trajectory.summary)),
         judged=judged_in_words(trajectory.summary, trajectory.scene.duration),
         events=list(cascades(events)),
+        contact_units=CONTACT_UNITS,
+        contacts=trajectory.contacts,
+        contacts_shown=_EVENTS_SHOWN,
         event_values=values,
         event_scales={name: max((abs(getattr(e, name) or 0.0) for e in events), default=0.0) for name in values},
         rounded=rounded,

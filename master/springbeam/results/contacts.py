@@ -1,0 +1,169 @@
+"""Each contact of a run: when, how long, its impulse, peak force, depth and loss, velocities before and after it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan
+from typing import NamedTuple
+
+import numpy as np
+
+from ..motion.events import Event
+from ..scene import Scene
+from .contact_times import between_tip_and_spring, with_foundation
+from .dense import inside
+from .law_peak import peak_of_law
+from .records import impulse
+from .window_peak import peak_force
+
+
+class Contact(NamedTuple):
+    """A contact of tip and spring, or of a single body with the foundation; a row of ``contacts.csv``."""
+
+    begin: float  #: [s]
+    duration: float  #: [s]; of an impact that separates at once 0
+    impulse: float  #: on the upper of both, upward: ∫ C dt and impacts [N·s]
+    #: Largest force [N]: of the law, or of a rigid contact the mean over the window; ``None`` if that is not known.
+    peak_force: float | None
+    peak_time: float | None  #: when that is, or when the window begins [s]
+    depth: float  #: largest penetration by the law; of a rigid one the distance that the ends go down together [m]
+    loss: float  #: by the contact law, or in its impacts [J]
+    v_tip_before: float  #: velocities of tip and lower end where they meet [m/s]; that of a wall, or of no body, is 0
+    z_before: float
+    v_tip_after: float | None  #: and where they part; ``None`` if the run ends in the contact
+    z_after: float | None
+
+    @property
+    def closing(self) -> float:
+        """Speed at which the ends meet [m/s]."""
+        return self.z_before - self.v_tip_before
+
+    @property
+    def opening(self) -> float | None:
+        """Speed at which they part [m/s]; ``None`` if the run ends in the contact."""
+        return None if self.v_tip_after is None or self.z_after is None else self.v_tip_after - self.z_after
+
+
+#: Units of the columns of ``contacts.csv``.
+CONTACT_UNITS = dict(zip(Contact._fields, ("s", "s", "N·s", "N", "s", "m", "J", *["m/s"] * 4), strict=True))
+
+
+def contacts_as_array(found: Sequence[Contact]) -> np.ndarray:
+    """Return contacts as an array of their columns, NaN for ``None``."""
+    kind = np.dtype([(name, "<f8") for name in Contact._fields])
+    return np.array([tuple(nan if value is None else value for value in contact) for contact in found], kind)
+
+
+def contacts(scene: Scene, steps: np.ndarray, events: Sequence[Event], window: float | None) -> list[Contact]:
+    """Return the contacts of a run in their order; a law that joins the ends for good has none.
+
+    Parameters
+    ----------
+    scene
+        As run.
+    steps, events
+        Of the whole run so far; steps of dtype `springbeam.results.records.STEP`.
+    window
+        Over which the force of a rigid contact is averaged [s]; ``None`` for a soft law, or if it is not known, as of a
+        run that was killed.
+    """
+    if not len(steps) or (scene.coupled and scene.contact.lasting):
+        return []
+    events = events[: int(steps["events"][-1])]  # a run that was killed may have some without their records
+    between = between_tip_and_spring(events) if scene.coupled else with_foundation(events)
+    found = _Found(scene, steps, events, window)
+    return [found.contact(*each) for each in between]
+
+
+class _Found:
+    """What all contacts of a run follow from; parameters as of `contacts`."""
+
+    def __init__(self, scene: Scene, steps: np.ndarray, events: Sequence[Event], window: float | None) -> None:
+        self._steps = steps
+        self._events = events
+        self._window = window
+        self._law = scene.soft_law
+        #: Whether there is a foundation and nothing but the lower body above it, on which its impulses act.
+        self._lower = scene.upper is None
+        self._pair = scene.coupled
+        force = "foundation_force" if self._lower else "contact_force"
+        self._gained = impulse(steps, force)
+        self._rows = steps["events"]
+        self._shared = np.zeros(len(steps))  #: time of a step that contacts by a soft law overlap [s]
+        if self._law is not None:
+            for first, last in between_tip_and_spring(events):
+                for row, overlap in self._edges(first, last).items():
+                    self._shared[row] += overlap
+
+    def contact(self, first: int, last: int | None) -> Contact:
+        events = self._events[first : None if last is None else last + 1]
+        begin = events[0].time
+        end = float(self._steps["time"][-1]) if last is None else events[-1].time
+        rows = slice(self._row(first), len(self._steps) if last is None else self._row(last) + 1)
+        if self._law is not None:
+            velocities = *_velocities(events[0]), *((None, None) if last is None else _velocities(events[-1]))
+            return Contact(begin, end - begin, *self._soft(first, last, rows), *velocities)
+        return Contact(begin, end - begin, *self._rigid(rows, events), *self._velocities(rows, last is None))
+
+    def _row(self, event: int) -> int:
+        """Return the record that has the ``event`` of this number."""
+        return int(np.searchsorted(self._rows, event + 1))
+
+    # -- soft ----------------------------------------------------------------------------------------------------------
+
+    def _edges(self, first: int, last: int | None) -> dict[int, float]:
+        """Return the records of the steps in which a contact begins and ends, and how long they are in it [s]."""
+        time = self._steps["time"]
+        begin = self._events[first].time
+        end = float(time[-1]) if last is None else self._events[last].time
+        found = {}
+        for row in {self._row(first), len(time) - 1 if last is None else self._row(last)}:
+            found[row] = max(min(end, float(time[row])) - max(begin, float(time[row] - self._steps["size"][row])), 0.0)
+        return found
+
+    def _soft(self, first: int, last: int | None, rows: slice) -> tuple[float, float, float, float, float]:
+        """Return impulse, peak force and its time, depth and loss; contacts share a step by their times in it."""
+        assert self._law is not None
+        steps = self._steps[max(rows.start - 1, 0) : rows.stop]
+        weights = np.ones(rows.stop - rows.start)
+        for row, overlap in self._edges(first, last).items():
+            if self._shared[row] > 0.0:
+                weights[row - rows.start] = overlap / self._shared[row]
+        lost = np.diff(self._steps["law_dissipated"][rows], prepend=steps["law_dissipated"][0])
+        deepest = -inside(False, steps, "gap").extremes["gap"].lowest
+        return (
+            float(weights @ self._gained[rows]),
+            *peak_of_law(self._law, steps),
+            max(deepest, 0.0),
+            float(weights @ lost),
+        )
+
+    # -- rigid ---------------------------------------------------------------------------------------------------------
+
+    def _rigid(self, rows: slice, events: Sequence[Event]) -> tuple[float, float | None, float | None, float, float]:
+        """Return impulse, peak force and its time, depth and loss."""
+        steps = self._steps[rows].copy()
+        steps["size"][0] = 0.0  # the step before the contact is no part of it
+        kicked = [event.impulse_foundation if self._lower else event.impulse_contact for event in events]
+        given = float(self._gained[rows][1:].sum()) + sum(kicked)
+        duration = float(steps["time"][-1] - steps["time"][0])
+        peak: tuple[float | None, float | None] = (None, None)
+        if self._window is not None:
+            peak = max(given, 0.0) / self._window, float(steps["time"][0])
+            if duration > 0.0 and not self._lower:
+                peak = peak_force(steps, events, self._window)
+        height = "y" if self._lower or self._pair else "u_tip"
+        depth = float(steps[f"{height}_after"][0] - inside(True, steps, height).extremes[height].lowest)
+        lost = sum(event.energy_loss for event in events if event.kind.strikes is not self._pair)
+        return given, *peak, max(depth, 0.0) if self._pair else 0.0, lost
+
+    def _velocities(self, rows: slice, lasts: bool) -> tuple[float, float, float | None, float | None]:
+        """Return the velocities of both ends before the first event and after the last one [m/s]."""
+        first = self._steps[rows.start]
+        last = self._steps[rows.stop - 1]
+        after = (None, None) if lasts else (float(last["v_tip_after"]), float(last["z_after"]))
+        return float(first["v_tip"]), float(first["z"]), *after
+
+
+def _velocities(event: Event) -> tuple[float, float]:
+    return event.v_tip or 0.0, event.z or 0.0
