@@ -52,8 +52,15 @@ def ran(*words, env=None, **options):
 
 
 def written(directory):
-    """Return the files to which a run appends: those of one that goes on are, to the last byte, those of the whole."""
-    return {path.name: path.read_bytes() for path in directory.iterdir() if path.suffix in (".csv", ".bin")}
+    """Return the files to which a run appends, and tables of these: they begin as those of the whole run.
+
+    A contact in which a run ends goes on in the whole one.
+    """
+    return {
+        path.name: path.read_bytes()
+        for path in directory.iterdir()
+        if path.suffix in (".csv", ".bin") and path.stem != "contacts"
+    }
 
 
 class Interrupt:

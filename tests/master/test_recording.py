@@ -177,14 +177,14 @@ def test_tables_are_written_again_from_the_arrays(tmp_path):
 def test_tables_are_exported_as_parquet(tmp_path, scene):
     run = filed(tmp_path / "run", block(30, scene), scene=scene)
     files = export(tmp_path / "run", "parquet")
-    assert [file.name for file in files] == list(PARQUET[: 2 + (scene.beam is not None)])
+    assert [file.name for file in files] == list(PARQUET[: 3 + (scene.beam is not None)])
     there = load_trajectory(run.directory.path)
     tables = [parquet.read_table(file).to_pydict() for file in files]
     assert tables[0] == {name: values.tolist() for name, values in there.columns.items()}
     assert tables[1]["kind"] == ["impact"] * 3
     assert tables[1]["v_tip"] == [event.v_tip for event in there.events]
     if scene.beam is not None:
-        assert tables[2]["u_20"] == there.shapes[1][:, 20].tolist()
+        assert tables[3]["u_20"] == there.shapes[1][:, 20].tolist()
 
 
 DAMAGE = {

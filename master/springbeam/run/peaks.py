@@ -19,8 +19,8 @@ PEAK_DOUBTED = "the peak contact force "
 def force_window(pair: Pair, steps: np.ndarray, slowest: float) -> float:
     """Return over which time the contact force is averaged before its peak is taken [s].
 
-    It is ``contact.force_window``, or `WINDOW` of a period: of our beam, by its ``slowest`` frequency [rad/s]; of another upper body; of both ends as one. Where none of
-    these is known, or oscillates, it is that share of the run.
+    It is ``contact.force_window``, or `WINDOW` of a period: of our beam, by its ``slowest`` frequency [rad/s]; of
+    another upper body; of both ends as one. Where none of these is known, or oscillates, it is that share of the run.
     """
     if pair.setup.force_window is not None:
         return pair.setup.force_window
