@@ -211,7 +211,7 @@ def _examine(bench: Bench, upward: float) -> Findings:
     length = max(1e-3 * abs(x), abs(v) * H, 1e-6)
     lag = _lag(bench, mass * length)
     bench.faults += sorted(bench.wrong(partial(_wrong_outputs, bench, mass * length)))
-    if promised:
+    if promised and lag == 0.0 and bench.body.abilities.order > 1:  # to order 1 no slope is followed
         _try_slopes(bench, mass * length)
     if bench.body.abilities.impulse and bench.body.abilities.velocity:
         mass = _struck_mass(bench, spec.mass or mass, length / H)
