@@ -139,10 +139,8 @@ def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
     assert (out / "crosscheck.png").stat().st_size > 10_000
 
 
-#: A tenth of scenes that a campaign draws, at coarse steps, and the verdict on each. In the first, the waves of impacts
-#: on the stop amplify any error 4e4 times. In 8, 15 and 12, half the step changes less than both runs err, by chance.
-#: In 12 and 23 a damper acts at the start.
-DRAWN = {0: "not comparable", 8: "agrees", 15: "agrees", 12: "agrees", 23: "agrees"}
+#: A tenth of scenes that a campaign draws, at coarse steps, and the verdict on each.
+DRAWN = {0: "not comparable", 8: "agrees", 12: "agrees", 15: "agrees"}
 
 
 def tenth(number):
