@@ -13,6 +13,8 @@ from springbeam.results.distance import distance
 from springbeam.run import companion
 from springbeam.run.companion import LIMITS, LONGER, check
 from springbeam.scene import scene_from_dict
+from springbeam.studies.metrics import metrics_of
+from springbeam.studies.study import measured
 
 #: Soft laws, ties, impacts on the foundation, creeping and fine beams, of `tests/scenes.toml`.
 JUDGED = group("judged")
@@ -153,3 +155,13 @@ def test_an_unfinished_run_is_not_checked():
     run = simulate(falling(), check=False)
     with pytest.raises(ValueError, match="has not come to its end"):
         check(replace(run, summary={**run.summary, "status": "stopped"}))
+
+
+def test_a_case_of_a_study_has_the_error_of_each_metric():
+    found = measured(falling, metrics_of(["y_min", "number_of_contacts", "max_z"]))
+    run = check(simulate(falling(), check=False))
+    assert found["error_y_min"] == run.error_of(metrics_of(["y_min"])["y_min"])
+    assert found["error_number_of_contacts"] == 0.0
+    unjudged = measured(falling, metrics_of(["y_min"]), judge=False)
+    assert "error_y_min" not in unjudged
+    assert found["y_min"] == unjudged["y_min"]

@@ -251,7 +251,7 @@ def _lines(summary: Mapping[str, Any], duration: float) -> Iterator[str]:
         beside = "" if interface is None else f", of the interface {float(interface):.1e}"
         yield f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}{beside}"
     if (found := summary.get("accuracy")) is not None:
-        yield f"accuracy  {picked_in_words(found)}"
+        yield f"accuracy  {picked_in_words(found)}, after {found['pilot_runs']} runs in {found['pilot_time']:.2g} s"
     if (said := judged_in_words(summary, duration)) is not None:
         yield f"errors    {said}"
     yield from (f"warning   {warning}" for warning in summary.get("warnings", ()))
