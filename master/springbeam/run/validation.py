@@ -23,7 +23,7 @@ _LACKS = {
     "state": "its state cannot be saved (canGetAndSetFMUstate = false)",
     "any_size": "its steps have one size (canHandleVariableCommunicationStepSize = false, or steps inside)",
     "velocity": "it has no velocity",
-    "integrals": "its Motion has wrong integrals, or it has not integral and integral_2, or a solver of order 1",
+    "integrals": "its Motion has wrong integrals, its solver is of order 1, or it has not integral and integral_2",
     "impulse": "it has no impulse, or of a body of your own no apply_impulse",
 }
 _TO_BE_STRUCK = ("state", "any_size", "velocity", "impulse")
