@@ -5,7 +5,7 @@ values is a file of two columns, time and value (``recorded``).
 """
 
 from collections.abc import Callable
-from math import inf, isfinite
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -24,6 +24,8 @@ else:
 
 #: With so many lines of a table in a step, no step ends at its kinks.
 LINES_IN_STEP = 4
+#: A time that no run has [s].
+_FOR_EVER = 1e300
 #: Most different places of point forces on a beam.
 MOST_POINTS = 4
 
@@ -378,13 +380,19 @@ class FunctionLoad(OfProgram, Load):
     """A load that is a function of time: ``with_changes(scene, loads=[FunctionLoad(on="tip", function=f)])``.
 
     ``function`` returns the value at one time [s], in the unit of the load; steps end at the times ``breaks`` [s], at
-    which it jumps or has a kink. ``derivative``, of the function, is for the motion of a wall.
+    which it jumps or has a kink. ``derivative``, of the function, is for the motion of a wall; ``fastest``, the rate of
+    its fastest oscillation [rad/s], for references and steps in which it turns by more than a radian.
     """
 
     signal: str = "function"
     function: Callable[[float], float]
     derivative: Callable[[float], float] | None = None
     breaks: Annotated[tuple[float, ...], Field(strict=False)] = ()
+    fastest: float = 0.0
+
+    @property
+    def rate(self) -> float:
+        return self.fastest
 
     @property
     def _bends(self) -> tuple[float, ...]:
@@ -400,7 +408,8 @@ class FunctionLoad(OfProgram, Load):
 
 
 def _each(function: Callable[[float], float], times: "np.ndarray") -> "np.ndarray":
-    values = [function(time) if isfinite(time) else 0.0 for time in np.ravel(times).tolist()]
+    # A reference asks for the value at the end of all times, too.
+    values = [function(time) if abs(time) < _FOR_EVER else 0.0 for time in np.ravel(times).tolist()]
     return np.reshape(np.array(values, dtype=float), np.shape(times))
 
 
