@@ -10,8 +10,10 @@ from pathlib import Path
 import pytest
 import typer
 
+from springbeam.cli import run
 from springbeam.cli.common import interruptible
 from springbeam.results.files import load_trajectory
+from springbeam.scene import load_scene
 
 # -- stopped early: exit code 3, what was computed is there -------------------------------------------------------
 
@@ -55,3 +57,30 @@ def test_an_interrupt_that_is_lost_in_a_finaliser_is_not_the_last(capsys):
         work()
     assert ended.value.exit_code == 3
     assert capsys.readouterr().err == "error: interrupted\n"
+
+
+# -- the cost of a run, before it begins --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("answer", "made"), [(True, True), (False, False), (None, True)])
+def test_a_run_of_years_is_made_after_a_question_on_a_terminal(monkeypatch, capsys, answer, made):
+    """6e11 steps of 3 µs or more are three weeks at least; a batch job is told, and runs."""
+    asked = []
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: answer is not None, raising=False)
+    monkeypatch.setattr(typer, "confirm", lambda words, err: asked.append(words) or answer)
+    scene = load_scene("soft", ["coupling.macro_step=1e-12"])
+    if made:
+        run._ask_if_long(scene)
+    else:
+        with pytest.raises(typer.Exit) as refused:
+            run._ask_if_long(scene)
+        assert refused.value.exit_code == 2
+    said = asked[0] if asked else capsys.readouterr().err
+    assert bool(asked) == (answer is not None)
+    assert "6e+11 macro steps take about " in said
+    assert any(unit in said for unit in ("days", "years"))
+
+
+def test_a_run_of_seconds_is_made_without_a_question(monkeypatch):
+    monkeypatch.setattr(typer, "confirm", None)
+    run._ask_if_long(load_scene("soft"))

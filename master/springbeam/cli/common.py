@@ -370,6 +370,15 @@ def interruptible() -> Iterator[None]:
         os.close(receiver)
 
 
+def in_time(seconds: float) -> str:
+    """Return a time in words, in the unit that suits it."""
+    sizes = {"years": 365.25 * 86400.0, "days": 86400.0, "hours": 3600.0, "minutes": 60.0}
+    for unit, size in sizes.items():
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.2g} s"
+
+
 def fail(code: int, message: str) -> NoReturn:
     """End the command with an error on stderr."""
     typer.echo(f"error: {message}", err=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -29,6 +30,7 @@ from .common import (
     SettingsOption,
     cause_of,
     fail,
+    in_time,
     progress,
 )
 
@@ -43,6 +45,9 @@ if TYPE_CHECKING:
 #: Most rows that --output-interval may ask for.
 _MOST_ROWS = 10_000_000
 _REFRESH_SECONDS = 0.1
+#: A run of fewer steps is not timed before it is made; one that takes so long [s] is made if the user agrees.
+_MANY_STEPS = 1e6
+_LONG = 7200.0
 #: Events and cascades of a kind that the table shows; others of this kind are one line, and all are in events.csv.
 _FIRST_OF_KIND = 8
 #: So many contacts are shown one by one.
@@ -89,6 +94,7 @@ def run(
     _refuse_options(what, interval)
     for line in () if quiet or as_json else implausible(what):
         typer.echo(f"warning: {line}", err=True)
+    _ask_if_long(what)
     made = picked(what, silent=quiet or as_json)
     what = what if made is None else made.scene
     default = Path("results") / Path(scene).stem
@@ -107,6 +113,24 @@ def _refuse_options(scene: Scene, interval: float | None) -> None:
     if interval is not None and not end / _MOST_ROWS <= interval < inf:
         rows = f"of which at most {_MOST_ROWS:,} lie before time.t_end = {end:g} s"
         fail(BAD_INPUT, f"--output-interval {interval:g}: must be a time [s], {rows}")
+
+
+def _ask_if_long(scene: Scene) -> None:
+    """Ask, on a terminal, whether a run is to be made that takes hours; elsewhere say how long it takes."""
+    if scene.accuracy is not None or scene.coupling.adaptive or scene.duration < _MANY_STEPS * scene.coupling.H:
+        return
+    from ..studies.predict import cost_of
+
+    cost = cost_of(scene)
+    seconds = cost["seconds"]
+    if seconds is None or seconds < _LONG:
+        return
+    words = f"{cost['macro_steps']:.3g} macro steps take about {in_time(seconds)}"
+    remedy = "a longer coupling.macro_step, or an accuracy, takes fewer"
+    if not sys.stdin.isatty():
+        typer.echo(f"note: {words}; {remedy}", err=True)
+    elif not typer.confirm(f"{words}; {remedy}. Run it all the same?", err=True):
+        fail(BAD_INPUT, "not run")
 
 
 def picked(scene: Scene, *, silent: bool) -> Trajectory | None:

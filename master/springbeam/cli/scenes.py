@@ -14,7 +14,7 @@ from rich.text import Text
 
 from ..scene.files import beginning, shipped_scenes, tables_of
 from ..studies.tables import Findings, table
-from .common import BAD_INPUT, JsonOption, SceneArgument, SettingsOption, fail, progress
+from .common import BAD_INPUT, JsonOption, SceneArgument, SettingsOption, fail, in_time, progress
 
 
 def _complete_table(incomplete: str) -> list[str]:
@@ -161,7 +161,7 @@ def _lines(p: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if p["exchange"] is not None:
         yield "scheme", _exchange(**p["exchange"])
     seconds = p["cost"]["seconds"]
-    about = "" if seconds is None else f", about {seconds:.2g} s with the companion run"
+    about = "" if seconds is None else f", about {in_time(seconds)} with the companion run"
     yield "run", f"{p['cost']['macro_steps']} macro steps{about}"
 
 

@@ -22,6 +22,8 @@ _YOUNG_OVER_SHEAR = (0.5, 200.0)
 _SLENDERNESS = (3.0, 3e4)
 #: Range of the lowest frequency [Hz] of macroscopic beams.
 _FREQUENCIES = (1e-2, 1e7)
+#: A run that sees fewer periods of the beam has its lengths in mm, if it would see more then.
+_SEEN = 0.1
 #: Mass of the beam over that of the spring, or vice versa.
 _MASS_RATIO = (1e-6, 1e6)
 #: Speed of the tip over that of sound in the beam, about its largest strain: no solid stays elastic beyond.
@@ -50,7 +52,7 @@ def implausible(scene: Scene) -> Iterator[str]:
     """
     beam = scene.beam
     if beam is not None and 1.0 not in (beam.area, beam.density):
-        for text in _improbable(beam, scene.spring):
+        for text in _improbable(beam, scene.spring, scene.time.t_end):
             yield filled(scene, text)
 
 
@@ -61,7 +63,7 @@ def _beyond(value: float, bounds: tuple[float, float]) -> bool:
     return not bounds[0] <= value <= bounds[1]
 
 
-def _improbable(beam: Beam, spring: Spring | None) -> Iterator[str]:
+def _improbable(beam: Beam, spring: Spring | None, end: float) -> Iterator[str]:
     for key, unit, bounds, known, other, factor in _MATERIALS:
         if _beyond(getattr(beam, key), bounds):
             meant = factor * getattr(beam, key)
@@ -84,6 +86,12 @@ def _improbable(beam: Beam, spring: Spring | None) -> Iterator[str]:
     frequency = 0.5 / math.pi / math.sqrt(tip_compliance(beam) * tip_inertia(beam))
     if beam.fidelity == "dynamic" and _beyond(frequency, _FREQUENCIES):
         yield f"[beam]: its lowest frequency is {frequency:.2g} Hz; check length, section, density and young_modulus"
+    elif beam.fidelity == "dynamic" and beam.length >= 1.0 and frequency * end < _SEEN < 1e3 * frequency * end:
+        yield (
+            f"[beam.length]: its lowest frequency is {frequency:.2g} Hz, of which the run sees {frequency * end:.2g} "
+            f"periods; with all lengths in mm it would be {1e-3 * beam.length:g} m long and vibrate at "
+            f"{1e3 * frequency:.3g} Hz"
+        )
     mass = beam.density * beam.area * beam.length
     if spring is not None and _beyond(mass / spring.mass, _MASS_RATIO):
         milli = f"; in mm it would be {1e-3 * beam.length:g} m long, of {1e-9 * mass:.3g} kg"

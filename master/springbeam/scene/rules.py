@@ -276,8 +276,8 @@ def _steps(scene: Scene) -> Iterator[str]:
     H = scene.coupling.macro_step
     if H is None or scene.accuracy is not None:  # which picks scheme, degree and steps that go together
         return
-    steps = scene.time.t_end / H
-    if steps < 1.0:
+    steps = scene.duration / H
+    if scene.time.t_end < H:
         default = ", the default" if H == DEFAULT_STEP else ""
         yield (
             f"[coupling.macro_step]{default}: must be at most [time.t_end]; give a smaller one, or an accuracy, which "
@@ -285,8 +285,8 @@ def _steps(scene: Scene) -> Iterator[str]:
         )
     if steps > MOST_MACRO_STEPS:
         yield (
-            f"[coupling.macro_step]: [time.t_end] would take {steps:.1e} macro steps; at most {MOST_MACRO_STEPS:.0e} "
-            "are allowed"
+            f"[coupling.macro_step]: the run would take {steps:.1e} macro steps up to [time.t_end]; at most "
+            f"{MOST_MACRO_STEPS:.0e} are allowed"
         )
 
 
