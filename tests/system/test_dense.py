@@ -32,7 +32,7 @@ def test_rows_are_themselves_and_between_them_every_column_holds(name):
     middles = inside[2]
     scale = np.abs(run.e_total).max()
     assert np.abs(middles.energy_residual).max() <= 2.0 * np.abs(run.energy_residual).max() + 1e-14 * scale
-    for column in {"clamp_force", "clamp_moment", "e_contact", "e_dissipated"} & set(run.columns):
+    for column in {"e_contact", "e_dissipated"} & set(run.columns):
         straight = 0.5 * (run[column][rows - 1] + run[column][rows])
         assert middles[column] == pytest.approx(straight, rel=1e-12, abs=1e-12 * np.abs(run[column]).max()), column
     together = are_joined(begin) & run.scene.contact.rigid

@@ -9,6 +9,7 @@ record as at a row, and its columns follow from that (`springbeam.results.column
   gap, linear between the rows; so does a tip that the foundation holds;
 * contact and foundation force are those of both rows and, between them, the polynomials applied, without the part of
   the mismatch (`forces`: order 6 for a rigid law, d + 3 for a soft one; of an exchange, linear);
+* inner forces of the beam follow cubics (`springbeam.results.inner`: order 4);
 * the energies are linear between the rows (order 2); an event changes them at its row.
 
 At the time of a row the values are the row's, at an event those after it. Orders are those of the polynomials: values
@@ -31,14 +32,16 @@ from ..motion.events import Event
 from ..motion.paths import LAST_MOMENT, Path, derivative, sign_changes, value
 from ..scene import Scene
 from .columns import columns
+from .inner import INNER, MAGNITUDE, curves
 from .records import Records, Rows, common, joined, reduced_mass, seated
+from .spans import Extremes as Extremes
 from .spans import rounding_of_steps, span
 from .trajectory import Trajectory
 
 #: Fields that are linear between rows, and do not change with an event.
 _LINEAR = (
     *("law_stored", "law_dissipated", "beam_received", "spring_received"),
-    *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress"),
+    "tip_acceleration",
     *(f"{body}_{what}" for body in ("beam", "spring") for what in ("potential", "dissipated", "load")),
 )
 #: Columns that are polynomials between rows, whose extremes `inside` finds.
@@ -100,6 +103,12 @@ def rows_at(run: Trajectory, times: Any) -> Trajectory:
     before = records.take(between)
     after = steps.take(row[between] + 1)
     np.put(records, between, _between(run.scene, before, after, run.events, wanted[between]))
+    for name in INNER:
+        number, powers = curves(steps, name)
+        begins = steps["time"][row[between]]
+        share = (wanted[between] - begins) / (steps["time"][row[between] + 1] - begins)
+        there = polyval(share, powers[:, np.searchsorted(number, row[between] + 1)], tensor=False)
+        records[name][between] = np.maximum(there, 0.0) if name == MAGNITUDE else there
     made = columns(run.scene, records, steps[:1])
     return Trajectory(run.scene, made, list(run.events), summary=dict(run.summary))
 
@@ -137,22 +146,6 @@ def at_multiples(run: Trajectory, interval: float, start: float = 0.0) -> Trajec
     first, last = ((run.time[i] - start) / interval for i in (0, -1))
     times = start + interval * np.arange(np.ceil(first - _SAME * abs(first)), np.floor(last + _SAME * abs(last)) + 1.0)
     return rows_at(run, np.clip(times, run.time[0], run.time[-1]))
-
-
-class Extremes(NamedTuple):
-    """Lowest and highest value of a column, and their times [s]."""
-
-    lowest: float
-    lowest_time: float
-    highest: float
-    highest_time: float
-
-    @classmethod
-    def of_rows(cls, times: np.ndarray, values: np.ndarray) -> Extremes:
-        """Return those of ``values`` at ``times`` [s], shapes (n,)."""
-        low = int(np.argmin(values))
-        high = int(np.argmax(values))
-        return cls(float(values[low]), float(times[low]), float(values[high]), float(times[high]))
 
 
 class Inside(NamedTuple):

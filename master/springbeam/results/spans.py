@@ -5,7 +5,7 @@ A range that is no larger than the rounding of what the quantity is computed fro
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,22 @@ from .trajectory import Trajectory
 ROUNDING = 1e-13
 #: Least range of a quantity over its rounding; an end that has less does not move.
 FLOOR = 1e4
+
+
+class Extremes(NamedTuple):
+    """Lowest and highest value of a column, and their times [s]."""
+
+    lowest: float
+    lowest_time: float
+    highest: float
+    highest_time: float
+
+    @classmethod
+    def of_rows(cls, times: np.ndarray, values: np.ndarray) -> Extremes:
+        """Return those of ``values`` at ``times`` [s], shapes (n,)."""
+        low = int(np.argmin(values))
+        high = int(np.argmax(values))
+        return cls(float(values[low]), float(times[low]), float(values[high]), float(times[high]))
 
 
 def span(values: Any, rounding: float = 0.0) -> float:

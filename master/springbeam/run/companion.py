@@ -17,6 +17,7 @@ import numpy as np
 
 from ..bodies.protocol import Body, FmuError
 from ..results.distance import Distance, distance
+from ..results.inner import largest
 from ..results.judged import in_words
 from ..results.totals import BESIDE, LOSS_NAMES, TOTALS
 from ..results.trajectory import BODY_COLUMNS, Trajectory
@@ -191,8 +192,11 @@ def results_of(run: Trajectory) -> dict[str, float]:
     names = [name for name in (*TOTALS, *LOSS_NAMES) if name not in BESIDE]
     found = {name: float(run.summary[name]) for name in names if run.summary.get(name) is not None}
     later = run.without_start()
-    for name in (name for name in ("v_tip", "z", *BODY_COLUMNS) if name in later.columns):
+    for name in (name for name in ("v_tip", "z") if name in later.columns):
         found[f"max_{name}"] = float(np.abs(later[name]).max(initial=0.0))
+    for column in (column for column in BODY_COLUMNS if column in run.columns and len(later)):
+        lowest, _, highest, _ = largest(run, column)
+        found[f"max_{column}"] = max(highest, -lowest)
     return found
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..motion.events import EventKind
 from ..results.dense import MOTION, Extremes, inside
+from ..results.inner import largest
 from ..results.totals import LOSS_NAMES, TOTALS
 from ..results.trajectory import BODY_COLUMNS, COLUMNS, Trajectory
 from ..scene import ArgumentError
@@ -57,7 +58,7 @@ def _extreme(column: str, pick: Callable[[Extremes], float]) -> Callable[[Trajec
         if column not in run.columns:
             return None
         if column in BODY_COLUMNS:
-            run = run.without_start()
+            return pick(largest(run, column))
         if run.steps is None or column not in MOTION:  # which is known at its rows only
             return pick(Extremes.of_rows(run.time, run[column]))
         return pick(inside(run.scene.contact.rigid, run.steps, column).extremes[column])

@@ -1,0 +1,102 @@
+"""Inner forces of the beam between the rows: a cubic through the values of both rows and the slopes there.
+
+Rows alone miss the largest value by up to (ω H)²/8 of it. The slope at a row is that of the parabola through it and
+both its neighbours, so that the error between rows is of order 4, (ω H)⁴/48; where a row has an event, slopes are those
+of the parabolas on either side.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.polynomial.polynomial import polyval
+
+from .spans import Extremes
+from .trajectory import Trajectory
+
+#: Columns that have such curves: those of `springbeam.results.trajectory.BODY_COLUMNS` that are no acceleration.
+INNER = ("clamp_force", "clamp_moment", "bending_stress")
+#: The one that is a magnitude.
+MAGNITUDE = "bending_stress"
+
+
+def curves(steps: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers of the records that end a step, and the curve of a column over each as powers of s = τ/H.
+
+    Parameters
+    ----------
+    steps
+        Consecutive records of dtype `springbeam.results.records.STEP`.
+    name
+        One of `INNER`.
+
+    Returns
+    -------
+    tuple
+        Shapes (n,) and (4, n).
+    """
+    made = np.flatnonzero(steps["size"][1:] > 0.0) + 1
+    if not len(made):
+        return made, np.zeros((4, 0))
+    size: Any = steps["size"][made]
+    start = steps[name][made - 1]
+    end = steps[name][made]
+    rate = (end - start) / size
+    # A step goes on smoothly where the one before ends without an event: at the row where it begins.
+    smooth = (made[1:] == made[:-1] + 1) & (steps["events"][made[:-1]] == steps["events"][made[:-1] - 1])
+    between = (rate[:-1] * size[1:] + rate[1:] * size[:-1]) / (size[1:] + size[:-1])
+    first = rate.copy()
+    last = rate.copy()
+    first[1:][smooth] = between[smooth]
+    last[:-1][smooth] = between[smooth]
+    # At an end of a smooth stretch the parabola of its other end: the mean of both slopes is that of the step.
+    begins = np.append(True, ~smooth)
+    ends = np.append(~smooth, True)
+    only = begins & ~ends
+    first[only] = 2.0 * rate[only] - last[only]
+    only = ends & ~begins
+    last[only] = 2.0 * rate[only] - first[only]
+    rise = end - start
+    d0 = first * size
+    d1 = last * size
+    return made, np.array([start, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise])
+
+
+def inside(steps: np.ndarray, name: str) -> Extremes:
+    """Return the extremes of a column of `INNER` on its curve."""
+    rows = Extremes.of_rows(steps["time"], steps[name])
+    made, powers = curves(steps, name)
+    if not len(made):
+        return rows
+    places = _turning(powers)
+    values = np.concatenate([polyval(s, powers, tensor=False) for s in places])
+    if name == MAGNITUDE:
+        values = np.maximum(values, 0.0)
+    times = np.concatenate([steps["time"][made] - (1.0 - s) * steps["size"][made] for s in places])
+    found = Extremes.of_rows(times, values)
+    low = found[:2] if found.lowest < rows.lowest else rows[:2]
+    high = found[2:] if found.highest > rows.highest else rows[2:]
+    return Extremes(*low, *high)
+
+
+def largest(run: Trajectory, name: str) -> Extremes:
+    """Return the extremes of a column of a body in ``run``, on its curve where it has one.
+
+    The first row is left out where it contradicts the clamp (`Trajectory.without_start`).
+    """
+    later = run.without_start()
+    if name not in INNER or run.steps is None:
+        return Extremes.of_rows(later.time, later[name])
+    return inside(run.steps[-len(later) :], name)
+
+
+def _turning(powers: np.ndarray) -> list[np.ndarray]:
+    """Return where cubics of coefficients (4, n) turn, twice (n,): shares of the step, 0 where that is outside."""
+    _, a, b, c = powers
+    # Roots of a + 2 b s + 3 c s², in the form that loses no digits.
+    root = np.sqrt(np.maximum(b * b - 3.0 * a * c, 0.0))
+    q = -(b + np.copysign(root, b))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        both = [q / (3.0 * c), a / q]
+    return [np.where((s > 0.0) & (s < 1.0), s, 0.0) for s in both]
