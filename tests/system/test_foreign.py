@@ -122,13 +122,6 @@ def test_link_and_tie_are_exact_and_keep_the_interface_energy(fmu, without):
     assert run.summary["resolved"]
 
 
-def test_without_integrals_the_force_has_degree_0(fmu):
-    """The run is that of the element, whose moments no condition needs."""
-    spring = {"integral": None, "integral_2": None}
-    run, exact = (simulate(pair(fmu(), spring=s, contact=TIE, coupling={"degree": 0})) for s in (spring, ELEMENT))
-    assert np.abs(run.y - exact.y).max() < 1e-13
-
-
 ELEMENT = {"element": "spring_damper", "mass": M2, "stiffness": K, "damping": C}
 #: A mass of weight 8 N below: its tables, and the stiffness k of what holds it.
 HEAVY = {

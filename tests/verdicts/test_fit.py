@@ -6,7 +6,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-import oscillator
 import pytest
 from commands import Interrupt, command, printed
 from hypothesis import Phase, example, given, settings
@@ -415,35 +414,3 @@ def test_what_is_called_determined_is_right(stiffness, damping, guess, late, sha
         for row in found["keys"]:
             right = {**{f"spring.{name}": value for name, value in drawn.items()}, "shift": -late}[row["key"]]
             assert abs(row["value"] - right) <= 2.0 * max(row["high"] - row["value"], row["value"] - row["low"])
-
-
-@pytest.mark.parametrize(("kind", "stiffness"), [("element", 80.0), ("fmu", 80.0), ("element", 200.0)])
-def test_keys_of_a_contact_are_found_whatever_body_it_meets(tmp_path, kind, stiffness):
-    """A mass falls on an oscillator, an element or an FMU of others; the record is that of an element.
-
-    The right keys are found and determined; none are if the recorded oscillator has another ``stiffness``.
-    """
-    tables = {
-        "time": {"t_end": 0.5},
-        "beam": {"element": "point_mass", "mass": 1.0, "displacement": 0.05, "velocity": -1.0},
-        "spring": {"element": "spring_damper", "mass": 2.0, "stiffness": 80.0, "damping": 0.6},
-        "contact": {"law": "compliance", "stiffness": 500.0, "exponent": 1.0, "damping": 0.3},
-        "coupling": {"macro_step": 0.01},
-    }
-    times = np.linspace(0.06, 0.49, 80)
-    recorded = simulate(with_changes(as_scene(tables), spring={"stiffness": stiffness})).at(times)["u_tip"]
-    path = written(tmp_path / "m.csv", "time,u_tip", times, noisy(recorded, 0.003))
-    if kind == "fmu":
-        tables["spring"] = {
-            **oscillator.ALL,
-            "fmu": str(oscillator.made(tmp_path / "other.fmu")),
-            "force_sign": -1,
-            "parameters": {"m": 2.0, "k": 80.0, "c": 0.6},
-        }
-    found = fitted(path, ["contact.stiffness=900", "contact.damping=0.2"], as_scene(tables), shift=0.0)
-    if stiffness != 80.0:
-        assert any("is no noise" in why for why in found["undetermined"])
-        return
-    assert found["undetermined"] == []
-    for row, value in zip(found["keys"], (500.0, 0.3), strict=True):
-        assert abs(row["value"] - value) <= row["high"] - row["low"]
