@@ -182,7 +182,8 @@ class Projection:
             return ()
         away = low > _OFF_ZERO * high
         breaks = [-1.0, *(() if away else sign_changes(path, -1.0, 1.0)), 1.0]
-        limits = self._limits(path, size, breaks) if self._damped else []
+        opens = b1 < 2.0 * abs(b2) + 3.0 * abs(b3)  # somewhere, else the law pushes everywhere
+        limits = self._limits(path, size, breaks) if self._damped and opens else []
         if away and not limits:
             return self._few if low > _STEADY * high else _MANY
         rule: list[tuple[float, float]] = []
