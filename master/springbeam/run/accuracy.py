@@ -73,9 +73,11 @@ def pick(scene: Scene, progress: Progress | None = None) -> Check:
         reached = f"the error of {WORDS[name]} is up to {least:.1e}"
         if least <= asked:
             reached = "; ".join(text for text in found.run.summary["warnings"] if text.startswith("not resolved"))
+    undamped = scene.beam is not None and not scene.massless and scene.beam.alpha_b == 0.0
+    damped = ", damp the beam ([beam] alpha_b)" * undamped
     raise SceneError(
-        f"accuracy = {asked:g}: not reached with {_MOST:.0f} steps: {reached}; ask for less, take a coarser mesh or "
-        "fewer modes, or shorten [time] t_end"
+        f"accuracy = {asked:g}: not reached with {_MOST:.0f} steps: {reached}; ask for less{damped}, take a coarser "
+        "mesh or fewer modes, or shorten [time] t_end"
     )
 
 

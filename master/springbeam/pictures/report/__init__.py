@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from math import copysign
 from pathlib import Path
 from typing import Any
 
@@ -211,7 +212,9 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
         rebound = "elastic" if scene.elastic_stop else f"restitution {stop.restitution:.4g}"
         yield "foundation", f"at φ = {stop.position:.4g} m, {rebound}"
     for i, load in enumerate(scene.loads):
-        what = f"{load.signal.replace('_', '-')} on the {load.on}, {load.peak:.4g} {load.unit}"
+        what = (
+            f"{load.signal.replace('_', '-')} on the {load.on}, {copysign(load.peak, load.amplitude):.4g} {load.unit}"
+        )
         given = load.model_dump(exclude_none=True)
         units = (("frequency", ", {:.4g} Hz"), ("frequency_end", " to {:.4g} Hz"), ("duration", ", in {:.4g} s"))
         yield f"load_{i}", what + "".join(words.format(given[key]) for key, words in units if key in given)
