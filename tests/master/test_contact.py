@@ -9,7 +9,7 @@ from springbeam import Motion, load_scene, with_changes
 from springbeam.contact.impacts import foundation_impact, meeting
 from springbeam.contact.phases import Automaton, Instant, Joint, Phase
 from springbeam.motion.events import EventKind
-from springbeam.scene.laws import Compliance, KelvinVoigt, Link
+from springbeam.scene.laws import Compliance, KelvinVoigt, Link, depth
 
 
 def automaton_of(scene="soft", tip_mass=0.01, mass=1.0, equilibrium=0.0, **tables):
@@ -79,3 +79,15 @@ def test_the_slopes_of_what_damping_adds_are_those_of_its_force(law, rate):
         (damping(p, rate + d) - damping(p, rate - d)) / (2 * d),
     )
     assert law.resistance(p, rate) == pytest.approx((damping(p, rate), *slopes), rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize(("z", "kind"), [(-0.5, "retie"), (0.5, "separation")])
+def test_a_massless_tip_whose_force_vanishes_at_equilibrium_is_tied_again_if_it_falls(z, kind):
+    ends = (Motion(0.0, z, 0.0, 0.0),) * 2
+    found, phase, _ = automaton_of(tip_mass=0.0).after(EventKind.SEPARATION, instant(Phase(Joint.TOUCH), ends))
+    assert (found, phase.joint) == (kind, Joint.TIED if kind == "retie" else Joint.FREE)
+
+
+def test_a_depth_is_found_where_the_energy_of_a_little_more_is_no_double():
+    """λ p²⁰⁰¹/2001 = 1 J; 2²⁰⁰¹ is too large."""
+    assert depth(Compliance(1e-3, 2000.0), 1.0) == pytest.approx(2.001e6 ** (1.0 / 2001.0), rel=1e-15)

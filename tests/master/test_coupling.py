@@ -109,3 +109,9 @@ def test_damping_never_gives_energy(start, end, mean, skew, degree, q, chi):
     dissipated = projection.dissipated(start, SIZE, x) if law.damped else 0.0
     assert dissipated >= -roundings
     assert work(projection, a, start, x) - gained == pytest.approx(dissipated, abs=roundings)
+
+
+@pytest.mark.parametrize("degree", [0, 1])
+def test_a_force_past_all_doubles_is_none(degree):
+    with pytest.raises(OverflowError):
+        Projection(Compliance(1e300, 2.0), degree).force(1e10, SIZE, [3e10, 2e10][: degree + 1])

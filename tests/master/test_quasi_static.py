@@ -10,7 +10,8 @@ from springbeam.bodies.protocol import Motion
 from springbeam.bodies.quasi_static import QuasiStaticBeam
 from springbeam.contact.events import Holding
 from springbeam.monolithic.semi_discrete import assemble, constant_forces
-from springbeam.scene import Beam, statics
+from springbeam.scene import Beam, load_scene, statics, with_changes
+from springbeam.scene.linearised import contact_energy
 from springbeam.scene.statics import SHAPE_POINTS
 
 BEAM = Beam.with_ones(
@@ -93,3 +94,16 @@ def test_what_holds_the_ends_is_the_force_of_the_reference_over_the_stiffness():
     with pair_of(given) as pair:
         found = Holding(*pair.bodies)((None, Motion(y, z, 0.0, 0.0)))
     np.testing.assert_allclose(found, [compliance * force, z + alpha * acceleration], rtol=1e-9, atol=1e-12)
+
+
+def test_the_energy_at_contact_is_that_of_the_start_and_of_loads():
+    """½ ∫ρA (s₁x)² dx, ½ KAG L s₀², and 2 F²/k, F the tip force that bends a slender beam as far as the load."""
+    beam = {"approach": "elastic", "initial_deflection_slope": 0.01, "n_elements": 4}
+    load = {"on": "beam", "shape": [1.0, 2.0], "amplitude": 5.0}
+    scene = with_changes(load_scene("soft"), beam=beam, loads=[load])
+    own = scene.beam
+    start = own.density * own.area * own.initial_velocity_slope**2 * own.length**3 / 6.0
+    start += 0.5 * statics.shear_stiffness(own) * own.length * 0.01**2
+    force = 5.0 * own.length * ((0.5 - 0.125) + 2.0 * (3.0 / 8.0 - 0.1))  # ∫ (1 + 2ξ) ξ² (3 − ξ)/2 dξ
+    expected = start + 2.0 * force**2 * statics.tip_compliance(own)
+    assert contact_energy(scene) == pytest.approx(expected, rel=1e-12)

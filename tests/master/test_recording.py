@@ -4,7 +4,7 @@ import math
 import os
 import shutil
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,6 +32,8 @@ from springbeam.results.directory import (
 from springbeam.results.files import export, load_summary, load_trajectory
 from springbeam.results.recording import FileRecorder, MemoryRecorder
 from springbeam.results.records import EVENT, STEP_COLUMNS
+from springbeam.run.log import Log
+from springbeam.run.outcome import RunStopped
 
 
 def filed(path, *blocks, scene=PAIR):
@@ -284,3 +286,26 @@ def test_rows_that_find_no_room_lose_no_record(tmp_path):
 
 
 # -- on the way there ---------------------------------------------------------------------------------------------
+
+
+def test_a_run_is_handed_over_up_to_where_it_goes_wrong():
+    """A record of the second block is not finite: those before it are kept with their events."""
+    recorder = MemoryRecorder(PAIR)
+    judged = []
+
+    def judge(steps, first):
+        judged.append((len(steps), first["time"].tolist()))
+        return np.zeros(len(steps), bool), str
+
+    log = Log(recorder, judge)
+    for begin in (0, 30):
+        steps, events, shapes = block(30, begin=begin)
+        steps["z"][17] = math.nan if begin else 0.0
+        log.records += [step.tobytes() for step in steps]
+        log.events += events
+        log.shapes += list(shapes)
+        with pytest.raises(RunStopped, match="z = nan at t = ") if begin else nullcontext():
+            log.flush()
+    kept = recorder.trajectory()
+    assert (len(kept), len(kept.events), len(kept.shape_table)) == (47, kept.steps["events"][-1], 47)
+    assert judged == [(30, [0.0]), (17, [0.0])]

@@ -14,7 +14,7 @@ import oscillator
 import pytest
 import scenes
 import tomli_w
-from commands import HANGS, command, printed
+from commands import HANGS, command, printed, refused
 from scenes import kinds
 
 from springbeam import RunStopped, SceneError, SpringDamper, simulate, with_changes
@@ -419,3 +419,14 @@ def test_events_are_those_of_the_element(fmu):
     assert [e.time for e in run.events] == pytest.approx([e.time for e in exact.events], abs=5e-9)
     assert exact.summary["max_energy_residual"] < 1e-11
     assert run.summary["max_interface_residual"] < 1e-12
+
+
+def test_commands(fmu, tmp_path, unpainted):
+    names = dict.fromkeys(("integral", "integral_2", "impulse", *ENERGIES))
+    scene = pair(fmu(), spring=names, contact={"damping": 0.0}, coupling={"degree": 0}, time={"t_end": 0.2})
+    file = tmp_path / "linked.toml"
+    file.write_text(tomli_w.dumps(scene.model_dump(exclude_none=True)), encoding="utf-8")
+    assert "the scene can be run" in printed("doctor", file)
+    printed("run", file, "--accuracy", "1e-2", "--out", tmp_path / "run", "--quiet")
+    printed("report", tmp_path / "run")
+    assert "no reference knows this body" in refused("crosscheck", file)

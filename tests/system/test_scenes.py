@@ -5,7 +5,7 @@ import pytest
 import scenes
 from references import integrated_anew, reference
 
-from springbeam import load_scene, simulate, with_changes
+from springbeam import RunStopped, load_scene, simulate, with_changes
 from springbeam.results.contact_changes import contact_changes
 
 CASES = scenes.TABLE["cases"]
@@ -100,3 +100,21 @@ def test_a_force_too_large_for_a_double_halves_the_step():
     run = simulate(scene)
     assert run.summary["halved_steps"] > 0
     assert (run.v_tip[-1], run.z[-1]) == pytest.approx((1e4 / 3.0, -2e4 / 3.0), rel=1e-10)
+
+
+@pytest.mark.parametrize("size", [0.1, 1e-3])
+def test_bouncing_without_end_stops_by_name(monkeypatch, size):
+    """A damped beam on a lossless stop: its rebounds shrink, but never by enough to be the last.
+
+    Also where three of them lie within a macro step: runs like that have gone on for hours.
+    """
+    monkeypatch.setattr("springbeam.run.stepping._MOST_IN_A_ROW", 300)
+    beam = {"density": 672.6, "area": 0.07, "shear_modulus": 53.6, "alpha_b": 1.0, "n_elements": 6}
+    tables = {
+        "time": {"t_end": 1.5},
+        "beam": {**beam, "initial_velocity_slope": -1.0},
+        "stop": {"position": 0.0},
+        "coupling": {"macro_step": size},
+    }
+    with pytest.raises(RunStopped, match=f"chatters: 300 events, each within a macro step of {size:g} s"):
+        simulate(scenes.scene_from_dict(tables))

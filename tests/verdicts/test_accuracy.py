@@ -11,7 +11,9 @@ from scenes import scene_from_dict
 
 from springbeam import RunStopped, SceneError, load_scene, with_changes
 from springbeam.results.distance import distance
+from springbeam.results.recording import MemoryRecorder
 from springbeam.run import accuracy as search
+from springbeam.run.runner import run
 from springbeam.run.simulate import simulate
 from springbeam.scene.files import tomllib
 
@@ -122,3 +124,17 @@ def test_an_accuracy_that_is_not_reached_says_what_fails_and_how_far_it_was(monk
     monkeypatch.setattr(search, "_MOST", most)
     with pytest.raises(SceneError, match=said):
         search.pick(scene)
+
+
+ASKING = {
+    "accuracy": 1e-4,
+    "time": {"t_end": 0.05},
+    "beam": {"young_modulus": 100.0, "shear_modulus": 100.0, "n_elements": 6, "initial_velocity_slope": -1.0},
+    "spring": {"linear_stiffness": 3.0},
+}
+
+
+def test_what_runs_a_scene_as_it_is_wants_the_accuracy_picked():
+    scene = scene_from_dict(ASKING)
+    with pytest.raises(SceneError, match=r"accuracy = 0\.0001"):
+        run(scene, MemoryRecorder(scene))

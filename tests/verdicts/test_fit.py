@@ -2,18 +2,19 @@
 
 import json
 import re
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from commands import Interrupt, command, printed
+from commands import Interrupt, command, printed, refused
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 from scenes import scene_from_dict
 from scipy.stats import t as student
 
-from springbeam import SceneError, load_scene, simulate, with_changes
+from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
 from springbeam.scene import as_scene
 from springbeam.signals.measured import Measured, read_measured, residuals
 from springbeam.studies.fit import study as fit
@@ -414,3 +415,40 @@ def test_what_is_called_determined_is_right(stiffness, damping, guess, late, sha
         for row in found["keys"]:
             right = {**{f"spring.{name}": value for name, value in drawn.items()}, "shift": -late}[row["key"]]
             assert abs(row["value"] - right) <= 2.0 * max(row["high"] - row["value"], row["value"] - row["low"])
+
+
+def test_the_command_compare_takes_a_measurement(here):
+    simulate(OSCILLATOR).save("run")
+    written(here / "m.csv", "time [s],position [mm]", TIMES + 0.2, 1e3 * exact())
+    compare = ("compare", "run", "m.csv", "--json", "--map")
+    for clock, shift, apart in (([], pytest.approx(-0.2, abs=1e-6), 1e-4), (["--shift", "-0.2"], -0.2, 1e-8)):
+        found = json.loads(printed(*compare, "position=y", *clock))
+        assert found["shift"] == shift
+        assert found["residuals"][0]["relative"] < apart
+    assert (here / "results" / "comparison.png").stat().st_size > 10_000
+    assert "m.csv: --map CH1: there are the columns position" in refused(*compare, "CH1=y")
+
+
+def test_a_trial_that_cannot_be_run_turns_the_search_back(tmp_path, monkeypatch):
+    """The first run of a search: after those all over the ranges, and two for the first derivatives."""
+    right = fit.simulate_to
+    runs = count()
+
+    def stops_once(scene, time):
+        if next(runs) == 18:
+            raise RunStopped("diverges", 0.1)
+        return right(scene, time)
+
+    monkeypatch.setattr(fit, "simulate_to", stops_once)
+    found = fitted(written(tmp_path / "m.csv", "time,y", TIMES, exact()), shift=0.0)
+    (error,) = [row["error"] for row in found["runs"] if row["error"]]
+    assert "diverges" in error
+    assert {row["key"]: row["value"] for row in found["keys"]} == pytest.approx(TRUE, rel=1e-6)
+
+
+def test_curves_weigh_by_what_is_left_of_them(tmp_path):
+    """A second curve of noise alone hardly moves what the first one tells; weighed by its spread, by 1 %."""
+    noise = np.random.default_rng(1).normal(0.0, 0.5, len(TIMES))
+    path = written(tmp_path / "m.csv", "time,y,z", TIMES, exact(), noise)
+    (stiffness,) = fitted(path, ["spring.linear_stiffness=790"], shift=0.0)["keys"]
+    assert stiffness["value"] == pytest.approx(800.0, rel=1e-3)
