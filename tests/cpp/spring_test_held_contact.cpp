@@ -174,7 +174,7 @@ TEST(HeldContact, KelvinVoigtIsBookedAtAnyStepAndRightAtSmallOnes) {
 }
 
 // Steps of a size that nobody has announced: forces have done other work than the law's. The energy of the pair, with
-// what the contact owes, stays to rounding; and two steps after a single change nothing is owed any more.
+// what the contact owes, stays to rounding; of sizes alike less than a fifth of it is owed when the masses have parted.
 TEST(HeldContact, EnergyStaysWhereTheStepSizeChanges) {
   for (const double chi : {0.0, 0.7}) {
     for (const double factor : {0.05, 0.5, 0.9, 1.1, 2.0, 20.0}) {
@@ -192,7 +192,9 @@ TEST(HeldContact, EnergyStaysWhereTheStepSizeChanges) {
           EXPECT_NEAR(c.energy() + lost, before, 1e-13 * all) << factor << ' ' << change << ' ' << steps;
         }
         const bool alike = 0.5 <= factor && factor <= 2.0;
-        if (chi == 0.0 && alike) EXPECT_NEAR(c.contact.state().debt, 0.0, 0.2 * all) << factor << ' ' << change;
+        if (chi == 0.0 && alike) {
+          EXPECT_NEAR(c.contact.state().debt, 0.0, 0.2 * all) << factor << ' ' << change;
+        }
       }
     }
   }
