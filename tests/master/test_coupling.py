@@ -9,6 +9,7 @@ from numpy.polynomial import legendre
 
 from springbeam.coupling.exchange import Exchange
 from springbeam.coupling.projection import Projection
+from springbeam.coupling.protocol import NotConverged
 from springbeam.coupling.soft import SoftSolver
 from springbeam.coupling.solver import StepSolver
 from springbeam.scene.laws import Compliance, KelvinVoigt, Link
@@ -115,3 +116,27 @@ def test_damping_never_gives_energy(start, end, mean, skew, degree, q, chi):
 def test_a_force_past_all_doubles_is_none(degree):
     with pytest.raises(OverflowError):
         Projection(Compliance(1e300, 2.0), degree).force(1e10, SIZE, [3e10, 2e10][: degree + 1])
+
+
+class Grainy(DuffingBody):
+    """Tells its displacement in multiples of ``grain`` [m]."""
+
+    grain = 1.0
+
+    def motion(self):
+        exact = super().motion()
+        return exact._replace(displacement=self.grain * round(exact.displacement / self.grain))
+
+
+@pytest.mark.parametrize(("grain", "found"), [(1e-13, True), (1e-11, False)])
+def test_a_body_may_be_rounded_by_a_thousand_tolerances_and_no_more(grain, found):
+    """The tolerance is 1e-12 of the distance in a step, 0.5 m/s · 1 ms; a gap of so many is left at most."""
+    upper = Upper(1.0, 100.0, 0.0, z=0.5)
+    lower = Grainy(1.0, 50.0, 0.0, z=0.5)
+    lower.grain = grain
+    if found:
+        rows = couple(StepSolver(0, 1e-12), 1e-3, 20, upper, lower)
+        assert max(abs(row.upper.displacement - row.lower.displacement) for row in rows) <= 1e3 * 1e-12 * 0.5e-3
+    else:
+        with pytest.raises(NotConverged):
+            couple(StepSolver(0, 1e-12), 1e-3, 20, upper, lower)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scenes import SOFT, kinds, soft
 
-from springbeam import load_scene, with_changes
+from springbeam import load_scene, simulate, with_changes
 from springbeam.paper import co_simulation, monolithic
 from springbeam.paper.problem import AlgorithmFailure
 from springbeam.scene.files import tomllib
@@ -141,3 +141,15 @@ def test_a_solution_that_grows_beyond_all_bounds_keeps_what_came_before():
             program.algorithm_1(scene)
         assert len(failed.value.trajectory) > 1
         assert np.isfinite(failed.value.trajectory.energy_residual).all()
+
+
+@pytest.mark.parametrize(("number", "degree"), [(2, 2), (4, 0)])
+def test_the_cases_of_the_figures_run_to_their_end_with_the_law_transmission(number, degree):
+    """Where waves are not followed, accelerations can part ends that positions bring together at the same instant.
+
+    That was repeated 20,000 times, until the run stopped.
+    """
+    run = simulate(with_changes(load_scene(f"paper-fig{number}"), coupling={"degree": degree}))
+    assert (run.time[-1], run.summary["resolved"]) == (4.0, False)
+    assert len(run.events) < 300
+    assert np.abs(run.energy_residual).max() < 1e-9
