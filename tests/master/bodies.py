@@ -334,8 +334,8 @@ def couple(coupling, size, steps, upper, lower):
 
     def row(contact):
         ends = (upper.motion(), lower.motion())
-        booked = coupling.booking(ends)
-        return Row(*ends, contact, sum(upper.energies()) + sum(lower.energies()) + booked.stored + booked.dissipated)
+        in_law = coupling.energies(ends)
+        return Row(*ends, contact, sum(upper.energies()) + sum(lower.energies()) + in_law.stored + in_law.dissipated)
 
     rows = [row(NO_FORCE)]
     for i in range(steps):

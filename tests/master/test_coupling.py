@@ -51,7 +51,7 @@ DAMPED = [Compliance(1e4, 1.5, 0.5), Compliance(1e6, 1.0, 5.0), KelvinVoigt(1e4,
 
 @pytest.mark.parametrize("law", DAMPED, ids=repr)
 @pytest.mark.parametrize(("degree", "size"), [(0, 1e-3), (1, 2e-2), (2, 2e-2)])
-def test_what_damping_takes_is_booked(law, degree, size):
+def test_what_damping_takes_is_counted(law, degree, size):
     """The bodies' and the law's energies and what the law dissipated: constant to rounding, at any step."""
     coupling = SoftSolver(law, degree, 1e-13)
     rows = couple(coupling, size, 60, unit_beam(4), DuffingBody(k1=3.0, k2=-0.2))

@@ -22,7 +22,7 @@ def soft(n=6, **tables):
 @pytest.mark.parametrize(("e", "size"), [(0.5, 1e-3), (0.97, 10.0)])
 def test_a_bouncing_mass_comes_to_rest_after_its_geometric_series(e, size):
     """Constant load g, from height d: rest after t₁ + 2 v₁ (e + e² + …)/g, where e ≥ 0.97 bounces hundreds of times at
-    once. Cut off are rebounds below 1e-8 v₁ or over within 1e-9 H; all of the energy is booked as impact losses."""
+    once. Cut off are rebounds below 1e-8 v₁ or over within 1e-9 H; the impacts lose all of the energy."""
     g = 10.0
     d = 0.05
     v = (2.0 * g * d) ** 0.5

@@ -29,7 +29,7 @@ PROGRAMS = {
     ("api.md", 0): r"contact_impulse    0\.9873\ncontact_force_max  9\.97\d?\ncontact_duration   0\.1444\n.*\n\[-0\.00",
     ("api.md", 1): r"^0\.1 tied \[-0\.00874",
     ("api.md", 2): r"^11\.4\d+ N, energy residual \d\.\de-1[0-9]",
-    ("api.md", 3): r"^[1-9]\d* strokes?, energy residual \d\.\de-1[0-9]",
+    ("api.md", 3): r"^[1-9]\d* impacts?, energy residual \d\.\de-1[0-9]",
     ("tools.md", 0): r"y\(1\.0 s\) = -0\.075\d+ m",
     ("tools.md", 1): r"^y = -0\.0\d+ m",
     ("tools.md", 2): r"^y = 0\.0193\d+ m",

@@ -190,6 +190,9 @@ class Prescribed(Body):
 
     def apply_impulse(self, impulse: float) -> None: ...
 
+    def holding_force(self, displacement: float, velocity: float) -> float:
+        return 0.0
+
 
 class RigidWall(Prescribed):
     """An end held at rest at ``position`` [m]: the foundation, an elastic stop, or a seated spring."""

@@ -45,11 +45,6 @@ class Interface:
     alone: bool = False
 
     @cached_property
-    def lasting(self) -> bool:
-        """Whether the law joins the ends from the start and for good."""
-        return self.law is not None and self.law.lasting
-
-    @cached_property
     def tip_share(self) -> float:
         """The tip's part in the velocity with which joined ends go on."""
         return common_velocity(1.0, 0.0, self.upper.mass, self.lower.mass)

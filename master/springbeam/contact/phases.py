@@ -40,6 +40,11 @@ class Phase:
     seated: bool = False
 
     @cached_property
+    def joined(self) -> bool:
+        """Whether the ends are together, by a law or by the foundation that holds them."""
+        return self.joint is not Joint.FREE
+
+    @cached_property
     def name(self) -> str:
         """Name in the column ``phase``."""
         return "seated" if self.seated else self.joint.value
@@ -140,7 +145,7 @@ class Automaton:
         impact = meeting(tip.velocity, low.velocity, self._tip_mass, self._mass)
         common = low.velocity + impact.on_spring / self._mass
         if not ties(self._interface):
-            tied = self._interface.lasting
+            tied = not lets_part(self._interface)
         elif self._is_at_equilibrium(at):
             tied = common < 0.0 or (common == 0.0 and not (at.phase.seated or self._stays_at_equilibrium()))
         else:
@@ -154,7 +159,7 @@ class Automaton:
         """*Touch* if C > 0; else the ends part: *free*."""
         if at.contact_force > 0.0:
             return Outcome(EventKind.RELEASE, Phase(Joint.TOUCH))
-        return Outcome(EventKind.RELEASE, Phase(Joint.FREE), self._parting(at.phase, at))
+        return Outcome(EventKind.RELEASE, Phase(Joint.FREE), self._parting(at))
 
     def tie(self, at: Instant) -> Outcome:
         """*Tied*."""
@@ -167,7 +172,7 @@ class Automaton:
         if self._tip_mass == 0.0 and falls:
             return self.tie(at)  # C vanishes at Ψ, where they are tied again
         opened = Phase(Joint.FREE, seated=at.phase.seated and not self._interface.alone)
-        return Outcome(EventKind.SEPARATION, opened, self._parting(opened, at))
+        return Outcome(EventKind.SEPARATION, opened, self._parting(at))
 
     def strike(self, at: Instant) -> Outcome:
         """What is at the foundation rebounds, the joined tip with it; *seated* where the rebound has died out."""
@@ -196,12 +201,12 @@ class Automaton:
 
     def leave(self, at: Instant) -> Outcome:
         """The lower end leaves the foundation; a joined tip leaves with it, at rest."""
-        impact = self._parting(at.phase, at) if self._ties(at.phase) else NO_IMPACT
+        impact = self._parting(at) if self._ties(at.phase) else NO_IMPACT
         return Outcome(EventKind.UNSEATED, Phase(at.phase.joint), impact)
 
     def _ties(self, phase: Phase) -> bool:
         """Whether a rigid law, or the foundation, holds the ends together in ``phase``."""
-        return phase.joint is not Joint.FREE and isinstance(self._interface.law, Rigid | None)
+        return phase.joined and isinstance(self._interface.law, Rigid | None)
 
     def _is_at_equilibrium(self, at: Instant) -> bool:
         """Whether the lower end is at Ψ, within the resolution of events."""
@@ -216,15 +221,15 @@ class Automaton:
         psi = self._interface.equilibrium
         return low.mass == inf or (tip.massless and tip.holding_force(psi, 0.0) + low.holding_force(psi, 0.0) < 0.0)
 
-    def _parting(self, held: Phase, at: Instant) -> Impact:
+    def _parting(self, at: Instant) -> Impact:
         """Return the impact that gives ends their common velocity, if those of steps differ by more than rounding.
 
-        A lower end that the foundation holds in the phase ``held`` is at rest.
+        A lower end that the foundation holds is at rest.
         """
         tip, low = at.ends
         if abs(tip.velocity - low.velocity) <= VELOCITY_ROUNDING * at.fastest:
             return NO_IMPACT
-        if self._interface.alone or held.seated:
+        if at.phase.seated:
             on_beam, loss = rebound(tip.velocity, self._tip_mass, restitution=0.0)
             return Impact(on_beam, of_foundation=on_beam, energy_loss=loss)
         return meeting(tip.velocity, low.velocity, self._tip_mass, self._mass)
@@ -240,7 +245,7 @@ def joins(interface: Interface) -> bool:
 
 def lets_part(interface: Interface) -> bool:
     """the laws `transmission` and `unilateral`"""
-    return joins(interface) and not interface.lasting
+    return isinstance(interface.law, Rigid) and not interface.law.lasting
 
 
 def ties(interface: Interface) -> bool:
@@ -268,7 +273,7 @@ def carries_the_tip(interface: Interface) -> bool:
 
 def _share(interface: Interface, phase: Phase) -> float:
     """Return the tip's part in the rate of the lower end's height."""
-    return interface.tip_share if joins(interface) and phase.joint is not Joint.FREE else 0.0
+    return interface.tip_share if joins(interface) and phase.joined else 0.0
 
 
 def gap_above_zero(interface: Interface, phase: Phase) -> EventFunction:

@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force
 from ..scene.laws import SoftLaw
-from .projection import Booked
+from .projection import SoftCoupling
 from .protocol import Step
 
 
-class Exchange(Booked):
+class Exchange(SoftCoupling):
     """Coupling by one exchange per step; what the law dissipates is that of the path of the ends.
 
     Parameters

@@ -24,7 +24,7 @@ import numpy as np
 from ..bodies.protocol import Ends
 from ..motion.paths import EPS, sign_changes
 from ..scene.laws import SoftLaw
-from .protocol import Booking, Counts, Coupling, Step
+from .protocol import Counts, Coupling, LawEnergies, Step
 from .small import Matrix, Vector, transposed
 from .solver import CONDITIONS
 
@@ -250,8 +250,8 @@ def penetration(step: Step, degree: int) -> tuple[float, Vector]:
     return low.displacement - tip.displacement, x
 
 
-class Booked(Coupling):
-    """Books what a soft law stores and dissipates; parameters as of `Projection`."""
+class SoftCoupling(Coupling):
+    """Accounts for what a soft law stores and dissipates; parameters as of `Projection`."""
 
     def __init__(self, law: SoftLaw, degree: int) -> None:
         self.law = law
@@ -264,6 +264,6 @@ class Booked(Coupling):
             start, x = penetration(step, self.degree)
             self.state.dissipated += self._projection.dissipated(start, step.size, x)
 
-    def booking(self, ends: Ends) -> Booking:
+    def energies(self, ends: Ends) -> LawEnergies:
         tip, low = ends
-        return Booking(self.law.potential(low.displacement - tip.displacement), self.state.dissipated)
+        return LawEnergies(self.law.potential(low.displacement - tip.displacement), self.state.dissipated)

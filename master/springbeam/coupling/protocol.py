@@ -23,14 +23,14 @@ class Step(NamedTuple):
     end: Ends
 
 
-class Booking(NamedTuple):
-    """What a coupling adds to a record: energies beside those of the bodies [J]."""
+class LawEnergies(NamedTuple):
+    """Energies of the contact law, beside those of the bodies [J]."""
 
-    stored: float = 0.0  #: in the contact law
-    dissipated: float = 0.0  #: by the contact law since the start
+    stored: float = 0.0
+    dissipated: float = 0.0  #: since the start
 
 
-NOTHING_BOOKED = Booking()
+NO_ENERGIES = LawEnergies()
 
 
 @dataclass
@@ -46,7 +46,7 @@ class Coupling:
 
     #: Degree of the contact force over a step.
     degree: int = 0
-    #: Whether the force does no net work but what is booked, at any step.
+    #: Whether the force does no net work but that of the law's energies, at any step.
     energy_exact: bool = True
     state: Counts
 
@@ -74,9 +74,9 @@ class Coupling:
     def accept(self, step: Step) -> None:
         """Count from now on what ``step``, which is made, has dissipated."""
 
-    def booking(self, ends: Ends) -> Booking:
-        """Return the energies at the ``ends``."""
-        return NOTHING_BOOKED
+    def energies(self, ends: Ends) -> LawEnergies:
+        """Return the energies of the contact law at the ``ends``."""
+        return NO_ENERGIES
 
 
 class Uncoupled(Coupling):

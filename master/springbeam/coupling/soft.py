@@ -19,7 +19,7 @@ import numpy as np
 
 from ..bodies.protocol import Ends
 from ..scene.laws import SoftLaw
-from .projection import Booked
+from .projection import SoftCoupling
 from .protocol import NotConverged
 from .small import Matrix, Vector, inverse, less, times
 from .solver import Aim, Responses, StepSolver
@@ -44,7 +44,7 @@ class SoftState(Responses):
     last_crossing: tuple[float, Matrix] = (0.0, [])
 
 
-class SoftSolver(Booked, StepSolver):
+class SoftSolver(SoftCoupling, StepSolver):
     """Coupling by a soft law.
 
     Parameters
@@ -61,7 +61,7 @@ class SoftSolver(Booked, StepSolver):
 
     def __init__(self, law: SoftLaw, degree: int, tolerance: float) -> None:
         StepSolver.__init__(self, degree, tolerance)
-        Booked.__init__(self, law, degree)
+        SoftCoupling.__init__(self, law, degree)
         self.state = SoftState()
 
     def no_contact(self, gap: Vector, size: float, start: Ends) -> bool:

@@ -13,7 +13,7 @@ Line numbers in comments are those of the printed algorithm. Where it leaves som
 Lines 11 and 14 leave a third case, y ≤ Ψ < u: nothing is changed.
 
 Line 18 overwrites the tip by the spring's position. The force on the tip that would do so is recovered from the tip's
-row of (62) and its work is booked (``e_injected_beam``), like what exchanging yˡ adds to the spring
+row of (62) and its work is counted (``e_injected_beam``), like what exchanging yˡ adds to the spring
 (``e_injected_spring``): nothing else in the model pays for either.
 """
 
@@ -57,7 +57,7 @@ class _Row(NamedTuple):
     pressing: float = 0.0  #: of the law on the spring
     foundation: float = 0.0
     case: int = 0
-    booked: bool = False  #: whether the step was one in contact
+    in_contact: bool = False  #: over the step
 
 
 def algorithm_1(
@@ -275,7 +275,7 @@ class _Algorithm:
         seated = case == 14 and y_new == self.phi
         phase = "seated" if seated else "tied" if case == 14 else "free"
         forces = (on_tip, inside, pressing, foundation)
-        after = _Row(self.time, q_new, v_new, y_new, z_new, phase, *forces, case, booked=True)
+        after = _Row(self.time, q_new, v_new, y_new, z_new, phase, *forces, case, in_contact=True)
         if seated:
             self._note("stop_impact", after, h * foundation)
         return after
@@ -298,7 +298,7 @@ class _Algorithm:
         h = np.diff(found["time"])
         dq = np.diff(q, axis=0)
         dy = np.diff(y)
-        booked = found["booked"][1:]
+        in_contact = found["in_contact"][1:]
         by_spring = p.damping * dy**2 / h
         taken = alpha * np.sum(dq * (d.K @ dq.T).T, axis=1) / h + by_spring
         square = (y - p.unloaded) ** 2
@@ -324,8 +324,8 @@ class _Algorithm:
             "e_dissipated": total(taken),
             "e_load": -(q @ self.load) - p.external_force * y,
             "case": found["case"].astype(float),
-            "e_injected_beam": total(booked * overwritten),
-            "e_injected_spring": total(booked * (np.diff(e_spring) - worked)),
+            "e_injected_beam": total(in_contact * overwritten),
+            "e_injected_spring": total(in_contact * (np.diff(e_spring) - worked)),
         }
         predicted = self.iterations["predicted"]
         joined = self.iterations["joined"]

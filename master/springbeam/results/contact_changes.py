@@ -15,7 +15,7 @@ from .contact_times import Interval, foundation_contacts, kicks, tip_contacts
 from .records import impulse
 from .trajectory import Trajectory
 
-#: Share of the impulse of a run below which a contact or a stroke is negligible.
+#: Share of the impulse of a run below which a contact or an impact is negligible.
 SLIGHT = 2e-3
 
 
@@ -30,7 +30,7 @@ class ContactChange(NamedTuple):
 def contact_changes(run: Trajectory, window: float) -> list[ContactChange]:
     """Return the changes of contact in their order, without contacts and flights shorter than ``window`` [s].
 
-    Strokes on the foundation that follow each other within ``window`` are one.
+    Impacts on the foundation that follow each other within ``window`` are one.
     """
     changes = []
     for since, until in _merged(tip_contacts(run.scene, run.events, inf), window):
@@ -53,7 +53,7 @@ def contact_time_difference(first: Trajectory, second: Trajectory, window: float
     """
     end = float(second.time[-1])
     worst = 0.0
-    for ours, theirs in zip(_contacts_and_strokes(first, end), _contacts_and_strokes(second, end), strict=True):
+    for ours, theirs in zip(_contacts_and_impacts(first, end), _contacts_and_impacts(second, end), strict=True):
         for one, other in ((ours, theirs), (theirs, ours)):
             worst = max(worst, _furthest(_lasting(*one, window), other[0], end))
     return worst
@@ -82,7 +82,7 @@ def _merged(intervals: list[Interval], window: float) -> list[Interval]:
     return merged
 
 
-def _contacts_and_strokes(run: Trajectory, end: float) -> Iterator[tuple[list[Interval], np.ndarray, np.ndarray]]:
+def _contacts_and_impacts(run: Trajectory, end: float) -> Iterator[tuple[list[Interval], np.ndarray, np.ndarray]]:
     """Yield the contacts of tip and spring, and those with the foundation, in a run that ends at ``end`` [s].
 
     With them are times [s] and the magnitude of the impulse up to each since the one before [N·s]; none if unknown.
@@ -104,7 +104,7 @@ def _contacts_and_strokes(run: Trajectory, end: float) -> Iterator[tuple[list[In
 def _lasting(intervals: list[Interval], times: np.ndarray, passed: np.ndarray, window: float) -> list[Interval]:
     """Join ``intervals`` closer than ``window`` [s]; return those longer or transmitting `SLIGHT` of all impulses.
 
-    Other parameters as of `_contacts_and_strokes`.
+    Other parameters as of `_contacts_and_impacts`.
     """
     least = SLIGHT * passed.sum() if times.size else inf
 

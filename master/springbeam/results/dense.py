@@ -33,7 +33,7 @@ from ..motion.paths import LAST_MOMENT, Path, derivative, sign_changes, value
 from ..scene import Scene
 from .columns import columns
 from .inner import INNER, MAGNITUDE, curves
-from .records import Records, Rows, common, joined, reduced_mass, seated
+from .records import Records, Rows, common, joined, seated
 from .spans import Extremes as Extremes
 from .spans import rounding_of_steps, span
 from .trajectory import Trajectory
@@ -237,7 +237,6 @@ def forces(exchanges: bool, before: np.ndarray, steps: np.ndarray) -> dict[str, 
     bring both forces to what they are at the ends of the step. Between two exchanges of values they are linear.
     """
     size = steps["size"]
-    together = joined(before) & (steps["reduced_mass"] > 0.0)
     found = {}
     for name in ("contact_force", "foundation_force"):
         c = steps[name]
@@ -246,8 +245,8 @@ def forces(exchanges: bool, before: np.ndarray, steps: np.ndarray) -> dict[str, 
         series = np.zeros((6, len(steps)))
         if not exchanges:
             series[:3] = c + dc / 2.0 + ddc / 6.0, dc / 2.0 + ddc / 4.0, ddc / 12.0
-            series[:4] -= np.where(together, _turning(before, steps), 0.0)
-            first = np.where(together, 4, steps["degree"].astype(int) + 1)
+            series[:4] -= _reversal(before, steps)
+            first = np.where(steps["reduced_mass"] > 0.0, 4, steps["degree"].astype(int) + 1)
         else:
             first = np.zeros(len(steps), int)
         signs = (-1.0) ** np.arange(6)
@@ -260,10 +259,10 @@ def forces(exchanges: bool, before: np.ndarray, steps: np.ndarray) -> dict[str, 
     return found
 
 
-def _turning(before: np.ndarray, steps: np.ndarray) -> np.ndarray:
+def _reversal(before: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Return μ g̈ [N] of ends that are joined, by parts: Legendre coefficients of degrees 0 to 3, shape (4, n)."""
     size = steps["size"]
-    mass = reduced_mass(before)
+    mass = steps["reduced_mass"]
     rate = before["v_tip_after"] - before["z_after"]
     rate_after = steps["v_tip"] - steps["z"]
     once, twice = (steps[f"u_tip_{name}"] - steps[f"y_{name}"] for name in ("integral", "integral_2"))

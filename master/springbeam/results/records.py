@@ -42,8 +42,9 @@ STEP_COLUMNS = (
     # Inner forces of the beam at the end of the step, before the event (`springbeam.bodies.protocol.InnerForces`); and
     # the bodies that report them, the sum of `BEAM_REPORTS` and `SPRING_REPORTS`, the same in all records of a run.
     *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress", "reports"),
-    # The same in all records: the degree of the contact force, the tip's share of the common velocity of joined ends,
-    # m_tip/(m_tip + m), and their reduced mass, 1/(1/m_tip + 1/m) [kg], 0 if no rigid law joins them.
+    # The same in all records: the degree of the contact force, and the tip's share of the common velocity of joined
+    # ends, m_tip/(m_tip + m). Reduced mass of ends that a rigid law has joined over the step, 1/(1/m_tip + 1/m) [kg],
+    # the tip's alone on a seat; else 0.
     *("degree", "tip_share", "reduced_mass"),
 )
 #: The contact force of a step: C and its two derivatives at the step's start.
@@ -137,21 +138,13 @@ def common(steps: Records, held: np.ndarray, of_tip: str, of_low: str) -> np.nda
 def impulse(steps: np.ndarray, name: str = "contact_force") -> np.ndarray:
     """Return ∫ C dτ [N·s] over each step of a run, or that of the force N of the foundation.
 
-    What has turned a mismatch of joined ends' velocities round is no part of it.
+    What has reversed a mismatch of joined ends' velocities is no part of it.
     """
     size, c, dc, ddc = (steps[part] for part in ("size", name, f"{name}_rate", f"{name}_rate_2"))
     before = Rows(steps, np.arange(len(steps)) - 1)
     turned = steps["v_tip"] - steps["z"] - before["v_tip_after"] + before["z_after"]
-    together = joined(before) & (size > 0.0) & ((name == "contact_force") | seated(before))
-    turning = np.where(together, reduced_mass(before) * turned, 0.0)
-    return np.asarray(size * (c + size * (dc / 2.0 + size * ddc / 6.0)) - turning)
-
-
-def reduced_mass(before: Records) -> np.ndarray:
-    """Return μ [kg] of ends that a rigid law joins after the records ``before``; the tip's alone on a seat."""
-    free = 1.0 - before["tip_share"]
-    alone = before["reduced_mass"] / np.where(free > 0.0, free, 1.0)
-    return np.where(seated(before) & (free > 0.0), alone, before["reduced_mass"])
+    acts = (name == "contact_force") | seated(before)
+    return np.asarray(size * (c + size * (dc / 2.0 + size * ddc / 6.0)) - acts * steps["reduced_mass"] * turned)
 
 
 def force(steps: Records | Mapping[str, np.ndarray], tau: np.ndarray, name: str = "contact_force") -> np.ndarray:

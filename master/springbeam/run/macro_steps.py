@@ -12,7 +12,6 @@ from math import ceil, inf, log2, sqrt
 
 from ..bodies import force
 from ..coupling.protocol import Step
-from ..motion.events import Joint
 from ..motion.paths import Path
 from .outcome import RunStopped
 from .setup import SAME, SHORTEST_STEP, Setup
@@ -199,7 +198,7 @@ class AdaptiveSteps:
         pair = self._pair
         degree = pair.joined.degree
         size = step.size
-        if state.phase.joint is Joint.FREE and not any(step.contact):
+        if not state.phase.joined and not any(step.contact):
             return 0.0, degree + 3
         at_end = force.value(step.contact, size) - pair.present(state.phase, step, size).contact_force
         at_start = step.contact[0] - state.present.contact_force

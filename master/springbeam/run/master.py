@@ -15,7 +15,7 @@ import numpy as np
 
 from ..bodies.protocol import NO_FORCE, Body, BodyFailed, Ends, StepRefused
 from ..contact.impacts import NO_IMPACT, Impact
-from ..contact.phases import Instant, Phase
+from ..contact.phases import Instant, Phase, joins
 from ..coupling.protocol import NotConverged, Step
 from ..motion.events import Event, EventKind, Joint
 from ..results.columns import ledger
@@ -131,9 +131,10 @@ class Master:
             if pair.opens_softly:
                 self._note_soft_contact(step)
         before = pair.present(state.phase, step, controller.size) if step.size > 0.0 else state.present
+        mass = pair.tied_mass(state.phase) if step.size > 0.0 else 0.0
         if event is not None:
             self._act(event, step, before.contact_force)
-        self._record(step, pair.ends(), before, changed=event is not None or (whole and target == kink))
+        self._record(step, pair.ends(), before, mass, changed=event is not None or (whole and target == kink))
 
     def _advance(self, size: float, *, to_kink: bool) -> tuple[Step, EventKind | None]:
         """The next step and the event it ends on, the bodies left at its end."""
@@ -193,11 +194,11 @@ class Master:
     def _in_contact(self, start: Ends) -> bool:
         """Is the tip on the spring top (or the stop), moving down or at rest?"""
         pair = self.pair
-        if not self._setup.upper or pair.law is not None or (pair.alone and self._setup.floor is None):
+        if not joins(pair.interface) and (not pair.alone or self._setup.floor is None):
             return False
         tip, low = start
         tolerance = self._detector.tolerance(start) + 1e-12 * abs(low.displacement)
-        parting = tip.velocity - low.velocity > 0.0 and not pair.lasting
+        parting = tip.velocity - low.velocity > 0.0 and not self._setup.lasting
         return abs(tip.displacement - low.displacement) <= tolerance and not parting
 
     def _act(self, kind: EventKind, step: Step, contact_force: float) -> None:
@@ -246,10 +247,11 @@ class Master:
 
     # -- what is left of a step ---------------------------------------------------------------------------------------
 
-    def _record(self, step: Step, ends: Ends, before: Present, *, changed: bool) -> None:
+    def _record(self, step: Step, ends: Ends, before: Present, mass: float = 0.0, *, changed: bool) -> None:
         """Leave the record of ``step``, and now and then the beam's shape.
 
-        ``ends`` are those after its event, ``before`` the forces before it; ``changed`` says whether others are next.
+        ``ends`` are those after its event; ``before``, the forces, and ``mass``, `Pair.tied_mass`, before it;
+        ``changed`` says whether other forces act next.
         """
         state = self.state
         tip, low = step.end  # no event makes an end faster than both were
@@ -260,12 +262,12 @@ class Master:
         speed = max(tip[1], -tip[1], low[1], -low[1])
         if speed > state.fastest:
             state.fastest = speed
-        self._log.records.append(self._packed(step, ends, before))
-        early = state.shapes_left > 0 and state.phase.joint is not Joint.FREE
+        self._log.records.append(self._packed(step, ends, before, mass))
+        early = state.shapes_left > 0 and state.phase.joined
         if early or state.time >= state.next_shape:
             self._shape(early)
 
-    def _packed(self, step: Step, ends: Ends, forces: Present) -> bytes:
+    def _packed(self, step: Step, ends: Ends, forces: Present, mass: float = 0.0) -> bytes:
         state = self.state
         pair = self.pair
         _, size, contact, foundation, _, before = step
@@ -275,24 +277,24 @@ class Master:
         (u, v, _, _), (y, z, _, _) = ends
         of_upper = pair.upper.energies()
         of_lower = pair.lower.energies()
-        booked = pair.joined.booking(ends)
+        in_law = pair.joined.energies(ends)
         if self._adaptive is not None:
             energies = abs(of_upper.kinetic + of_upper.potential) + abs(of_lower.kinetic + of_lower.potential)
-            self._adaptive.note(energies + booked.stored)
+            self._adaptive.note(energies + in_law.stored)
         return packed(
             *(state.time, size, *before[0], *before[1], *contact, *foundation),
             *(*forces, u, v, y, z, *state.present, state.phase.number, state.events),
             *(
                 *of_upper,
                 *of_lower,
-                *booked,
+                *in_law,
                 state.lost,
                 pair.upper.received or 0.0,
                 pair.lower.received or 0.0,
                 state.energy_at_start,
             ),
             *(pair.upper.inner_forces() if self._reports & BEAM_REPORTS else _NO_INNER_FORCES),
-            *(self._reports, pair.joined.degree, pair.tip_share, pair.turned_mass),
+            *(self._reports, pair.joined.degree, pair.interface.tip_share, mass),
         )
 
     def _shape(self, early: bool) -> None:

@@ -95,7 +95,7 @@ class State:
         if phase == self.phase:
             return
         self.phase = phase
-        if phase.joint is Joint.FREE:
+        if not phase.joined:
             self.contact = NO_FORCE
         if not phase.seated:
             self.foundation = NO_FORCE
@@ -132,8 +132,7 @@ class Pair:
             self.upper, self.lower, setup.law, equilibrium, setup.floor, setup.restitution, self.alone
         )
         self.automaton = Automaton(self.interface)
-        #: The tip's part in the velocity with which joined ends go on.
-        self.tip_share = self.interface.tip_share
+        self._reduced_mass = [self.interface.reduced_mass(seated=seated) for seated in (False, True)]
         #: Where the ends are; looked up once, since every step asks a few times.
         self._massless = self.upper.massless
         self._tip = self.upper.motion
@@ -142,15 +141,11 @@ class Pair:
         self._holding = 0.0  #: what holds a seated lower end, without loads and contact [N]
         #: The soft law between the ends; a rigid one has no force of its own, and ties them while they are joined.
         self.law = setup.soft
-        #: μ of ends that a rigid law joins, whose mismatch of velocities a step turns round [kg]; else 0.
-        self.turned_mass = self.interface.reduced_mass() if self.law is None else 0.0
         #: The bodies whose acceleration, or its change by damping, is unknown.
         self.without_acceleration: list[Body] = []
         self._decays: dict[int, float] = {}  #: `Body.decay` of those that have been asked, by `id`
-        #: Whether they are joined for good.
-        self.lasting = self.interface.lasting
         #: Whether contact opens and closes inside steps, without an event that ends them.
-        self.opens_softly = self.law is not None and not self.lasting
+        self.opens_softly = self.law is not None and not setup.lasting
         #: What couples the bodies where the law acts, and where the ends are apart.
         self.joined = coupling_of(setup.scheme, setup.degree, setup.tolerance, self.law, self.upper.reach)
         self._uncoupled = self.joined if self.law else Uncoupled()
@@ -165,7 +160,7 @@ class Pair:
         tip, low = ends = self.ends()
         if self.law is not None:
             contact_force = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
-        joint = Joint.TIED if self.law is not None and self.lasting else Joint.FREE
+        joint = Joint.TIED if self.law is not None and self.setup.lasting else Joint.FREE
         seated = self.setup.at_rest and not self.alone and low.displacement == self.setup.floor
         held = (contact_force, 0.0, 0.0)
         alone = self.alone and self.law is None
@@ -192,7 +187,7 @@ class Pair:
             self.loads.act(state.time, size)
         coupling = self.joined
         guess = state.contact  # the force of the last step, continued
-        if phase.joint is Joint.FREE:
+        if not phase.joined:
             coupling = self._uncoupled
             guess = NO_FORCE
         elif size > _REACH_OF_FORCE * state.last_size:
@@ -204,8 +199,6 @@ class Pair:
     def _with_foundation(self, step: Step) -> Step:
         """Return ``step`` with the force N on the lower end that the foundation holds; a spring is at rest under it."""
         time, size, contact, _, _, (tip, _) = step
-        if self.alone:
-            return step._replace(foundation=contact)
         assert self.interface.floor is not None
         self._holding = self.lower.holding_force(self.interface.floor, 0.0)
         load, slope, bend = self.lower.load_on_end()
@@ -228,7 +221,7 @@ class Pair:
 
     def follow_phase(self, phase: Phase) -> float:
         """Let a massless tip take the velocity of what ``phase`` joins it to, or spring back; return its loss [J]."""
-        if phase.joint is Joint.FREE:
+        if not phase.joined:
             return self.upper.release()
         self.upper.join(self.lower.motion().velocity)
         return 0.0
@@ -240,7 +233,7 @@ class Pair:
     def ends_together(self, phase: Phase) -> Ends:
         """Return (tip, lower end); where a rigid law joins them, with the velocity that they have in common."""
         tip, low = ends = self.ends()
-        if phase.joint is Joint.FREE or self.law is not None:
+        if not self._ties(phase):
             return ends
         common = self._common_velocity(phase, ends)
         return tip._replace(velocity=common), low._replace(velocity=common)
@@ -248,7 +241,7 @@ class Pair:
     def _common_velocity(self, phase: Phase, ends: Ends) -> float:
         """Return the velocity of ``ends`` that a rigid law joins [m/s]."""
         tip, low = ends
-        share = 0.0 if phase.seated else self.tip_share
+        share = 0.0 if phase.seated else self.interface.tip_share
         return low.velocity + share * (tip.velocity - low.velocity)
 
     def present(self, phase: Phase, step: Step, macro_step: float, *, changed: bool = False) -> Present:
@@ -271,7 +264,7 @@ class Pair:
         load = force.value(self.lower.load_on_end(), 0.0 if changed else size) if phase.seated else 0.0
         if self.law is not None:
             C = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
-        elif phase.joint is Joint.FREE:
+        elif not phase.joined:
             C = 0.0
         elif self._massless:
             C = self.upper.holding_force(low.displacement, low.velocity)
@@ -279,8 +272,6 @@ class Pair:
             C = self._multiplier(phase, time + size, macro_step, force.value(contact, size), changed=changed)
         if not phase.seated:
             return Present(C)
-        if self.alone:
-            return Present(C, C)
         if changed:
             assert self.interface.floor is not None
             self.mark()  # from where a body may try which force holds it
@@ -292,9 +283,8 @@ class Pair:
         tip, low = step.start
         tip_after, low_after = step.end
         turned = tip_after.velocity - low_after.velocity - tip.velocity + low.velocity
-        joined = phase.joint is not Joint.FREE and self.law is None
         applied = force.mean(step.foundation if name == "foundation" else step.contact, step.size)
-        return applied - self.reduced_mass(phase) * turned / step.size * joined
+        return applied - self.tied_mass(phase) * turned / step.size
 
     def _multiplier(self, phase: Phase, time: float, macro_step: float, acting: float, *, changed: bool) -> float:
         """Return C = −μ (ü − ÿ) of joined ends [N], ü and ÿ without it; ``acting`` [N] where a body cannot tell.
@@ -337,6 +327,14 @@ class Pair:
             self._decays[id(body)] = found if found is not None and found * macro_step < _KEPT else 0.0
         return self._decays[id(body)]
 
+    def _ties(self, phase: Phase) -> bool:
+        """Return whether a rigid law, or the foundation, holds the ends together."""
+        return phase.joined and self.law is None
+
+    def tied_mass(self, phase: Phase) -> float:
+        """Return `reduced_mass` of ends that are held together, whose mismatch a step reverses; else 0."""
+        return self.reduced_mass(phase) if self._ties(phase) else 0.0
+
     def reduced_mass(self, phase: Phase) -> float:
         """Reduced mass of both ends [kg]; the tip's mass while the lower end is seated."""
-        return self.interface.reduced_mass(seated=phase.seated)
+        return self._reduced_mass[phase.seated]
