@@ -1,6 +1,6 @@
 """Functions for Python programs: ``springbeam.simulate`` and the others.
 
-A `Trajectory` is data; its methods that need rooms above its own are attached here.
+A `Trajectory` is data; what is computed from it by other modules is attached here.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .results import recording, totals
+from .results.contacts import contacts_of
 from .results.files import load_trajectory as load
 from .results.trajectory import Trajectory
 from .run.companion import Check, check
@@ -58,5 +59,5 @@ def _html(run: Trajectory) -> str:
     return f"<table><caption>{escape(run.scene.title or 'a run')}</caption>{body}</table>"
 
 
-for _name, _method in {"plot": _plot, "save": _save, "_repr_html_": _html}.items():
+for _name, _method in {"plot": _plot, "save": _save, "_repr_html_": _html, "contacts": property(contacts_of)}.items():
     setattr(Trajectory, _name, _method)

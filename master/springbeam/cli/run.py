@@ -36,9 +36,8 @@ from .common import (
 
 if TYPE_CHECKING:
     from ..motion.events import Event
-    from ..results.contacts import Contact
     from ..results.recording import FileRecorder
-    from ..results.trajectory import Trajectory
+    from ..results.trajectory import Contact, Trajectory
     from ..run.outcome import Progress
     from ..scene import Scene
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import nan
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,38 +13,8 @@ from .contact_times import between_tip_and_spring, with_foundation
 from .dense import inside
 from .law_peak import peak_of_law
 from .records import impulse
+from .trajectory import Contact, Trajectory
 from .window_peak import peak_force
-
-
-class Contact(NamedTuple):
-    """A contact of tip and spring, or of a single body with the foundation; a row of ``contacts.csv``."""
-
-    begin: float  #: [s]
-    duration: float  #: [s]; of an impact that separates at once 0
-    impulse: float  #: on the upper of both, upward: ∫ C dt and impacts [N·s]
-    #: Largest force [N]: of the law, or of a rigid contact the mean over the window; ``None`` if that is not known.
-    peak_force: float | None
-    peak_time: float | None  #: when that is, or when the window begins [s]
-    depth: float  #: largest penetration by the law; of a rigid one the distance that the ends go down together [m]
-    loss: float  #: by the contact law, or in its impacts [J]
-    v_tip_before: float  #: velocities of tip and lower end where they meet [m/s]; that of a wall, or of no body, is 0
-    z_before: float
-    v_tip_after: float | None  #: and where they part; ``None`` if the run ends in the contact
-    z_after: float | None
-
-    @property
-    def closing(self) -> float:
-        """Speed at which the ends meet [m/s]."""
-        return self.z_before - self.v_tip_before
-
-    @property
-    def opening(self) -> float | None:
-        """Speed at which they part [m/s]; ``None`` if the run ends in the contact."""
-        return None if self.v_tip_after is None or self.z_after is None else self.v_tip_after - self.z_after
-
-
-#: Units of the columns of ``contacts.csv``.
-CONTACT_UNITS = dict(zip(Contact._fields, ("s", "s", "N·s", "N", "s", "m", "J", *["m/s"] * 4), strict=True))
 
 
 def contacts_as_array(found: Sequence[Contact]) -> np.ndarray:
@@ -73,6 +42,12 @@ def contacts(scene: Scene, steps: np.ndarray, events: Sequence[Event], window: f
     between = between_tip_and_spring(events) if scene.coupled else with_foundation(events)
     found = _Found(scene, steps, events, window)
     return [found.contact(*each) for each in between]
+
+
+def contacts_of(run: Trajectory) -> list[Contact]:
+    """Return the contacts of ``run`` in their order; none of one without steps, as by a reference."""
+    steps = np.empty(0) if run.steps is None else run.steps
+    return contacts(run.scene, steps, run.events, run.summary.get("contact_force_window"))
 
 
 class _Found:

@@ -19,7 +19,7 @@ from pydantic_core import to_json
 from ..motion.events import Event
 from ..scene import scene_from_dict
 from .columns import trajectory_of
-from .contacts import contacts_as_array
+from .contacts import contacts_as_array, contacts_of
 from .directory import PARQUET, TABLES, ResultsUnreadable, RunDirectory
 from .document import as_json
 from .records import EVENT, SHAPE, STEP, array_of, events_as_array, events_of
@@ -42,7 +42,7 @@ def lines(rows: Iterable[Sequence[Any]]) -> bytes:
 
 def tables_of(run: Trajectory) -> list[np.ndarray]:
     """Return the tables of a run beside its rows: its events, its contacts and, with a beam, its shapes."""
-    found = [events_as_array(run.events), contacts_as_array(run.contacts)]
+    found = [events_as_array(run.events), contacts_as_array(contacts_of(run))]
     if run.shape_table is not None:
         found.append(np.ascontiguousarray(run.shape_table).view(SHAPE)[:, 0])
     return found

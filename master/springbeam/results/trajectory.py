@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-    from .contacts import Contact
-
 
 class Column(NamedTuple):
     """A column of a run: its unit, the part of a scene without which it is left out, and its meaning."""
@@ -115,12 +113,43 @@ def rounded(value: float, scale: float) -> str:
     return "0" if abs(value) <= _NOISE * scale else f"{value:.4g}"
 
 
+class Contact(NamedTuple):
+    """A contact of tip and spring, or of a single body with the foundation; a row of ``contacts.csv``."""
+
+    begin: float  #: [s]
+    duration: float  #: [s]; of an impact that separates at once 0
+    impulse: float  #: on the upper of both, upward: ∫ C dt and impacts [N·s]
+    #: Largest force [N]: of the law, or of a rigid contact the mean over the window; ``None`` if that is not known.
+    peak_force: float | None
+    peak_time: float | None  #: when that is, or when the window begins [s]
+    depth: float  #: largest penetration by the law; of a rigid one the distance that the ends go down together [m]
+    loss: float  #: by the contact law, or in its impacts [J]
+    v_tip_before: float  #: velocities of tip and lower end where they meet [m/s]; that of a wall, or of no body, is 0
+    z_before: float
+    v_tip_after: float | None  #: and where they part; ``None`` if the run ends in the contact
+    z_after: float | None
+
+    @property
+    def closing(self) -> float:
+        """Speed at which the ends meet [m/s]."""
+        return self.z_before - self.v_tip_before
+
+    @property
+    def opening(self) -> float | None:
+        """Speed at which they part [m/s]; ``None`` if the run ends in the contact."""
+        return None if self.v_tip_after is None or self.z_after is None else self.v_tip_after - self.z_after
+
+
+#: Units of the columns of ``contacts.csv``.
+CONTACT_UNITS = dict(zip(Contact._fields, ("s", "s", "N·s", "N", "s", "m", "J", *["m/s"] * 4), strict=True))
+
+
 @dataclass(repr=False)
 class Trajectory:
     """Columns as numpy arrays under the names of `COLUMNS`: ``trajectory["y"]`` or ``trajectory.y``.
 
     ``shape_table`` has the numbers of `SHAPE_COLUMNS`, shape (n, 64); it is ``None`` without a beam. ``at`` is
-    `springbeam.results.dense.at`; `springbeam.api` attaches ``plot`` and ``save``, which need rooms above.
+    `springbeam.results.dense.at`; `springbeam.api` attaches ``contacts``, ``plot`` and ``save``.
     """
 
     scene: Scene
@@ -133,6 +162,8 @@ class Trajectory:
 
     if TYPE_CHECKING:
 
+        @property
+        def contacts(self) -> list[Contact]: ...
         def at(self, times: Any) -> Trajectory: ...
         def plot(self, picture: str = "positions", ax: Axes | None = None) -> Figure: ...
         def save(self, directory: str | Path, *, replace: bool = False) -> Path: ...
@@ -146,14 +177,6 @@ class Trajectory:
         if name == "columns" or name not in self.columns:  # the former while it is unpickled
             raise AttributeError(name)
         return self.columns[name]
-
-    @property
-    def contacts(self) -> list[Contact]:
-        """Each contact in its order; none of a run without steps, as by a reference."""
-        from .contacts import contacts  # which follows from dense output
-
-        steps = np.empty(0) if self.steps is None else self.steps
-        return contacts(self.scene, steps, self.events, self.summary.get("contact_force_window"))
 
     @property
     def do_steps(self) -> int:

@@ -15,10 +15,10 @@ import jinja2
 import numpy as np
 import tomli_w
 
-from ...results.contacts import CONTACT_UNITS
+from ...results.contacts import contacts_of
 from ...results.judged import judged_in_words
 from ...results.totals import in_words
-from ...results.trajectory import Trajectory, cascades, rounded
+from ...results.trajectory import CONTACT_UNITS, Trajectory, cascades, rounded
 from ...scene import Scene
 from ...scene.partners import kind_of
 from ...scene.statics import bending_stiffness, shear_stiffness
@@ -87,7 +87,7 @@ def page(trajectory: Trajectory) -> str:
         judged=judged_in_words(trajectory.summary, trajectory.scene.duration),
         events=list(cascades(events)),
         contact_units=CONTACT_UNITS,
-        contacts=trajectory.contacts,
+        contacts=contacts_of(trajectory),
         contacts_shown=_EVENTS_SHOWN,
         event_values=values,
         event_scales={name: max((abs(getattr(e, name) or 0.0) for e in events), default=0.0) for name in values},
