@@ -182,9 +182,10 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
   const Variable& by = variable(place, Type::real, "differentiate by");
   if (of.causality != Causality::output) throw std::invalid_argument("'" + of.name + "' is not an output");
   const bool starting = progress.phase == initialization;
-  if (by.consumed || of.discrete) return 0.0;  // an impulse acts in the next step
+  if (by.consumed) return 0.0;  // it acts in the next step
   if (!by.continuous_input() && !(is_setting(by) && starting && order == 0))
     throw std::invalid_argument("'" + by.name + "' is not a continuous input");
+  if (of.discrete) return 0.0;
   const auto& at_start = of.initial_dependencies;
   const bool named = !at_start || std::find(at_start->begin(), at_start->end(), by.name) != at_start->end();
   const auto meant = [&, order = order](const Dependency& d) { return d.input == by.name && d.order == order; };
