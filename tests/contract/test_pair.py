@@ -168,7 +168,7 @@ def test_a_size_that_changes_is_followed_from_the_step_after(beam, spring):
 
 
 def test_a_last_step_that_is_cut_short_costs_no_more_than_its_part(beam, spring):
-    """Of the whole step, the energy that the contact gains or owes; the pair's stays."""
+    """The contact gains or owes that part of the energy of the whole step; the pair keeps its energy."""
     whole = Pair(beam, spring, 1e-3).start()
     short = Pair(beam, spring, 1e-3).start()
     for pair in (whole, short):

@@ -76,7 +76,7 @@ def test_a_check_changes_no_bit_of_the_run_and_may_come_later():
 
 
 def test_the_error_of_any_function_of_a_run_is_that_of_both():
-    """Of the clamp's moment at the end, of a position between rows, and of a count, beside a run in steps of H/16."""
+    """The clamp's moment at the end, of a position between rows, and of a count, beside a run in steps of H/16."""
     scene = load_scene("soft", ["time.t_end=0.1", "beam.n_elements=6", "coupling.macro_step=4e-3", "coupling.degree=0"])
     found = check(simulate(scene, check=False))
     fine = simulate(with_changes(scene, coupling={"macro_step": 2.5e-4}), check=False)

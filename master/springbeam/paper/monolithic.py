@@ -38,7 +38,7 @@ from .problem import AlgorithmFailure, AtContact
 
 YTemp = Literal["equation", "guess", "both"]
 
-#: Of Newton's method, on the change of the unknown [m].
+#: Limits of Newton's method, on the change of the unknown [m].
 _MAX_ITERATIONS = 50
 _TOLERANCE = 1e-12
 

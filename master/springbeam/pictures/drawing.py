@@ -25,7 +25,7 @@ VERMILLION = "#D55E00"
 PURPLE = "#CC79A7"
 GREY = "#777777"
 STONE = "#B8B8B8"
-#: Of curves of one kind, in turn.
+#: Colours of curves of one kind, in turn.
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 
 

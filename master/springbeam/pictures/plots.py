@@ -35,7 +35,7 @@ from .timeline import COMPRESSION, DPI, REMARK, STYLE, figure_for, line_style, p
 
 _SHAPES_EARLY = 20
 _SHAPES_LATER = 24
-#: Of the heights of panels, in the overview.
+#: Factor of the heights of panels in the overview.
 _ON_ONE_PAGE = 0.75
 #: Early to late, dark to light, but visible on paper.
 _CLOCK = ListedColormap(matplotlib.colormaps["cividis"](np.linspace(0.0, 0.9, 256)), "clock")

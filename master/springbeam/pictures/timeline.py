@@ -50,13 +50,13 @@ STYLE: dict[Any, Any] = {
 }
 REMARK: dict[str, Any] = {"fontsize": 7.0, "style": "italic", "color": GREY}
 DPI = 120
-#: Of the PNGs: four times as fast as by default, and a few percent larger.
+#: Compression of the PNGs: four times as fast as by default, and a few percent larger.
 COMPRESSION = {"compress_level": 2}
 _TITLE_WIDTH = 105  # characters
 _BESIDE_MARK = 60
 _KEY_COLUMNS = 4
-#: Of a figure, and of what surrounds its panels [inch]: labels to the left, keys to the right; between two panels; the
-#: labels of the time axis; a row of a title or of the key; a row of marks of events; free room.
+#: Sizes of a figure, and of what surrounds its panels [inch]: labels to the left, keys to the right; between two
+#: panels; the labels of the time axis; a row of a title or of the key; a row of marks of events; free room.
 _WIDTH = 8.2
 _LEFT = 0.75
 _RIGHT = 1.85

@@ -1,7 +1,10 @@
 """The results of a run: its records and functions of them, in memory and in files.
 
-Imports `scene` and `motion` only. Start at ``steps``, the record of a step; ``columns``, ``dense`` and ``totals`` are
-functions of records. A run passes them to a recorder: ``recording`` keeps them in memory or in a run ``directory``,
-whose ``files`` are written and read back as a ``trajectory``. ``contact_times`` has the times of contact of a run, and
-their differences between two runs.
+Imports `scene` and `motion` only. Start at ``records``, the three arrays that are a run. ``recording`` keeps them in
+memory or in a run ``directory``, whose ``files`` are read back as a ``trajectory``. Functions of them:
+
+* ``columns`` at the rows, ``dense`` and ``inner`` between them, ``spans`` for their ranges and rounding;
+* ``totals``: the results of a run, with ``law_peak`` and ``window_peak`` for the largest force; their errors in words,
+  ``judged``;
+* ``contacts``, each contact of a run, by its ``contact_times``; ``contact_changes`` and ``distance`` compare two runs.
 """

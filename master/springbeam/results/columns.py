@@ -54,7 +54,7 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     if scene.coupled and scene.contact.impacts:
         inside = np.minimum(normal_compliance(scene, u, first), MOST_SHOWN)
     energies = ledger(steps)
-    found = {
+    table = {
         "time": steps["time"],
         "u_tip": u,
         "v_tip": v,
@@ -72,23 +72,23 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     }
     reports = int(first["reports"][0]) if len(first) else BEAM_REPORTS + SPRING_REPORTS
     if reports & BEAM_REPORTS:
-        found |= {name: steps[field] for name, field in _OF_BEAM.items()}
+        table |= {name: steps[field] for name, field in _OF_BEAM.items()}
     if reports & SPRING_REPORTS and scene.spring is not None:
-        found["a_y"] = _acceleration(scene, scene.spring, found, steps)
-    if rigid and "a_tip" in found and (scene.lower is None or "a_y" in found):
+        table["a_y"] = _acceleration(scene, scene.spring, table, steps)
+    if rigid and "a_tip" in table and (scene.lower is None or "a_y" in table):
         # Joined ends move as one; the tip's own acceleration alternates from step to step.
-        found["a_tip"] = np.where(apart, found["a_tip"], found.get("a_y", 0.0))
-    return {name: np.array(found[name]) for name in columns_of(scene) if name in found or name not in BODY_COLUMNS}
+        table["a_tip"] = np.where(apart, table["a_tip"], table.get("a_y", 0.0))
+    return {name: np.array(table[name]) for name in columns_of(scene) if name in table or name not in BODY_COLUMNS}
 
 
-def _acceleration(scene: Scene, spring: Spring, found: Mapping[str, np.ndarray], steps: np.ndarray) -> np.ndarray:
+def _acceleration(scene: Scene, spring: Spring, table: Mapping[str, np.ndarray], steps: np.ndarray) -> np.ndarray:
     """Return ÿ [m/s²] of the spring's top under the forces of its row, 0 while it is seated."""
-    force = -spring.force(found["y"]) - spring.damping * found["z"]
+    force = -spring.force(table["y"]) - spring.damping * table["z"]
     for i, load in enumerate(scene.loads):
         if load.on in ("spring", "base"):
-            force = force + found[f"load_{i}"] * (1.0 if load.on == "spring" else -spring.mass)
+            force = force + table[f"load_{i}"] * (1.0 if load.on == "spring" else -spring.mass)
     if scene.coupled:
-        force = force - found["contact_force"]
+        force = force - table["contact_force"]
     return np.where(seated(steps), 0.0, force / spring.mass)
 
 
@@ -98,8 +98,7 @@ def first_not_finite(scene: Scene, steps: np.ndarray, first: np.ndarray) -> tupl
     Parameters as of `columns`.
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        made = columns(scene, steps, first)
-    table = [(name, values) for name, values in made.items() if name != "phase"]
+        table = [(name, values) for name, values in columns(scene, steps, first).items() if name != "phase"]
     table += [(name, steps[name]) for name in STEP_COLUMNS]
     finite = np.isfinite([values for _, values in table])
     if finite.all():
@@ -154,7 +153,7 @@ def ledger(steps: np.ndarray, received: Collection[str] = ()) -> dict[str, np.nd
     nothing = np.zeros(len(steps))
     e_beam, lost_beam, load_beam = account("beam")
     e_spring, lost_spring, load_spring = account("spring")
-    found = {
+    energies = {
         "e_beam": e_beam,
         "e_spring": e_spring,
         "e_contact": steps["law_stored"],
@@ -162,4 +161,4 @@ def ledger(steps: np.ndarray, received: Collection[str] = ()) -> dict[str, np.nd
         "e_impact_loss": steps["impact_loss"],
         "e_load": load_beam + load_spring,
     }
-    return {**found, "e_total": np.sum(list(found.values()), axis=0)}
+    return {**energies, "e_total": np.sum(list(energies.values()), axis=0)}

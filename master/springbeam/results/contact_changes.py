@@ -64,12 +64,12 @@ def impulse_difference(run: Trajectory, reference: Trajectory) -> float:
 
     The sums are of the impulses on the tip and of those of the foundation.
     """
-    found, exact = (
+    ours, exact = (
         np.sum([(0.0, 0.0), *((event.impulse_contact, event.impulse_foundation) for event in of.events)], axis=0)
         for of in (run, reference)
     )
     scale = float(np.abs(exact).sum())
-    return float(np.abs(found - exact).sum()) / scale if scale > 0.0 else nan
+    return float(np.abs(ours - exact).sum()) / scale if scale > 0.0 else nan
 
 
 def _merged(intervals: list[Interval], window: float) -> list[Interval]:

@@ -63,9 +63,8 @@ SHAPE = np.dtype([(name, "<f8") for name in SHAPE_COLUMNS])
 packed = Struct(f"<{len(STEP_COLUMNS)}d").pack
 #: The column ``phase`` by the number in a record: how the ends are joined, and 3 more while the lower end is seated.
 PHASE_NAMES = np.array(["free", "tied", "touch", "seated", "seated", "seated"])
-#: The first number of the phases in which the lower end is seated; numbers of those in which nothing joins the ends.
+#: The first number of the phases in which the lower end is seated.
 _SEATED = 3.0
-_APART = (0.0, _SEATED)
 
 
 class Rows:
@@ -119,7 +118,7 @@ def events_of(rows: np.ndarray) -> list[Event]:
 
 def joined(steps: Records) -> np.ndarray:
     """Return whether the ends are joined from each row on."""
-    return ~np.isin(steps["phase"], _APART)
+    return np.asarray(steps["phase"] % _SEATED > 0.0)
 
 
 def seated(steps: Records) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Judge a run by its energy ledger: when it warns, when it stops, and what it then says."""
+"""Judge a run by its energy ledger: when it warns, when it stops, and with which message."""
 
 from __future__ import annotations
 
@@ -50,16 +50,16 @@ def errors(
     largest energy before ``steps`` [J], ``received`` as of `ledger`.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused by the record
-        found = ledger(steps, received)
+        energies = ledger(steps, received)
         initial = float(first["energy_at_start"][0])
         if received:
             initial = float(ledger(first, received)["e_total"][0])
         # Beyond its hilltop a softening spring has a negative potential, which may cancel its kinetic energy.
-        of_spring = np.maximum(np.abs(found["e_spring"]), steps["spring_kinetic"])
-        size = np.abs(found["e_beam"]) + of_spring + found["e_contact"]
+        of_spring = np.maximum(np.abs(energies["e_spring"]), steps["spring_kinetic"])
+        size = np.abs(energies["e_beam"]) + of_spring + energies["e_contact"]
         rounding = np.cumsum(_HELD * energy_of_force(steps))
         largest = rounding + np.maximum.accumulate(np.maximum(size - rounding, max(scale, abs(initial))))
-        residual = found["e_total"] - initial
+        residual = energies["e_total"] - initial
         return np.divide(residual, largest, out=np.zeros_like(residual), where=largest > 0.0), largest
 
 
@@ -74,7 +74,7 @@ class Balance:
         self._received = [
             table for table, body in zip(("beam", "spring"), pair.bodies, strict=True) if body.received is not None
         ]
-        #: Bodies of the caller's may tell no energies; there is then no balance to judge by.
+        #: Bodies of the caller may report no energies; there is then no balance to judge by.
         self._unknown = any(
             not body.can().energies and body.received is None and body.mass < inf for body in pair.bodies
         )
@@ -83,7 +83,7 @@ class Balance:
         self._scale = 0.0  #: the largest energy so far [J]
 
     def check(self, steps: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, Callable[[int], str]]:
-        """Tell at which of the next records too much of the energy has changed, and why; see `Log`."""
+        """Return at which of the next records too much of the energy has changed, and why; see `Log`."""
         share, largest = errors(steps, first, self._scale, self._received)
         self._scale = float(largest[-1])
         return np.abs(share) > self._stops, lambda row: self._cause(float(abs(share[row])), steps)

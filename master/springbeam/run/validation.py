@@ -41,10 +41,11 @@ def _needs(setup: Setup) -> Iterator[Need]:
     if not setup.exchanges:
         instead = 'use scheme = "jacobi" or "gauss_seidel" with [contact] law = "link" or "compliance", without [stop]'
         yield f'[coupling] scheme = "{setup.scheme}"', instead, ("state",)
-    elif setup.degree > 0:
-        yield degree, _LEFT_OUT, ("velocity",)
-    if setup.exchanges and setup.soft is not None and setup.soft.damped:
-        yield "[contact] damping", _LEFT_OUT, ("velocity",)
+    else:
+        if setup.degree > 0:
+            yield degree, _LEFT_OUT, ("velocity",)
+        if setup.soft is not None and setup.soft.damped:
+            yield "[contact] damping", _LEFT_OUT, ("velocity",)
     if isinstance(setup.law, Rigid) and not setup.lasting:
         yield f'[contact] law = "{setup.law_name}"', 'use "compliance", "link" or "tie"', _TO_BE_STRUCK
     if setup.floor is not None:
@@ -80,21 +81,22 @@ def _lacking(setup: Setup, needs: Iterable[Need], table: str, body: Abilities) -
         for name in names:
             if getattr(body, name) < getattr(_ALL, name):
                 yield f"{key}: the body in [{table}] cannot do that, {_LACKS[name]}; {instead}"
-    if body.order < _ALL.order and not setup.exchanges:
+    if setup.exchanges:  # which sets no integrals of the gap to 0, and conserves no energy
+        body = replace(body, integrals=_ALL.integrals, order=_ALL.order)
+    if body.order < _ALL.order:
         yield (
             f'[coupling] scheme = "{setup.scheme}": the body in [{table}] cannot do that, a force moves its end by '
             "less or more than its velocity says, as by a solver of order 1 (Euler's), and a contact would create or "
             "lose energy in each step; name the velocity of an FMU, or give a body of your own a method of order 2"
         )
     degree = f"[coupling] degree = {setup.degree}: the body in [{table}] cannot do that"
-    # The scheme sets as many integrals of the gap to 0; an exchange needs none.
-    followed = body.slopes if setup.exchanges else min(body.integrals, body.slopes)
+    followed = min(body.integrals, body.slopes)
     if setup.degree > body.slopes:
         yield (
             f"{degree}, it follows derivatives of the force of order {body.slopes} at most (canInterpolateInputs; "
             f"FMI 3.0 has none; a body of your own, in advance); use degree = {followed}"
         )
-    if not setup.exchanges and setup.degree > body.integrals:
+    if setup.degree > body.integrals:
         yield f"{degree}, {_LACKS['integrals']}; use degree = {followed}"
 
 

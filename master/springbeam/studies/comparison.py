@@ -55,7 +55,7 @@ PERTURBATION = 1e-7
 _GROWTH = 1e4
 #: Intervals of contact shorter than this many macro steps are ignored.
 SHORT = 2.0
-#: The same where nothing has macro steps, as a share of the time.
+#: Where nothing has macro steps: shorter than this part of the time.
 SHORT_SHARE = 2e-3
 #: What a comparison computes: the run, its companion; the reference, from another velocity.
 PARTS = 4

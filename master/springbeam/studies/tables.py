@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _DPI = 110
 #: Most characters of a name that is not wrapped.
 _NAME = 40
-#: Of printed findings [characters].
+#: Width of printed findings [characters].
 _WIDTH = 120
 
 #: Columns of a row by name.

@@ -35,7 +35,7 @@ _PIXELS = 1.8
 #: Pixels of a chart's height: for each inch of its picture, and for what stands around it.
 _PIXELS_PER_INCH = 82
 _PIXELS_BESIDE = 110
-#: Of a sketch [inch].
+#: Height of a sketch [inch].
 _SKETCH_HEIGHT = 3.0
 
 
