@@ -26,7 +26,7 @@ BandFactors::BandFactors(Eigen::MatrixXd rows) : rows_(std::move(rows)) {
 }
 
 void BandFactors::solve_in_place(Eigen::VectorXd& x) const {
-  // Of linear elements the width is known to the compiler.
+  // The compiler knows the width of linear elements.
   rows_.rows() == 4 ? sweep(std::integral_constant<Index, 3>(), x.data()) : sweep(rows_.rows() - 1, x.data());
 }
 

@@ -8,7 +8,8 @@ namespace beam {
 class BandFactors {
  public:
   BandFactors() = default;
-  /// Of the matrix with A(i, i − k) in row k and column i. Where a pivot is not positive, solutions are not finite.
+  /// Factors the matrix with A(i, i − k) in row k and column i. Where a pivot is not positive, solutions are not
+  /// finite.
   explicit BandFactors(Eigen::MatrixXd rows);
 
   /// x becomes A⁻¹ x.

@@ -67,7 +67,7 @@ class Loads {
       "point_force[1]",   "point_force[2]",     "point_force[3]",      "point_force[4]",
       "tip_load",         "base_acceleration",  "tip_load_coefficient"};
   static bool is_point(std::size_t shape);  ///< or one of those in between
-  /// Of each load its value at one instant, or its mean.
+  /// The value of each load at one instant, or its mean.
   using Values = std::array<double, count>;
 
   Loads() = default;
@@ -250,7 +250,7 @@ class Beam {
 
   double alpha_b_;          // [s]
   Eigen::VectorXd struck_;  // M⁻¹e, the velocity that a unit impulse leaves
-  mutable State now_;       // with the work of the last step if that is booked
+  mutable State now_;       // includes the work of the last step once that is computed
   State start_;             // at the start of the last step
 
  private:

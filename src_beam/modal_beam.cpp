@@ -176,7 +176,7 @@ class ModalBeam final : public Beam {
   ArrayXd damping_;  // α_b ω² [1/s]
   bool damped_;
 
-  // Of the last step.
+  // The last step.
   ArrayXd equilibrium_,
       r_;  // where its first force would hold the modes, and what of that force their displacement leaves
   std::array<ArrayXd, 3> force_, load_;  // modal force and its part that is the loads', with their rates [N/√kg, …]

@@ -10,16 +10,16 @@ namespace {
 constexpr double epsilon = std::numeric_limits<double>::epsilon(), infinite = std::numeric_limits<double>::infinity();
 /// For one force: brackets that only bisection closes take 60, the logarithm of 1/epsilon and some before.
 constexpr int most_trials = 120;
-/// Of the force: some hundred roundings of a top's step. Where the top's own error is larger, as over many periods,
-/// what is missing ceases to fall; then it may be the most that the default tolerance adds up to.
+/// Tolerances of the force: some hundred roundings of a top's step. Where the top's own error is larger, as over many
+/// periods, what is missing ceases to fall; then it may be the most that the default tolerance adds up to.
 constexpr double force_rounding = 1e-13, top_error = 1e-10;
 /// Changes of depth below this part of it leave ten digits less to a difference quotient than to the middle's force.
 constexpr double flat = 1e-6;
 /// A secant whose ends are as near as this, of what they are differences of, is known to a part in a million.
 constexpr double secant_rounding = 1e6 * epsilon;
-/// Of the energies of a step: less is not owed.
+/// Rounding of the energies of a step: less is not owed.
 constexpr double energy_rounding = 1e-11;
-/// Of an interval, down to rounding.
+/// Halvings of an interval, down to rounding.
 constexpr int most_halvings = 60;
 
 /// Where a message says that the tip goes: exactly, for steps of the size H that it is for; for others by

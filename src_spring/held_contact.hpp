@@ -54,7 +54,7 @@ class HeldContact {
   double elastic(double y) const { return law_.elastic(y - now_.tip); }  ///< Φ' [N]
   /// What the contact's force has stored [J]: Φ, and what it owes.
   double energy(double y) const { return law_.energy(y - now_.tip) + now_.debt; }
-  /// The same with the tip as it has `arrived` [m], where the last step has left it: to where it was predicted that
+  /// The energy with the tip as it has `arrived` [m], where the last step has left it: to where it was predicted that
   /// step's force did the rest of its work.
   double energy(double y, double arrived) const { return energy(y) + now_.last * (now_.tip - arrived); }
   double dissipated() const { return now_.dissipated; }  ///< by the contact since the start [J]

@@ -44,7 +44,7 @@ class Spring {
     double size;
     bool event;
   };
-  /// The same step, if `to_event` only to the first event after its start: contact begins or ends, the top meets the
+  /// Makes a step, if `to_event` only to the first event after its start: contact begins or ends, the top meets the
   /// foundation or leaves it. What happens there is due in strike() or at the start of the next step.
   Reached step_to_event(double size, const Inputs& inputs, double time, bool to_event);
   /// Falling onto the foundation inside: rebound, or come to rest, at `time`, under the inputs as observed.

@@ -38,7 +38,8 @@ constexpr std::array<Description, Wiring::faults> descriptions{
 }  // namespace
 
 void Wiring::check_step(const HeldContact& contact, const TipMessage& arrived) {
-  // Of the tip's path in a step: more than rounding, and more than loads within a step do. Of what is missed: nothing.
+  // Parts of the tip's path in a step: more than rounding, and more than loads within a step cause. Part of the error
+  // that no cause explains.
   constexpr double rounding = 1e-6, noticeable = 0.05, unexplained = 0.01;
   const HeldContact::State& state = contact.state();
   stored_ = std::max(stored_, contact.energy(state.tip + state.depth));
