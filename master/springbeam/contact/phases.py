@@ -29,7 +29,7 @@ VELOCITY_ROUNDING = 16.0 * 2.0**-52
 _TIP = 0
 _LOW = 1
 
-#: A force that can only push: C between the ends, or N of the foundation.
+#: A force that can only push, by its name in steps and instants: C between the ends, or N of the foundation.
 PushingForce = Literal["contact", "foundation"]
 
 

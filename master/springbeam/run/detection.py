@@ -142,7 +142,7 @@ class Detector:
         """Return whether a force that can only push would pull by more than rounding."""
         pair = self._pair
         H = self._controller.size
-        pull = -present.of(force)
+        pull: float = -getattr(present, force)
         if pull <= 0.0 or state.met_again == state.time:
             return False
         mass = pair.lower.mass if force == "foundation" else pair.reduced_mass(state.phase)
@@ -155,17 +155,17 @@ class Detector:
         """
         pair = self._pair
         H = self._controller.size
-        start = max(state.present.of(force), 0.0)
+        start = max(getattr(state.present, force), 0.0)
         last = step
 
         def pushes(size: float) -> float:
             nonlocal last
             last = pair.attempt(state, size, step.start)
-            return pair.present(state.phase, last, H).of(force)
+            return float(getattr(pair.present(state.phase, last, H), force))
 
         present = pair.present(state.phase, step, H)
         size = step.size
-        end = present.of(force)
+        end = getattr(present, force)
         mean = pair.mean_of(force, state.phase, step)
         bend = 3.0 * (start + end - 2.0 * mean)
         slope = end - start - bend  # of the parabola through both ends with the mean of the step

@@ -200,8 +200,8 @@ class AdaptiveSteps:
         size = step.size
         if not state.phase.joined and not any(step.contact):
             return 0.0, degree + 3
-        at_end = force.value(step.contact, size) - pair.present(state.phase, step, size).contact_force
-        at_start = step.contact[0] - state.present.contact_force
+        at_end = force.value(step.contact, size) - pair.present(state.phase, step, size).contact
+        at_start = step.contact[0] - state.present.contact
         missed = 0.5 * abs(at_end - (-1.0) ** degree * at_start)
         mass = pair.reduced_mass(state.phase)
         gives = inf if mass == 0.0 else _MOVED[degree] * size * size / (4.0 * mass)

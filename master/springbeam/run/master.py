@@ -133,7 +133,7 @@ class Master:
         before = pair.present(state.phase, step, controller.size) if step.size > 0.0 else state.present
         mass = pair.tied_mass(state.phase) if step.size > 0.0 else 0.0
         if event is not None:
-            self._act(event, step, before.contact_force)
+            self._act(event, step, before.contact)
         self._record(step, pair.ends(), before, mass, changed=event is not None or (whole and target == kink))
 
     def _advance(self, size: float, *, to_kink: bool) -> tuple[Step, EventKind | None]:

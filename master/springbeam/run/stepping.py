@@ -30,14 +30,10 @@ _REACH_OF_FORCE = 4.0
 
 
 class Present(NamedTuple):
-    """Contact force C and foundation force N [N] at an instant."""
+    """Contact force C and foundation force N [N] at an instant, by the names in `PushingForce`."""
 
-    contact_force: float = 0.0
-    foundation_force: float = 0.0
-
-    def of(self, name: PushingForce) -> float:
-        """Return one of both [N]."""
-        return self.foundation_force if name == "foundation" else self.contact_force
+    contact: float = 0.0
+    foundation: float = 0.0
 
 
 NOTHING = Present()
@@ -279,12 +275,11 @@ class Pair:
         return Present(C, self._holding - load + C)
 
     def mean_of(self, name: PushingForce, phase: Phase, step: Step) -> float:
-        """Return the mean of C or N over ``step`` [N] without what turns a mismatch of velocities round."""
+        """Return the mean of C or N over ``step`` [N] without what reverses a mismatch of velocities."""
         tip, low = step.start
         tip_after, low_after = step.end
         turned = tip_after.velocity - low_after.velocity - tip.velocity + low.velocity
-        applied = force.mean(step.foundation if name == "foundation" else step.contact, step.size)
-        return applied - self.tied_mass(phase) * turned / step.size
+        return force.mean(getattr(step, name), step.size) - self.tied_mass(phase) * turned / step.size
 
     def _multiplier(self, phase: Phase, time: float, macro_step: float, acting: float, *, changed: bool) -> float:
         """Return C = −μ (ü − ÿ) of joined ends [N], ü and ÿ without it; ``acting`` [N] where a body cannot tell.
