@@ -51,7 +51,8 @@ def test_a_killed_worker_loses_its_own_case_alone_and_only_if_it_dies_again(tmp_
 def test_an_interrupted_study_says_how_it_goes_on_and_does(here, unpainted, monkeypatch):
     monkeypatch.setattr(sweep.Sweep, "parallel", False)
     shown = printed(*SWEEP, "--out", "whole")
-    assert re.search(r"^spring\.mass +y_min\n *1 .*\n *1\.25 .*\n *1\.5 .*\n *1\.75 .*\n *2 .*\nresults ", shown, re.M)
+    table = r"^spring\.mass +y_min\n +\[kg\] +\[m\]\n *1 .*\n *1\.25 .*\n *1\.5 .*\n *1\.75 .*\n *2 .*\nresults "
+    assert re.search(table, shown, re.M)
     interrupt = Interrupt(3)
     record = sweep.Sweep.record
     monkeypatch.setattr(sweep.Sweep, "record", lambda *arguments: interrupt() or record(*arguments))
