@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import oscillator
 import pytest
 from references import reference
 from scenes import group
@@ -112,6 +113,44 @@ def test_bodies_of_the_caller_are_judged_if_they_can_return_to_their_start():
     assert (upper.motion().displacement, lower.motion().displacement) == (run.u_tip[-1], run.y[-1])
     with_element = simulate(falling(), lower=SpringDamper(1.0, 300.0))
     assert run.summary["errors"]["motion"] == with_element.summary["errors"]["motion"]
+
+
+def on_a_grid(folder, number):
+    """Scene of a mass linked to an FMU that moves in internal steps of 5 ms, in a ``number`` of macro steps of two."""
+    fmu = oscillator.made(folder / "grid.fmu")
+    parameters = {"m": 2.0, "k": 30.0, "c": 0.1, "lie": oscillator.LIES["grid"], "inner": 5e-3}
+    return scene_from_dict(
+        {
+            "time": {"t_end": number * 0.01},
+            "beam": {"element": "point_mass", "mass": 2.0, "velocity": -1.0},
+            "spring": {**oscillator.ALL, "fmu": str(fmu), "force_sign": -1, "parameters": parameters},
+            "contact": {"law": "link", "stiffness": 40.0},
+            "coupling": {"macro_step": 0.01, "degree": 0},
+        }
+    )
+
+
+@pytest.mark.parametrize(("number", "ratio"), [(60, 3), (64, 4), (50, 5), (49, 7)])
+def test_a_body_with_steps_of_one_size_is_judged_by_whole_multiples_of_them(number, ratio, tmp_path):
+    """The shortest from 3 H on that end where the run does; the error is that beside our own spring in steps of H/16.
+
+    Errors of order 2 are what is said over ratio² − 1; higher orders change that by less than a fifth.
+    """
+    scene = on_a_grid(tmp_path, number)
+    run = simulate(scene)
+    errors = run.summary["errors"]
+    assert (errors["ratio"], errors["beside"]) == (ratio, f"steps {ratio} times as long")
+    own = {"mass": 2.0, "linear_stiffness": 30.0, "damping": 0.1}
+    tables = {**scene.model_dump(exclude_unset=True, exclude_none=True), "spring": own}
+    fine = simulate(with_changes(scene_from_dict(tables), coupling={"macro_step": 0.01 / 16.0}), check=False)
+    true = distance(run, fine, 0.01).motion
+    assert 0.8 < (ratio**2 - 1.0) * true / errors["motion"] < 1.2
+
+
+def test_a_body_with_steps_of_one_size_in_a_prime_number_of_them_has_no_companion(tmp_path):
+    run = simulate(on_a_grid(tmp_path, 47))
+    assert (run.summary["resolved"], "errors" in run.summary) == (None, False)
+    assert "use a multiple of [coupling] macro_step = 0.03" in run.summary["not_judged"]
 
 
 def test_a_run_without_a_companion_says_why(monkeypatch):

@@ -1,8 +1,8 @@
 """Judge a run by a companion in steps 2.3 times as long: how far apart both are bounds the error of the finer one.
 
 Where errors fall at least with the size of the steps, the difference of both runs is an upper bound of the error of the
-finer run, of whatever is a function of a run, for any bodies, laws and loads. The sizes are incommensurate: runs that
-share macro points may miss one event. What both runs cannot see is in ``docs/verdicts.md``.
+finer run, of whatever is a function of a run, for any bodies, laws and loads. The sizes are incommensurate, as far as
+the bodies allow: runs that share macro points may miss one event. What both runs cannot see is in ``docs/verdicts.md``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..bodies.protocol import Body, FmuError
+from ..bodies.protocol import Abilities, Body, FmuError
 from ..results.distance import Distance, distance
 from ..results.inner import largest
 from ..results.judged import in_words
@@ -24,11 +24,15 @@ from ..results.trajectory import BODY_COLUMNS, Trajectory
 from ..scene import Scene, SceneError, with_changes
 from .outcome import Progress, RunStopped
 from .peaks import PEAK_DOUBTED
-from .runner import run_in_memory
+from .runner import abilities, run_in_memory
+from .setup import set_up
 from .summary import NOT_RESOLVED
+from .validation import refusals
 
 #: Length of the companion's steps over the run's.
 LONGER = 2.3
+#: Those of bodies whose steps have one size: whole numbers, of which the first is taken that ends where the run does.
+_WHOLE = range(3, 11)
 #: Tolerances of the companion of an adaptive run over the run's.
 LOOSER = 100.0
 #: A run of fewer steps has a companion in shorter ones.
@@ -142,9 +146,10 @@ def check(
     """
     if run.steps is None or run.summary.get("status", "done") not in ("done", "running"):
         raise ValueError("a run that has not come to its end, or one by a reference, cannot be checked")
-    scene, ratio = _companion_of(run)
+    ratio = LONGER
     began = perf_counter()
     try:
+        scene, ratio = _companion_of(run.scene, abilities(run.scene, upper=upper, lower=lower))
         companion = run_in_memory(scene, progress, upper=upper, lower=lower)
     except RunStopped as stopped:
         why = f"{NOT_RESOLVED}: with {_beside(scene, ratio)} the run {stopped}"
@@ -163,9 +168,8 @@ def compared(run: Trajectory, companion: Trajectory, ratio: float, seconds: floa
     return Check(run, companion, errors, ratio, seconds, _why_not(run, errors, ratio))
 
 
-def _companion_of(run: Trajectory) -> tuple[Scene, float]:
-    """Return the scene of the companion of ``run``, and the ratio of its steps to those of the run."""
-    scene = run.scene
+def _companion_of(scene: Scene, able: Mapping[str, Abilities]) -> tuple[Scene, float]:
+    """Return the scene of the companion of a run of ``scene``, and the ratio of its steps to those of the run."""
     coupling = scene.coupling
     if coupling.macro_step is None:
         keys = ("relative_tolerance", "absolute_tolerance")
@@ -174,8 +178,20 @@ def _companion_of(run: Trajectory) -> tuple[Scene, float]:
         if "relative_tolerance" in looser:
             looser["relative_tolerance"] = min(0.1, looser["relative_tolerance"])
         return with_changes(scene, coupling=looser), LOOSER
-    ratio = LONGER if scene.duration > _FEWEST * coupling.macro_step else 1.0 / LONGER
+    ratio = _ratio(scene, coupling.macro_step, able)
     return with_changes(scene, coupling={"macro_step": ratio * coupling.macro_step}), ratio
+
+
+def _ratio(scene: Scene, H: float, able: Mapping[str, Abilities]) -> float:
+    """Return the ratio of the companion's steps to those of a run in steps ``H`` [s] of bodies of these abilities.
+
+    Where no longer steps are allowed, it is the shortest, by which the companion is refused with a remedy.
+    """
+    if all(body.any_size for body in able.values()):
+        return LONGER if scene.duration > _FEWEST * H else 1.0 / LONGER
+    setup = set_up(scene, *able.values())
+    allowed = (ratio for ratio in _WHOLE if not refusals(replace(setup, macro_step=ratio * H), able))
+    return float(next(allowed, _WHOLE[0]))
 
 
 def _window(run: Trajectory) -> float:
@@ -225,4 +241,4 @@ def _beside(scene: Scene, ratio: float) -> str:
     """Return what the companion has in words."""
     if scene.coupling.macro_step is None:
         return f"tolerances {LOOSER:g} times as large"
-    return f"steps {LONGER:g} times as {'long' if ratio > 1.0 else 'short'}"
+    return f"steps {max(ratio, 1.0 / ratio):g} times as {'long' if ratio > 1.0 else 'short'}"

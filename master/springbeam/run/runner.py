@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import Any
 
 from ..bodies.factory import findings, load_bodies
-from ..bodies.protocol import Body
+from ..bodies.protocol import Abilities, Body
 from ..results.recording import MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, as_scene
@@ -62,16 +62,11 @@ class Simulation(AbstractContextManager["Simulation"]):
             scene = scene.model_copy(update={"upper": scene.beam.model_copy(update={"approach": "elastic"})})
         self.scene = scene
         self.recorder = recorder or MemoryRecorder(scene)
-        found = findings(of_scene)
-        able = {table: finding.abilities for table, finding in found.items()}
-        H = scene.coupling.macro_step or 1e-3 * scene.time.t_end
-        for table, body in (("beam", upper), ("spring", lower)):
-            if body is not None:
-                able[table] = tried(body, scene.contact_time or 0.0, H)
+        able = abilities(scene, upper=upper, lower=lower)
         setup = set_up(scene, *able.values())
         #: The slowest frequency of our beam and the fastest wave that an impact excites in it [rad/s]; 0 without one.
         self._frequencies = _frequencies(of_scene)
-        beam, spring, contact_force = load_bodies(of_scene, setup.start, setup.degree, found)
+        beam, spring, contact_force = load_bodies(of_scene, setup.start, setup.degree)
         self._bodies = beam, spring
         try:
             validate(setup, upper or beam, lower or spring, able)
@@ -208,6 +203,17 @@ class Simulation(AbstractContextManager["Simulation"]):
             "wall_time": wall_time,
             "warnings": [*warnings_of(self.scene), *amounts["warnings"]],
         }
+
+
+def abilities(scene: Scene, *, upper: Body | None = None, lower: Body | None = None) -> dict[str, Abilities]:
+    """Return the measured abilities of bodies that are not our own, by table. Parameters, errors: `Simulation`."""
+    found = findings(_without_own(scene, upper=upper, lower=lower))
+    able = {table: finding.abilities for table, finding in found.items()}
+    H = scene.coupling.macro_step or 1e-3 * scene.time.t_end
+    for table, body in (("beam", upper), ("spring", lower)):
+        if body is not None:
+            able[table] = tried(body, scene.contact_time or 0.0, H)
+    return able
 
 
 def run(
