@@ -8,7 +8,7 @@ from runs import a_trajectory
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.motion.events import Event, EventKind
-from springbeam.results.contact_changes import _merged, contact_changes
+from springbeam.results.contact_changes import contact_changes
 from springbeam.results.distance import apart, distance, motion
 from springbeam.results.records import joined
 from springbeam.results.spans import FLOOR, ROUNDING, rounding_of, span
@@ -123,4 +123,12 @@ def test_a_rest_on_the_foundation_begins_and_ends():
 
 
 def test_contacts_are_one_that_follow_each_other_within_the_window_however_long_they_last():
-    assert _merged([(0.0, 0.5), (0.52, 0.7), (0.9, 1.0)], 0.1) == [(0.0, 0.7), (0.9, 1.0)]
+    times = [(0.0, 0.5), (0.52, 0.7), (0.9, 1.0)]
+    events = [
+        event
+        for closed, opened in times
+        for event in (Event(closed, EventKind.IMPACT, joint="touch"), Event(opened, EventKind.SEPARATION))
+    ]
+    found = contact_changes(a_trajectory(events=events), 0.05)
+    joined_times = [("closes", 0.0), ("opens", 0.7), ("closes", 0.9), ("opens", 1.0)]
+    assert [(change.kind, change.time) for change in found] == joined_times

@@ -12,7 +12,7 @@ from draw import USUAL, drawn, scene_dict
 from springbeam import load_scene, with_changes
 from springbeam.monolithic import event_driven
 from springbeam.scene import scene_from_dict
-from springbeam.studies.comparison import _judged, compare
+from springbeam.studies.comparison import compare, errors_judged
 from springbeam.studies.crosscheck import crosscheck
 
 SOFT = load_scene("soft")
@@ -65,7 +65,7 @@ def test_an_error_may_be_twice_what_the_companion_has_differed_by_so_far_and_the
     """Reported is the largest error or, where a bound is broken, the one that is furthest out of it."""
     changed = np.array([0.1, 0.0, 0.2])
     floor = np.full(3, 0.01)
-    found = _judged("y", np.array([1.0, 2.0, 3.0]), np.array(error), changed, floor)
+    found = errors_judged("y", np.array([1.0, 2.0, 3.0]), np.array(error), changed, floor)
     rms = np.sqrt(np.mean(np.square(error)))
     bound = (0.21, 0.21, 0.41)[at]
     assert (found["at"], found["error"], found["passed"]) == (at + 1.0, error[at], passed)

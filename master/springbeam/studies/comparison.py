@@ -97,7 +97,7 @@ def compare(scene: Scene, done: Done = unseen) -> Row:
     return found
 
 
-def _judged(name: str, times: np.ndarray, error: np.ndarray, changed: np.ndarray, floor: np.ndarray) -> Row:
+def errors_judged(name: str, times: np.ndarray, error: np.ndarray, changed: np.ndarray, floor: np.ndarray) -> Row:
     """Judge the errors of a quantity at ``times`` [s] by what ``changed`` up to then, and a ``floor``."""
     bound = _SAFETY * np.maximum.accumulate(changed) + floor
     worst = int(np.argmax(error / bound))
@@ -172,7 +172,7 @@ def _judge(found: Row, runs: list[Trajectory], reference: Trajectory, moved: Tra
         found["growth"] = max(found["growth"], float(growth[-1]))
         floor = _step_error(scene) * (np.flatnonzero(good) + 1.0) + _SAFETY * _rounding(scene, name)
         changed = (_FACTORS[: len(runs) - 1] * _known_next(np.abs(values[1:] - values[0]))).max(axis=0)
-        judged = _judged(name, times[good], np.abs(values[0] - exact), changed, floor * growth * scale)
+        judged = errors_judged(name, times[good], np.abs(values[0] - exact), changed, floor * growth * scale)
         found["quantities"].append(judged)
     _compare_events(scene, found, of_runs, of_reference)
 
