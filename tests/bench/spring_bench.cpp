@@ -161,10 +161,9 @@ const bench::Values pressed{
 void compare_held(const bench::Options& o) {
   constexpr double H = 1e-3;
   bench::Values inside = pressed, outside = pressed;
-  inside.insert(inside.end(), {{"contact_law", 2.0},
-                               {"compliance_stiffness", 1e4},
-                               {"compliance_exponent", 1.5},
-                               {"tip_response", 1e-9}});
+  inside.insert(
+      inside.end(),
+      {{"contact_law", 2.0}, {"compliance_stiffness", 1e4}, {"compliance_exponent", 1.5}, {"tip_response", 1e-9}});
   outside.emplace_back("contact_force", 5.0);
   bench::Fmu plain(outside);
   const unsigned force = bench::Fmu::reference("reaction"), u = bench::Fmu::reference("tip_displacement"),

@@ -188,7 +188,7 @@ class Search:
         """Return derivatives of the residual, and of the shift eliminated in it, by differences around a place.
 
         ``before`` and ``after`` say how far from it; derivatives are 0 where neither run can be made. Those to both
-        sides differ at a sample that an impact passes on one side: there a velocity jumps, and the smaller one counts.
+        sides differ at a sample that an impact crosses on one side: there a velocity jumps, and the smaller one counts.
         """
         columns = []
         moved = []
