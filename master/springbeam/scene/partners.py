@@ -4,9 +4,19 @@
 ``element``, one of these.
 """
 
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator
+from pydantic_core import PydanticKnownError
 
 from .tables import Beam, OneOf, Spring, Table, key
+
+
+def _no_boolean(value: Any) -> Any:
+    """Return ``value``; refuse true and false, which equal 1 and 0 in Python."""
+    if isinstance(value, bool):
+        raise PydanticKnownError("int_type")
+    return value
 
 
 class ForeignFmu(Table):
@@ -22,7 +32,9 @@ class ForeignFmu(Table):
 
     fmu: str = key("–", "the file; relative to the scene's")
     force: str = key("N", "input: the contact force, which presses the lower body down and lifts the upper one")
-    force_sign: Literal[1, -1] = key("–", "-1 where a positive input does the opposite", 1)
+    force_sign: Annotated[Literal[1, -1], BeforeValidator(_no_boolean)] = key(
+        "–", "-1 where a positive input does the opposite", 1
+    )
     displacement: str = key("m", "output, upward")
     velocity: str | None = key("m/s", "output", None)
     integral: str | None = key("m·s", "output: ∫ x dτ over the last step, 0 at its start", None)
