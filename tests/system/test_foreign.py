@@ -3,7 +3,10 @@
 import functools
 import importlib
 import os
+import re
 import signal
+import subprocess
+import sys
 import threading
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -33,6 +36,7 @@ STIFFNESS = 50.0
 DAMPING = 0.1
 #: Names that a scene may leave out, each with what stands on it.
 WITHOUT = {"nothing": (), "velocity, impulse": ("velocity", "impulse")}
+DOCS = Path(__file__).parents[2] / "docs"
 BAD = scenes.table("bad_inputs.toml")["fmus"]
 #: What an FMU does after 1.5 s, and the cause that is named.
 LATE = BAD["late"]
@@ -297,7 +301,7 @@ def test_units_that_an_fmu_declares_are_converted(fmu, tmp_path):
 
 def test_the_body_that_the_page_builds_by_python_fmu_is_the_element(tmp_path, monkeypatch):
     """docs/own_fmu.md says how close it is, 1e-12 m: Runge-Kutta steps of order 4 at H = 1e-3 s."""
-    monkeypatch.syspath_prepend(Path(__file__).parents[2] / "docs")
+    monkeypatch.syspath_prepend(DOCS)
     page = importlib.import_module("own_fmu")
     python = page.built(tmp_path)
     below = page.body(python, m=1.0, k=30.0, c=0.5)
@@ -305,6 +309,31 @@ def test_the_body_that_the_page_builds_by_python_fmu_is_the_element(tmp_path, mo
     run, _, apart = page.compared(above, below, page.LINK)
     assert apart < 1e-11
     assert run.summary["max_interface_residual"] < 1e-11
+
+
+#: Where a body of Python raises an exception: the line before it, and what is reported.
+RAISES = {
+    "step": ("def do_step(self, time, size):", "cannot step at t"),
+    "initialisation": ("def exit_initialization_mode(self):", "cannot be initialised"),
+    "instantiation": ("self.m = 1.0", "cannot be instantiated"),
+}
+
+
+@pytest.mark.parametrize("place", RAISES)
+def test_what_an_exception_of_a_body_of_python_says_is_reported(tmp_path, place):
+    line, said = RAISES[place]
+    text = re.search(r"```py\n(from pythonfmu .*?)```", (DOCS / "own_fmu.md").read_text("utf-8"), re.S)[1]
+    raising = 'if "resources" in __file__: raise KeyError("no row of the table")'
+    before, after = text.split(line)
+    (tmp_path / "msd.py").write_text(f"{before}{line}\n        {raising}{after}", encoding="utf-8")
+    build = [sys.executable, "-m", "pythonfmu", "build", "-f", "msd.py", "--handle-state"]
+    subprocess.run(build, cwd=tmp_path, check=True)
+    python = {"fmu": str(tmp_path / "MassSpringDamper.fmu"), "force": "F", "displacement": "x", "velocity": "v"}
+    beam = {"element": "point_mass", "mass": M1}
+    contact = {"law": "link", "stiffness": STIFFNESS}
+    scene = scene_from_dict({"time": {"t_end": 1.0}, "beam": beam, "spring": python, "contact": contact})
+    with pytest.raises(FmuError, match=rf"{said}.*KeyError\('no row of the table'\)"):
+        simulate(scene)
 
 
 @pytest.fixture

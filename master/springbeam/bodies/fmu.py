@@ -107,7 +107,7 @@ class Fmu:
         #: The unit of its time.
         self.time_unit = self.unit(clocks[0], "time") if clocks else Unit()
         try:
-            return library.instance(self._name, self._log)
+            return library.instance(self._name, self._log, not self._own)
         except Exception as error:  # FMPy's own have no other type
             raise FmuError(f"{self.path}: cannot be instantiated: {self._cause(error)}") from error
 
@@ -287,7 +287,7 @@ class Fmu:
 
     def _log(self, status: int, text: bytes | None) -> None:
         if status > 0:
-            self._message = (text or b"").decode("utf-8", "replace")
+            self._message = " ".join((text or b"").decode("utf-8", "replace").split())
 
     def _cause(self, otherwise: Exception | str) -> str:
         message = self._message

@@ -95,15 +95,18 @@ class Slave:
     VERSION: ClassVar[str]
     PREFIX: ClassVar[str]
     REAL: ClassVar[str]  #: the type of the variables of a motion
-    make: Callable[[Log], None]
+    make: Callable[[Log, bool], None]
     dll: Any
     instanceName: str
 
-    def instance(self, name: str, log: Log) -> Self:
-        """Return an instance, whose messages ``log`` takes. Raises whatever FMPy does if the FMU makes none."""
+    def instance(self, name: str, log: Log, verbose: bool) -> Self:
+        """Return an instance, whose messages ``log`` takes. Raises whatever FMPy does if the FMU makes none.
+
+        ``verbose`` turns its debug logging on, without which PythonFMU does not log what an exception says.
+        """
         made = copy(self)
         made.instanceName = name
-        made.make(log)
+        made.make(log, verbose)
         return made
 
     def freeLibrary(self) -> None:
@@ -170,7 +173,7 @@ class FMU2(Slave, fmi2.FMU2Slave):  # type: ignore[misc]
     DERIVATIVES = ("{}", "{}")
     COUNTED = False
 
-    def make(self, log: Log) -> None:
+    def make(self, log: Log, verbose: bool) -> None:
         """Instantiate the FMU."""
         self._number = next(_NUMBERS)
         self.instanceName += f" #{self._number}"
@@ -180,7 +183,7 @@ class FMU2(Slave, fmi2.FMU2Slave):  # type: ignore[misc]
         callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
         callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
         callbacks.componentEnvironment = self._number
-        self.instantiate(callbacks=callbacks)
+        self.instantiate(callbacks=callbacks, loggingOn=verbose)
 
     def freeInstance(self) -> None:
         super().freeInstance()
@@ -210,8 +213,8 @@ class FMU3(Slave, fmi3.FMU3Slave):  # type: ignore[misc]
     DERIVATIVES = ("der({})", "der({},2)")
     COUNTED = True
 
-    def make(self, log: Log) -> None:
-        self.instantiate(logMessage=lambda _environment, status, _category, text: log(status, text))
+    def make(self, log: Log, verbose: bool) -> None:
+        self.instantiate(loggingOn=verbose, logMessage=lambda _environment, status, _category, text: log(status, text))
 
     def initialise(self, time: float, end: float | None, parameters: Callable[[], None]) -> None:
         parameters()
