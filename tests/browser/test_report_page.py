@@ -53,10 +53,10 @@ def run_and_report(folder, scene):
 class Shown:
     """A report in a page of the browser, with everything it asked for and complained of."""
 
-    def __init__(self, browser, directory, size=DESKTOP):
+    def __init__(self, browser, directory, size=DESKTOP, **device):
         self.trajectory = load_trajectory(directory)
         self.url = (directory / REPORT).as_uri()
-        self.page = browser.new_page(viewport=size)
+        self.page = browser.new_page(viewport=size, **device)
         self.requests = []
         self.complaints = []
         self.page.on("request", lambda request: self.requests.append(request.url))
@@ -134,6 +134,24 @@ def test_the_slider_is_in_sight_at_once_also_below_warnings_and_nothing_covers_w
     box = shown.page.locator("#slider").bounding_box()
     assert 0.0 <= box["y"] <= size["height"] - box["height"]
     assert shown.page.evaluate(COVERED) == []
+    shown.page.close()
+
+
+#: Whether a chart keeps a touch for itself, so that the page does not scroll.
+KEPT = """() => {
+  const target = document.querySelector("#positions .nsewdrag"), at = target.getBoundingClientRect();
+  const touches = [new Touch({ identifier: 1, target, clientX: at.left + 50, clientY: at.top + 50 })];
+  const lists = { touches, targetTouches: touches, changedTouches: touches };
+  const touch = new TouchEvent("touchstart", { ...lists, bubbles: true, cancelable: true });
+  return !target.dispatchEvent(touch);
+}"""
+
+
+def test_a_finger_on_a_chart_scrolls_the_page_of_a_phone(browser, folder):
+    shown = Shown(browser, run_and_report(folder, "soft"), PHONE, has_touch=True, is_mobile=True)
+    assert not shown.page.evaluate(KEPT)
+    shown.page.evaluate("Plotly.relayout('positions', { dragmode: 'zoom' })")
+    assert shown.page.evaluate(KEPT)
     shown.page.close()
 
 

@@ -16,7 +16,11 @@
   const byId = (id) => document.getElementById(id);
   const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
 
+  // A finger that moves across a chart as wide as the screen scrolls the page.
+  const dragmode = matchMedia("(pointer: coarse)").matches ? false : "zoom";
+
   for (const name of page.overTime) page.charts[name].layout.shapes = [...page.backdrop];
+  for (const chart of Object.values(page.charts)) chart.layout.dragmode = dragmode;
   for (const [name, chart] of Object.entries(page.charts)) Plotly.newPlot(name, chart.data, chart.layout, config);
 
   // One time axis for all.
