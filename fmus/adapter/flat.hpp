@@ -15,7 +15,7 @@ template <class Part>
 std::size_t doubles(const Part& part) {
   if constexpr (std::is_trivially_copyable_v<Part>) {
     static_assert(sizeof part % sizeof(double) == 0);
-    return sizeof part / sizeof(double);
+    return sizeof part / sizeof(double);  // NOLINT(bugprone-sizeof-expression): Part may be a double itself
   } else {
     return static_cast<std::size_t>(part.size());
   }

@@ -4,7 +4,7 @@
 
 #ifdef __GLIBCXX__
 namespace __gnu_cxx {
-extern void __freeres();
+extern void __freeres();  // NOLINT(bugprone-reserved-identifier): its name in libstdc++
 }
 
 namespace {

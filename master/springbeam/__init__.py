@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from .bodies.protocol import Body, Energies, Motion
     from .motion.events import Event
     from .scene import Beam, Contact, Scene, SceneError, Spring, Stop, load_scene, with_changes
+    from .scene.function_load import FunctionLoad
     from .scene.laws import SoftLaw
-    from .scene.loads import FunctionLoad
 else:
     __getattr__ = attached(
         __name__,
@@ -27,7 +27,7 @@ else:
             "motion.events": ("Event",),
             "scene": ("Beam", "Contact", "Scene", "SceneError", "Spring", "Stop", "load_scene", "with_changes"),
             "scene.laws": ("SoftLaw",),
-            "scene.loads": ("FunctionLoad",),
+            "scene.function_load": ("FunctionLoad",),
             "version": ("__version__",),
         },
     )

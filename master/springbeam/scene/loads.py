@@ -14,7 +14,7 @@ from typing_extensions import Self
 
 from ..lazily import Later
 from .recorded import Reading, curve_of
-from .tables import OfProgram, OneOf, Table, key
+from .tables import OneOf, Table, key
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,7 +25,7 @@ else:
 #: With so many lines of a table in a step, no step ends at its kinks.
 LINES_IN_STEP = 4
 #: A time that no run has [s].
-_FOR_EVER = 1e300
+FOR_EVER = 1e300
 #: Most different places of point forces on a beam.
 MOST_POINTS = 4
 
@@ -374,43 +374,6 @@ class TableLoad(Reading, _Started):
 
     def slope(self, t: "np.ndarray") -> Any:
         return self.record(t, 1)
-
-
-class FunctionLoad(OfProgram, Load):
-    """A load that is a function of time: ``with_changes(scene, loads=[FunctionLoad(on="tip", function=f)])``.
-
-    ``function`` returns the value at one time [s], in the unit of the load; steps end at the times ``breaks`` [s], at
-    which it jumps or has a kink. ``derivative``, of the function, is for the motion of a wall; ``fastest``, the rate of
-    its fastest oscillation [rad/s], for references and steps in which it turns by more than a radian.
-    """
-
-    signal: str = "function"
-    function: Callable[[float], float]
-    derivative: Callable[[float], float] | None = None
-    breaks: Annotated[tuple[float, ...], Field(strict=False)] = ()
-    fastest: float = 0.0
-
-    @property
-    def rate(self) -> float:
-        return self.fastest
-
-    @property
-    def _bends(self) -> tuple[float, ...]:
-        return self.breaks
-
-    def curve(self, t: "np.ndarray") -> Any:
-        return _each(self.function, t)
-
-    def slope(self, t: "np.ndarray") -> Any:
-        if self.derivative is None:
-            raise ValueError(f'a FunctionLoad on = "{self.on}" has no derivative, by which a wall moves; give it one')
-        return _each(self.derivative, t)
-
-
-def _each(function: Callable[[float], float], times: "np.ndarray") -> "np.ndarray":
-    # A reference asks for the value at the end of all times, too.
-    values = [function(time) if abs(time) < _FOR_EVER else 0.0 for time in np.ravel(times).tolist()]
-    return np.reshape(np.array(values, dtype=float), np.shape(times))
 
 
 #: By their names in a scene.
