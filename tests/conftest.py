@@ -37,6 +37,8 @@ hypothesis.settings.load_profile("springbeam")
 
 # A shell ignores it in what it runs in the background, and so would the programs that tests start and interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+if hasattr(signal, "SIGHUP"):  # nohup does this to this one
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.fixture(scope="session", autouse=True)
