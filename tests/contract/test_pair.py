@@ -310,7 +310,7 @@ def test_a_tool_that_exchanges_nothing_before_the_first_step_keeps_the_energy_an
 
 
 def test_start_values_replace_a_first_exchange(beam, spring):
-    """As of a tool that exchanges nothing before its first step, but takes start values of inputs."""
+    """A tool that exchanges nothing before its first step, but takes start values of inputs."""
     pair = Pair(beam, spring, 1e-3).start()
     values = dict(zip(BY_NAME, pair.beam.get(*BY_NAME), strict=True))
     force = pair.spring.get("reaction")
