@@ -64,7 +64,7 @@ def test_an_interrupt_that_is_lost_in_a_finaliser_is_not_the_last(capsys):
 
 @pytest.mark.parametrize(("answer", "made"), [(True, True), (False, False), (None, True)])
 def test_a_run_of_years_is_made_after_a_question_on_a_terminal(monkeypatch, capsys, answer, made):
-    """6e11 steps of 3 µs or more are three weeks at least; a batch job is told, and runs."""
+    """6e11 steps of 3 µs or more are three weeks at least; a batch job prints a note, and runs."""
     asked = []
     monkeypatch.setattr(sys.stdin, "isatty", lambda: answer is not None, raising=False)
     monkeypatch.setattr(typer, "confirm", lambda words, err: asked.append(words) or answer)
