@@ -4,10 +4,9 @@ from contextlib import nullcontext
 from dataclasses import replace
 
 import pytest
-from bodies import DuffingBody, Upper
 from scenes import table
 
-from springbeam import SceneError, load_scene, with_changes
+from springbeam import PointMass, SceneError, load_scene, with_changes
 from springbeam.bodies.protocol import NO_FORCE, Abilities, Body, Motion
 from springbeam.run.setup import set_up
 from springbeam.run.validation import refusals, tried, validate
@@ -62,18 +61,18 @@ def test_a_body_of_order_1_is_found_and_refused(share, order):
     assert sum("a solver of order 1" in line for line in lines) == (order == 1)
 
 
-class Unstruck(DuffingBody):
+class Unstruck(PointMass):
     apply_impulse = Body.apply_impulse
 
 
 @pytest.mark.parametrize(("lower", "why"), [
-    (DuffingBody(1.0), None),
-    (DuffingBody(1.0, y=-0.015 * (1.0 + 1e-15)), None),
-    (DuffingBody(1.0, y=-0.015 * (1.0 + 1e-9)), r"the body in \[spring\] starts below the foundation, at -0\.015"),
+    (PointMass(1.0), None),
+    (PointMass(1.0, -0.015 * (1.0 + 1e-15)), None),
+    (PointMass(1.0, -0.015 * (1.0 + 1e-9)), r"the body in \[spring\] starts below the foundation, at -0\.015"),
     (Unstruck(1.0), r"the body in \[spring\] cannot do that, it has no impulse"),
 ])  # fmt: skip
 def test_bodies_are_admitted_where_they_can_begin(lower, why):
     """Above a foundation at −15 mm, to rounding; and struck, if the law is rigid."""
     scene = with_changes(load_scene("soft"), beam={"approach": "elastic"})
     with pytest.raises(SceneError, match=why) if why else nullcontext():
-        validate(set_up(scene), Upper(1.0, y=0.1), lower)
+        validate(set_up(scene), PointMass(1.0, 0.1), lower)

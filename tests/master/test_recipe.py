@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bodies import simulate
 
+from springbeam import simulate
 from springbeam.monolithic import event_driven
 from springbeam.monolithic import laws as references
 from springbeam.scene import Scene, laws, load_scene, with_changes

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 import tomli_w
-from bodies import DuffingBody, beam_body
+from bodies import bodies_of
 from commands import printed
 
 import springbeam
@@ -41,7 +41,7 @@ def test_a_run_that_is_made_step_by_step_is_a_trajectory_on_the_way():
 HITS = with_changes(load_scene("soft"), coupling={"degree": 2, "macro_step": 5e-4}, time={"t_end": 0.14})
 
 
-mass = partial(DuffingBody, 1.0, 0.0, 0.0)
+mass = partial(springbeam.PointMass, 1.0)
 
 
 class Silent(springbeam.Body):
@@ -59,14 +59,15 @@ class Silent(springbeam.Body):
 
 def test_a_body_need_not_tell_its_shape_or_energies():
     scene = with_changes(HITS, time={"t_end": 0.05})
-    run = simulate(scene, upper=Silent(beam_body(scene.beam, 0.0)))
+    with bodies_of(scene) as (beam, _):
+        run = simulate(scene, upper=Silent(beam))
     assert np.abs(run.y - simulate(scene).y).max() < 1e-9
     assert len(run.shapes[0]) == 0
     assert np.array_equal(run.e_beam, np.zeros(len(run)))
     assert "a body reports no energies, so the energy balance is not checked" in run.summary["warnings"]
 
 
-class Unstruck(DuffingBody):
+class Unstruck(springbeam.PointMass):
     """Takes no impulse."""
 
     apply_impulse = springbeam.Body.apply_impulse
@@ -83,7 +84,7 @@ APART = with_changes(
         ({"contact": {"law": "tie"}}, mass(-0.1), 'law = "tie": the upper end starts at 0 m .* -0.1 m; let'),
         (
             {"contact": {"law": "tie"}},
-            Unstruck(1.0, 0.0, 0.0, 0.0, -2.0),
+            Unstruck(1.0, 0.0, -2.0),
             r"start with -1 and -2 m/s .* body in \[spring\] does not take",
         ),
         ({"contact": {"law": "compliance"}}, mass(0.1), "the lower one at 0.1 m; it must start there or above"),
@@ -104,7 +105,7 @@ def test_a_start_that_cannot_be_is_refused_whoever_made_the_body(change, body, s
 
 def test_an_error_in_a_body_of_ones_own_is_reported_at_once(monkeypatch):
     """Without 20 halvings of the step: it is called once more after the last step that is made."""
-    advance = DuffingBody.advance
+    advance = springbeam.PointMass.advance
     steps = []
 
     def failing(self, time, *rest):
@@ -113,7 +114,7 @@ def test_an_error_in_a_body_of_ones_own_is_reported_at_once(monkeypatch):
             raise OverflowError("too fast")
         return advance(self, time, *rest)
 
-    monkeypatch.setattr(DuffingBody, "advance", failing)
+    monkeypatch.setattr(springbeam.PointMass, "advance", failing)
     with pytest.raises(RunStopped) as stopped:
         simulate(with_changes(APART, contact={"law": "compliance"}), lower=mass())
     assert stopped.value.cause == "OverflowError: too fast"
