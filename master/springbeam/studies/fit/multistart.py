@@ -56,7 +56,7 @@ def expected(keys: int, done: int) -> int:
 
 def name_of(case: Row) -> str:
     """Return the name of a case, which is all that it takes."""
-    return " ".join(str(value) for value in case.values())
+    return ", ".join(f"{key} = {value}" for key, value in case.items())
 
 
 class MultiStart:

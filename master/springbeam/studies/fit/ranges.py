@@ -61,11 +61,14 @@ class Ranges:
         return np.ones(len(wide)), 1.0 + np.array(wide)
 
     def values(self, unknowns: np.ndarray) -> Row:
-        """Return the keys at ``unknowns``, shape (k,)."""
-        return {
+        """Return the keys at ``unknowns``, shape (k,); at a limit the end of its range, not beyond by rounding."""
+        keys = {
             name: min(ends, key=abs) * math.exp(x - 1.0)
             for (name, ends), x in zip(self.ends.items(), unknowns.tolist(), strict=True)
         }
+        for name, ends in self.ends.items():
+            keys[name] = next((end for end in ends if math.isclose(keys[name], end, rel_tol=1e-14)), keys[name])
+        return keys
 
     def starts(self, count: int) -> list[np.ndarray]:
         """Return unknowns all over the ranges, the middle (a guess) first: the R sequence (Roberts 2018)."""
