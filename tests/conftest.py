@@ -21,6 +21,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import springbeam.api  # attaches what a trajectory can do
+from springbeam.bodies import foreign, probe
 from springbeam.bodies.fmu import release
 from springbeam.monolithic import event_driven
 
@@ -34,6 +35,9 @@ from references import reference  # noqa: E402
 # Every run of the tests draws the same examples, however busy the machine, whatever an earlier run has found.
 hypothesis.settings.register_profile("springbeam", derandomize=True, database=None, deadline=None)
 hypothesis.settings.load_profile("springbeam")
+
+# FMUs of others answer however busy the machine is; the check before a run has a body of its own.
+foreign.ForeignBody.PATIENCE = probe._TriedBody.PATIENCE = 1800.0
 
 # A shell ignores it in what it runs in the background, and so would the programs that tests start and interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)

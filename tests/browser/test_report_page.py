@@ -9,7 +9,7 @@ import shutil
 
 import numpy as np
 import pytest
-from commands import printed
+from commands import HANGS, printed
 
 from springbeam.results.directory import REPORT
 from springbeam.results.files import load_trajectory
@@ -57,6 +57,7 @@ class Shown:
         self.trajectory = load_trajectory(directory)
         self.url = (directory / REPORT).as_uri()
         self.page = browser.new_page(viewport=size, **device)
+        self.page.set_default_timeout(1e3 * HANGS)
         self.requests = []
         self.complaints = []
         self.page.on("request", lambda request: self.requests.append(request.url))

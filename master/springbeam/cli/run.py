@@ -93,7 +93,7 @@ def run(
     _refuse_options(what, interval)
     for line in () if quiet or as_json else implausible(what):
         typer.echo(f"warning: {line}", err=True)
-    _ask_if_long(what)
+    ask_if_long(what)
     made = picked(what, silent=quiet or as_json)
     what = what if made is None else made.scene
     default = Path("results") / Path(scene).stem
@@ -114,7 +114,7 @@ def _refuse_options(scene: Scene, interval: float | None) -> None:
         fail(BAD_INPUT, f"--output-interval {interval:g}: must be a time [s], {rows}")
 
 
-def _ask_if_long(scene: Scene) -> None:
+def ask_if_long(scene: Scene) -> None:
     """Ask, on a terminal, whether a run is to be made that takes hours; elsewhere say how long it takes."""
     if scene.accuracy is not None or scene.coupling.adaptive or scene.duration < _MANY_STEPS * scene.coupling.H:
         return
