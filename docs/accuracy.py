@@ -1,9 +1,8 @@
 """Pictures and tables of docs/measured.md:  .venv/bin/python docs/accuracy.py [STUDY]…   (all: some minutes)
 
-The studies are those of `springbeam tradeoff`, and scipy's solvers on the same problem (tests/bench/rivals.py), one
-after the other, timed in processor time, of which what else runs on
-the machine takes none (with OMP_NUM_THREADS=1). Pictures go to docs/images/tradeoff-STUDY.png,
-tables into docs/measured.md, between the lines that name the study.
+The studies are those of `springbeam tradeoff`, and scipy on the same problem (tests/bench/rivals.py), one after the
+other, timed in processor time, of which what else runs on the machine takes none (with OMP_NUM_THREADS=1). Pictures go
+to docs/images/tradeoff-STUDY.png, tables into docs/measured.md, between the lines that name the study.
 """
 
 from __future__ import annotations

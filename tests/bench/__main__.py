@@ -13,7 +13,6 @@ from pathlib import Path
 # Before numpy is imported. Its threads spin while they have nothing to do, in processor time that is anybody's.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import against_scipy
 import command_line
 import fmus
 import master
@@ -29,7 +28,6 @@ GROUPS = {
     "spring": fmus.spring,
     "master": master.master,
     "paper": master.paper,
-    "accuracy": against_scipy.accuracy,
     "sweep": sweeps.throughput,
 }
 PAGE = "performance.md"

@@ -6,7 +6,6 @@ from functools import partial
 from time import process_time, thread_time
 
 import printed
-from against_scipy import UNTIL
 from measure import Row, Times, below, compare, median_and_spread, ratio_row, shown
 
 from springbeam import load_scene, simulate, with_changes
@@ -14,6 +13,8 @@ from springbeam.bodies.fmu import Fmu, release
 from springbeam.bodies.own import FmuSpring
 from springbeam.paper import co_simulation, monolithic
 
+#: Just before the first impact on the foundation of `soft` [s].
+UNTIL = 0.0712
 #: The calls of a macro step beside its advances; those before the first one are set-up.
 STEPPING = ("GetReal", "GetFMUstate", "SetFMUstate")
 
@@ -82,7 +83,7 @@ def tied_phase(scene):
 
 def whole_call(effort):
     """What a call of `simulate` takes beside its solution, in a process that has run the scene before."""
-    scene = with_changes(load_scene("soft"), time={"t_end": 0.0712}, coupling={"macro_step": 0.0712 / 6})
+    scene = with_changes(load_scene("soft"), time={"t_end": UNTIL}, coupling={"macro_step": UNTIL / 6})
     simulate(scene)
     calls = []
     solutions = []

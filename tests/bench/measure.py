@@ -7,8 +7,6 @@ import statistics
 from dataclasses import dataclass
 from time import process_time
 
-import rivals
-
 from springbeam.monolithic import event_driven
 from springbeam.paper import co_simulation, monolithic
 from springbeam.run import runner
@@ -19,7 +17,7 @@ class _Clock:
 
 
 # What runs report as their wall time.
-runner.perf_counter = rivals.perf_counter = co_simulation.perf_counter = process_time
+runner.perf_counter = co_simulation.perf_counter = process_time
 monolithic.clock = event_driven.clock = _Clock
 
 
