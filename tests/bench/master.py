@@ -135,7 +135,7 @@ def paper(effort):
         (f"`springbeam paper 2`, {steps} steps, 1000 elements", printed, 3,
          "Algorithm 1 as printed in scipy.sparse, `spsolve` for each of its linear systems, three a step"),
         ("the same", monolithic, 5,
-         "the same numbers from one solution a step, factorised once before the clock runs (SuperLU)"),
+         "the same numbers from one solution a step, factorised once (SuperLU)"),
     ):  # fmt: skip
         times = compare(lambda: seconds(co_simulation), partial(seconds, program), min(effort.rounds, rounds))
         ratios = median_and_spread([1.0 / ratio for ratio in times.ratios])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from time import process_time
 
 from springbeam.monolithic import event_driven
-from springbeam.paper import co_simulation, monolithic
+from springbeam.paper import algorithm
 from springbeam.run import runner
 
 
@@ -17,8 +17,8 @@ class _Clock:
 
 
 # What runs report as their wall time.
-runner.perf_counter = co_simulation.perf_counter = process_time
-monolithic.clock = event_driven.clock = _Clock
+runner.perf_counter = algorithm.perf_counter = process_time
+event_driven.clock = _Clock
 
 
 @dataclass(frozen=True)

@@ -10,43 +10,34 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from springbeam.paper import monolithic
+from springbeam.paper.algorithm import TOLERANCE, Algorithm
 
 
-def simulate(scene):
-    """Run Algorithm 1 as printed; arguments are the defaults of `springbeam.paper.monolithic.algorithm_1`."""
-    algorithm = _AsPrinted(scene)
-    algorithm.run()
-    return algorithm.trajectory()
+def algorithm_1(scene):
+    """Run Algorithm 1 as printed; the defaults are those of `springbeam.paper.monolithic.algorithm_1`."""
+    return Algorithm(scene, _AsPrinted(scene), "rest").run(float)
 
 
-class _AsPrinted(monolithic._Algorithm):
-    def _set_step(self, h):
-        super()._set_step(h)
+class _AsPrinted(monolithic.Meshed):
+    def set_step(self, h):
+        super().set_step(h)
         d = self.discrete
-        alpha = self.beam.alpha_b
-        self.A = (4.0 * d.M + (h**2 + 2.0 * alpha * h) * d.K).tocsc()
+        self.A = (4.0 * d.M + (h**2 + 2.0 * self._beam.alpha_b * h) * d.K).tocsc()
         last = self.A.shape[0] - 1
         self.at_tip = sp.csc_array(([1.0], ([last], [last])), shape=self.A.shape)
-        self.solve = partial(spla.spsolve, self.A)
+        self._solve = partial(spla.spsolve, self.A)
 
-    def _newton(self, f, guess, solve):
-        """Make Newton's steps of (62) on all unknowns, told by that of the tip."""
-        if solve != "beam":
-            return super()._newton(f, guess, solve)
-        before = self.rows[-1]
-        h = self.h
-        M = self.discrete.M
-        known = self.B @ before.q + 4.0 * h * (M @ before.v) + 2.0 * h**2 * self.load
-        x = before.q.copy()
-        at_start = self._compliance(before.q[-1], self.stiffness)[0]
-
-        def equation(w):
-            x[-1] = w
-            force, slope = self._compliance(w, self.stiffness)
-            residual = self.A @ x - known
-            residual[-1] -= h**2 * (force + at_start)
-            change = spla.spsolve(self.A - h**2 * slope * self.at_tip, residual)
-            x[:-1] -= change[:-1]
-            return float(change[-1]), 1.0
-
-        return super()._newton(equation, guess, solve)
+    def predicted_tip(self, u_free, u, law):
+        """Make Newton's steps of (62) on all unknowns."""
+        square = self.h**2
+        known = self.known()
+        q = self._before[0].copy()
+        at_start, _ = law.force(u)
+        change = [1.0]
+        while abs(change[-1]) > TOLERANCE:
+            force, slope = law.force(q[-1])
+            residual = self.A @ q - known
+            residual[-1] -= square * (force + at_start)
+            change = spla.spsolve(self.A - square * slope * self.at_tip, residual)
+            q -= change
+        return float(q[-1])

@@ -9,7 +9,7 @@ from scenes import SOFT, kinds, soft
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.paper import co_simulation, monolithic
-from springbeam.paper.problem import AlgorithmFailure
+from springbeam.paper.algorithm import AlgorithmFailure
 from springbeam.scene.files import tomllib
 
 PROGRAMS = {"monolithic": monolithic, "co_simulation": co_simulation}
@@ -97,7 +97,8 @@ def test_both_programs_decide_alike(at_contact, slope, speed, stop, stiffness, p
     """In all their columns, up to a last step of 0.3 h; a spring sinks before the tip has come and after it has left.
 
     The midpoint rule and the exact flow differ by (ωh)²/12 ≤ 9e-5 of a step's motion, over 6 steps; 3e-4 is allowed,
-    and more of energies, which grow tenfold in a step, and of which a dashpot takes that of the mean velocity.
+    and more of energies, which grow tenfold in a step. Of a step that ends on the foundation, where the exact motion
+    turns round, a dashpot takes more than that of the mean velocity.
     """
     contact = {"exponent": 1.0, "stiffness": stiffness}
     beam = {"initial_deflection_slope": slope, "initial_velocity_slope": speed}
@@ -110,12 +111,14 @@ def test_both_programs_decide_alike(at_contact, slope, speed, stop, stiffness, p
     assert kinds(run) == kinds(reference)
     impulses = [[event.impulse_foundation for event in each.events] for each in (run, reference)]
     assert impulses[0] == pytest.approx(impulses[1], abs=3e-4 * max(impulses[1]))
+    if "seated" not in phases:
+        assert run.e_dissipated == pytest.approx(reference.e_dissipated, rel=1e-3, abs=1e-9)
     shares = dict.fromkeys(("u_tip", "v_tip", "y", "z", "contact_force", "compliance_force", "foundation_force"), 3e-4)
     for name, share in (shares | {"e_beam": 3e-4, "e_spring": 3e-4, "energy_residual": 1e-3}).items():
         largest = np.abs(reference[name]).max()
         assert run[name] == pytest.approx(reference[name], abs=share * largest, rel=0.0), name
     assert np.array_equal(run.case, np.where(run.phase == "free", run.case, 14.0) * (run.case != 0.0))
-    for body, share in {"beam": 3e-4, "spring": 1e-3}.items():
+    for body, share in {"beam": 3e-4, "spring": 2e-3}.items():
         injected = reference.summary[f"injected_into_{body}"]
         assert run.summary[f"injected_into_{body}"] == pytest.approx(injected, rel=share, abs=1e-9)
 
@@ -135,7 +138,7 @@ def test_runs_end_at_t_end_where_it_is_off_the_grid(t_end, steps):
 def test_a_solution_that_grows_beyond_all_bounds_keeps_what_came_before():
     """The tip is thrown about, until Newton's method finds no step, or the FMU no spring that high."""
     scene = soft(4, time={"t_end": 0.05})
-    says = {monolithic: "Newton's method for the predicted position", co_simulation: "the hilltop of its potential"}
+    says = {monolithic: "Newton's method for the position of the spring", co_simulation: "the hilltop of its potential"}
     for program, why in says.items():
         with pytest.raises(AlgorithmFailure, match=rf"{why}.* at t = 0\.0") as failed:
             program.algorithm_1(scene)

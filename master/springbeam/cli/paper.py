@@ -40,9 +40,10 @@ def paper(
 
     Example: springbeam paper 2 --monolithic
     """
-    from ..paper import co_simulation, figures
+    from ..paper import co_simulation
     from ..paper import monolithic as as_one_system
-    from ..paper.problem import AlgorithmFailure
+    from ..paper.algorithm import AlgorithmFailure
+    from ..paper.problem import TABLE_2
     from ..results.recording import FileRecorder
     from ..scene import load_scene
 
@@ -61,7 +62,7 @@ def paper(
     recorder = FileRecorder(scene, directory)
     found = carry_out(recorder, made=made, pictures=_PICTURES, no_plots=no_plots, silent=quiet or as_json)
     solves = made.summary["iterations_per_solve"]
-    printed = figures.TABLE_2[int(figure)][0]
+    printed = TABLE_2[int(figure)][0]
     line = f"Table 2   {solves:.3f} iterations per solve of (53), printed {printed:.3f}"
     found = replace(found, shown=[*found.shown, line])
     if failed:
