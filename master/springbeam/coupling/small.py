@@ -40,19 +40,20 @@ def inverse(A: Matrix) -> Matrix:
         minors = [[d, -b], [-c, a]]
         determinant = a * d - b * c
     else:
-        (a, b, c), (d, e, f), (g, h, i) = A
-        first = e * i - f * h
-        second = f * g - d * i
-        third = d * h - e * g
-        minors = [
-            [first, c * h - b * i, b * f - c * e],
-            [second, a * i - c * g, c * d - a * f],
-            [third, b * g - a * h, a * e - b * d],
-        ]
-        determinant = a * first + b * second + c * third
+        first, second, third = A
+        columns = [_cross(second, third), _cross(third, first), _cross(first, second)]
+        minors = transposed(columns)
+        determinant = sum(map(mul, first, columns[0]))
     if determinant == 0.0 or not isfinite(determinant):
         raise np.linalg.LinAlgError
     return [[minor / determinant for minor in row] for row in minors]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    """Return a × b."""
+    x, y, z = a
+    u, v, w = b
+    return [y * w - z * v, z * u - x * w, x * v - y * u]
 
 
 def broyden(descent: Matrix, step: Vector, residual: Vector) -> Matrix:
@@ -66,11 +67,3 @@ def broyden(descent: Matrix, step: Vector, residual: Vector) -> Matrix:
         return descent
     row = [sum(map(mul, step, column)) / denominator for column in zip(*descent, strict=True)]
     return [[x + y * z for x, z in zip(line, row, strict=True)] for line, y in zip(descent, d, strict=True)]
-
-
-def secant(B: Matrix, step: Vector, missed: Vector) -> Matrix:
-    """Return B + m sᵀ/(sᵀs): Broyden's update of a Jacobian whose prediction over the step s has missed m."""
-    square = sum(map(mul, step, step))
-    if square == 0.0:
-        return B
-    return [[x + m * s / square for x, s in zip(row, step, strict=True)] for row, m in zip(B, missed, strict=True)]

@@ -1,4 +1,4 @@
-"""Find the contact force of a step: predict, correct, verify, with responses of the bodies that are remembered.
+"""Find the contact force of a step by Newton's method, with responses of the bodies that are remembered.
 
 Unknowns are the Legendre coefficients a of C; the conditions on the gap over the step (`CONDITIONS`), in metres, should
 be what the law wants them to be (`StepSolver.aim`: zero, where the ends are tied). With g = 0 at the step's start and
@@ -10,19 +10,18 @@ whatever the coefficients, the step and the bodies. The moments are taken agains
 which spans the same space and keeps the system well conditioned: ∫ g dτ = I₁ and ∫ s g dτ = I₁ − 2 I₂/H, with
 I₁ = ∫ g dτ and I₂ = ∫∫ g dτ dτ = ∫ (H − τ) g dτ.
 
-Both bodies advance under the force of the last step, continued. Corrections follow from responses: B of the upper
-body's conditions to a is measured once for each size of step and remembered, for the beam is linear. S of the lower
-body's starts as that of a free mass, and Broyden's rank-one updates make it follow. Under a corrected force the lower
-body advances and the end of the upper one is predicted by B. Once the conditions hold so, the upper body advances to
-verify it, so a step usually costs two steps of each body. An upper body that is not linear is found out there, and B
-follows as S does.
+Both bodies advance under the force of the last step, continued; what that leaves of the conditions corrects it by
+D = −(B − S)⁻¹ (Newton's method), until they hold, so a step usually costs two steps of each body. B is the response of
+the upper body's conditions to a, measured once for each size of step, S that of the lower body, measured when a size
+comes again and before that a free mass's. Broyden's rank-one updates make D follow what both bodies do, and it is
+remembered for each size.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import count
 from math import inf
 from operator import add, sub
 
@@ -32,7 +31,7 @@ from ..bodies import force
 from ..bodies.protocol import NO_FORCE, SIZES_REMEMBERED, Body, Ends, Force, Motion, made_of
 from ..motion.paths import EPS
 from .protocol import Conditions, Counts, Coupling, NotConverged, Step
-from .small import Matrix, Vector, broyden, inverse, less, secant, times, transposed
+from .small import Matrix, Vector, broyden, inverse, less, times, transposed
 
 _log = logging.getLogger(__name__)
 
@@ -43,6 +42,9 @@ _ROUNDING = 16.0 * float(np.finfo(float).eps)
 _LATE = 8
 #: That rounding, over the tolerance.
 _NOISE = 1e3
+#: Displacement of a lower body, over its motion, by which its response is measured; and the least of any [m].
+_LITTLE = 1e-4
+_LEAST = 1e-150
 
 
 def _end(m: Motion, size: float) -> tuple[float, ...]:
@@ -59,13 +61,11 @@ def _end_and_moments(m: Motion, size: float) -> tuple[float, ...]:
 
 #: The conditions on the gap over a step, by degree.
 CONDITIONS: tuple[Conditions, ...] = (_end, _end_and_mean, _end_and_moments)
-#: Where a correction leads: the conditions there [m], ``None`` if zero; the correction of the coefficients [N], and the
-#: coefficients there [N].
-Aim = tuple[Vector | None, Vector, Vector]
-#: What is remembered of a size of step: B [m/N]; D = −(B − S)⁻¹ [N/m], unless the lower body was a wall; and whether S
-#: was measured. If not, it is that of a free mass, followed by Broyden's updates.
-Response = tuple[Matrix, Matrix | None, bool]
-_UNKNOWN: tuple[None, None, bool] = (None, None, False)
+#: Where a correction leads: the conditions there [m], the correction of the coefficients [N], and these there [N].
+Aim = tuple[Vector, Vector, Vector]
+#: What is remembered of a size of step: B [m/N], and D = −(B − S)⁻¹ [N/m] by the mass of the lower body, for which a
+#: wall stands where the foundation holds it.
+Response = tuple[Matrix, dict[float, Matrix]]
 
 
 @dataclass
@@ -115,140 +115,101 @@ class StepSolver(Coupling):
         size, start
             Of the step, as of `solve`.
         """
-        step = times(descent, gap)
-        return None, step, list(map(add, a, step))
+        change = times(descent, gap)
+        return [0.0] * len(gap), change, list(map(add, a, change))
 
     def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
         """Advance both bodies so that the conditions hold, as `Coupling.solve` says."""
-        conditions = self._conditions
-        derivatives = force.derivatives
-        a = known = force.legendre(guess, size, self.degree)  # known: where the upper body has been
-        acting = derivatives(a, size)
-        upper.rewind()
-        upper_end = upper.advance(time, size, acting)
-        r_upper: Sequence[float] = conditions(upper_end, size)
-        lower.rewind()
-        lower_end = lower.advance(time, size, acting)
-        r_lower = conditions(lower_end, size)
-        gap = list(map(sub, r_upper, r_lower))
+        a = force.legendre(guess, size, self.degree)
+        step, gap = self._advanced(upper, lower, time, size, start, a)
         if not any(a) and self.no_contact(gap, size, start):
-            return made_of(Step, (time, size, acting, NO_FORCE, start, (upper_end, lower_end)))
-        B, descent, measured = remembered = self.state.of_size.get(size, _UNKNOWN)
-        predicted = B is None  # whether the upper body is elsewhere than at its end under ``a``
-        if B is None:
-            length = max(self._expected, abs(upper_end.displacement), size * abs(upper_end.velocity))
-            B = self._measure(upper, time, size, a, r_upper, length)
-        if descent is None or lower.mass == inf:
-            descent = _descent(B, self._free_response(lower, size))
-        goal, step, better = self.aim(gap, a, descent, size, start)
-        residual = gap if goal is None else list(map(sub, gap, goal))
-        norm = max(map(abs, residual))
+            return step
+        upper_end, lower_end = step.end
+        remembered = self.state.of_size.pop(size, None)
+        B, descents = remembered or (self._response(upper, step, upper_end, a, 1.0, self._expected or _LEAST), {})
+        descent = known = descents.get(lower.mass)
+        if descent is None:
+            # A size that comes again may come often: to measure S then saves a step of each body in most.
+            S = self._free_response(lower, size)
+            if remembered:
+                S = self._response(lower, step, lower_end, a, _LITTLE, _LEAST)
+            descent = _descent(B, S)
+        goal, change, better = self.aim(gap, a, descent, size, start)
         # Rounding is always enough; the tolerance follows from the motion, and counts if rounding is not reached.
-        enough = rounding = _ROUNDING * max(self.state.reach, abs(start[0].displacement))
-        # S is measured once, when a size comes again: it then saves a step of the lower body in most.
-        due = not measured and remembered[1] is not None and lower.mass < inf
-        for iteration in range(_MAX_ITERATIONS):
-            if not norm < inf:
+        rounding = _ROUNDING * max(self.state.reach, abs(start[0].displacement))
+        settled = known is not None and max(map(abs, change)) <= EPS * max(map(abs, a))
+        for iteration in count():
+            missed = list(map(sub, gap, goal))
+            norm = max(map(abs, missed))
+            if not norm < inf or iteration == _MAX_ITERATIONS:
                 raise NotConverged(norm, iteration)
-            if norm <= enough and (iteration or max(map(abs, step)) <= EPS * max(map(abs, a))):
-                if not predicted:
+            if norm <= rounding and (iteration or settled):
+                break
+            if iteration:
+                if norm <= self._absolute_tolerance(step, times(B, a), late=iteration >= _LATE):
                     break
-                upper.rewind()
-                upper_end = upper.advance(time, size, acting)
-                r_upper = conditions(upper_end, size)
-                predicted = False
-            else:
-                self.state.iterations += 1
-                a = better
-                acting = derivatives(a, size)
-                r_upper = list(map(add, r_upper, times(B, step)))
-                predicted = True
-                lower.rewind()
-                lower_end = lower.advance(time, size, acting)
-                r_lower = conditions(lower_end, size)
-                enough = rounding
-            before = gap
-            gap = list(map(sub, r_upper, r_lower))
-            residual = gap if goal is None else list(map(sub, gap, goal))
-            norm = max(map(abs, residual))
-            if not norm > enough:
-                continue
-            late = iteration >= _LATE
-            enough = self._absolute_tolerance(start[0], lower_end, size, times(B, a), late=late)
-            if norm <= enough:
-                continue
-            if not predicted:
-                # The upper body is not linear: what it missed of the prediction corrects both responses.
-                taken = list(map(sub, a, known))
-                missed = list(map(sub, gap, before))
-                B = secant(B, taken, missed)
-                descent = broyden(descent, taken, missed)
-                known = a
-            elif due:
-                length = 1e-4 * max(abs(lower_end.displacement), size * abs(lower_end.velocity))
-                S = self._measure(lower, time, size, a, r_lower, length)
-                lower.rewind()
-                lower_end = lower.advance(time, size, acting)
-                descent = _descent(B, S)
-                measured = True
-                due = False
-            else:
-                descent = broyden(descent, step, residual)
-            goal, step, better = self.aim(gap, a, descent, size, start)
-            residual = gap if goal is None else list(map(sub, gap, goal))
-            norm = max(map(abs, residual))
-        else:
-            raise NotConverged(norm, _MAX_ITERATIONS)
-        if _log.isEnabledFor(logging.DEBUG):
-            said = "t = %.9g s, H = %.3g s: contact force found in %d iterations, residual %.2g m, %.2g m allowed"
-            _log.debug(said, time, size, iteration, norm, enough)
-        # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
-        u = upper_end[0]
-        y = lower_end[0]
+                descent = broyden(descent, change, missed)
+                goal, change, better = self.aim(gap, a, descent, size, start)
+            self.state.iterations += 1
+            a = better
+            step, gap = self._advanced(upper, lower, time, size, start, a)
+        _log.debug("t = %.9g s, H = %.3g s: %d iterations, residual %.2g m", time, size, iteration, norm)
         state = self.state
-        state.reach = max(state.reach, u, -u, y, -y)
-        if lower.mass == inf:
-            descent, measured = remembered[1:]
-        state.of_size.pop(size, None)
-        state.of_size[size] = (B, descent, measured)
+        # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
+        state.reach = max(state.reach, *(abs(end.displacement) for end in step.end))
+        if remembered:
+            descents[lower.mass] = descent
+        state.of_size[size] = (B, descents)
         if len(state.of_size) > SIZES_REMEMBERED:  # the one that was used least recently is forgotten
             del state.of_size[next(iter(state.of_size))]
-        return made_of(Step, (time, size, acting, NO_FORCE, start, (upper_end, lower_end)))
+        return step
+
+    def _advanced(
+        self, upper: Body, lower: Body, time: float, size: float, start: Ends, a: Vector
+    ) -> tuple[Step, Vector]:
+        """Return the step from the marks under the coefficients ``a``, and the conditions [m] after it."""
+        acting = force.derivatives(a, size)
+        upper.rewind()
+        tip = upper.advance(time, size, acting)
+        lower.rewind()
+        low = lower.advance(time, size, acting)
+        gap = list(map(sub, self._conditions(tip, size), self._conditions(low, size)))
+        return made_of(Step, (time, size, acting, NO_FORCE, start, (tip, low))), gap
 
     def _free_response(self, lower: Body, size: float) -> Matrix:
-        if lower.mass == inf:
-            return [[0.0] * (self.degree + 1)] * (self.degree + 1)
         unit = force.free_mass_response(self.degree, size, lower.mass)
         return transposed([self._conditions(m, size) for m in unit])
 
-    def _measure(self, body: Body, time: float, size: float, a: Vector, r: Sequence[float], length: float) -> Matrix:
-        """Return columns ∂conditions/∂a_k by differences about ``a``, where they are ``r``.
+    def _response(self, body: Body, step: Step, end: Motion, a: Vector, share: float, least: float) -> Matrix:
+        """Return columns ∂conditions/∂a_k by differences about ``a``, under which ``body`` made ``step`` to ``end``.
 
-        The difference would move a free mass by ``length`` [m]; it is exact where the body is linear, as the massless
-        beam is.
+        The difference would move a free mass by a ``share`` of the motion, at least by ``least`` [m]; it is exact where
+        the body is linear, as the massless beam is.
         """
         if body.mass == inf:
             return [[0.0] * len(a)] * len(a)
-        delta = 2.0 * body.mass * max(length, 1e-150) / (size * size) or 1.0
+        time, size, *_ = step
+        length = share * max(abs(end.displacement), size * abs(end.velocity))
+        delta = 2.0 * body.mass * max(length, least) / (size * size) or 1.0
         columns = []
         for k in range(len(a)):
             changed = a.copy()
             changed[k] += delta
             body.rewind()
-            r_changed = self._conditions(body.advance(time, size, force.derivatives(changed, size)), size)
-            columns.append([(x - y) / delta for x, y in zip(r_changed, r, strict=True)])
+            moved = self._conditions(body.advance(time, size, force.derivatives(changed, size)), size)
+            columns.append([(x - y) / delta for x, y in zip(moved, self._conditions(end, size), strict=True)])
         return transposed(columns)
 
-    def _absolute_tolerance(self, start: Motion, end: Motion, size: float, by_force: Vector, *, late: bool) -> float:
-        """Return the tolerance [m].
+    def _absolute_tolerance(self, step: Step, by_force: Vector, *, late: bool) -> float:
+        """Return the tolerance of the conditions after ``step`` [m].
 
-        ``start`` is the upper body's motion, ``end`` the lower one's; ``late`` says whether it allows for the rounding
+        ``by_force`` is what the force has moved the upper end by [m]; ``late`` says whether it allows for the rounding
         of bodies.
         """
-        u, v, _, _ = start
-        y, z, _, _ = end
+        u, v, _, _ = step.start[0]
+        y, z, _, _ = step.end[1]
         forced = max(map(abs, by_force))
-        change = max(size * max(v, -v, z, -z), abs(y - u))
+        change = max(step.size * max(v, -v, z, -z), abs(y - u))
         # The end is a sum of modes as large as it has ever been, and of what the force does; both are rounded.
         rounding = _ROUNDING * max(self.state.reach, u, -u, y, -y, forced)
         if late:
