@@ -79,35 +79,6 @@ def test_the_shape_is_four_arrays_and_inputs_have_derivatives(beam, spring):
     assert "nValues = 1, but the variables have 21" in k.message
 
 
-@pytest.mark.parametrize("version", ["3.0"])
-def test_terminals_connect_the_pair_as_the_system_file_does(beam, spring, fmu_folder):
-    folder = Path(fmpy.__file__).parent / "schema" / "fmi3"
-    schema = etree.XMLSchema(etree.parse(folder / "fmi3TerminalsAndIcons.xsd"))
-    members = []
-    for fmu in (beam, spring):
-        document = etree.parse(fmu.folder / "terminalsAndIcons" / "terminalsAndIcons.xml")
-        schema.assertValid(document)
-        (terminal,) = document.iter("Terminal")
-        assert (terminal.get("name"), terminal.get("matchingRule")) == ("tip", "plug")
-        found = terminal.iter("TerminalMemberVariable")
-        members.append({member.get("memberName"): fmu.variables[member.get("variableName")] for member in found})
-    with zipfile.ZipFile(fmu_folder / "spring_beam3.ssp") as archive:
-        system = etree.fromstring(archive.read("SystemStructure.ssd"))
-        for name in ("beam3.fmu", "spring3.fmu"):
-            assert archive.read(f"resources/{name}") == (fmu_folder / name).read_bytes()
-    connected = {tuple(connection.attrib.values()) for connection in system.iter("{*}Connection")}
-    upper, lower = members
-    assert upper.keys() == lower.keys()
-    plugged = set()
-    for name, one in upper.items():
-        ends = [("beam", one), ("spring", lower[name])]
-        ends.sort(key=lambda end: ("output", "input").index(end[1].causality))
-        assert [end.causality for _, end in ends] == ["output", "input"]
-        assert one.unit == lower[name].unit
-        plugged.add(tuple(text for element, end in ends for text in (element, end.name)))
-    assert plugged == connected
-
-
 def test_binary_loads_on_systems_since_glibc_2_14(case):
     # RHEL 7 has 2.17. See fmus/adapter/old_glibc.cpp, which is where a name listed here wants a definition.
     symbols = re.findall(r"GLIBC_([0-9.]+)\)?\s+(\S+)", ran("objdump", "-T", case.binary))
