@@ -1,9 +1,9 @@
 """Random scenes: a range of ``ranges.toml`` has axes, a cell has a value for each, `scene_dict` is the scene of a cell.
 
 Values are relative to the beam and to the motion, so that a range describes a kind of scene: the cell's stiffness,
-length, density and speed give the units. `EXTREME` covers all possible scenes, `USUAL` common ones. A Latin hypercube
-covers a range; a slice of the extreme one varies two parameters over their ranges, with the others at rest. The same
-seed gives the same cells.
+length, density and speed give the units. `EXTREME` covers all possible scenes, `USUAL` common ones, `KINDS` those of
+kinds.py. A Latin hypercube covers a range; a slice of the extreme one varies two parameters over their ranges, with the
+others at rest. The same seed gives the same cells.
 """
 
 from collections.abc import Sequence
@@ -45,6 +45,7 @@ _RANGES = tables_of(Path(__file__).with_name("ranges.toml"))
 AT_REST: dict[str, Any] = {name: _tuples(value) for name, value in _RANGES["at_rest"].items()}
 EXTREME = (Axis("coupling", COUPLINGS), *_axes(_RANGES["extreme"]))
 USUAL = _axes(_RANGES["usual"])
+KINDS = _axes(_RANGES["kinds"])
 #: Two axes over their ranges by the name of the slice, and other values that are not at rest.
 SLICES: dict[str, tuple[str, str, dict[str, Any]]] = {
     name: (*fixed.pop("axes"), {key: _tuples(value) for key, value in fixed.items()})

@@ -1,117 +1,100 @@
-"""Judge runs of bodies of every kind in both places:  .venv/bin/python tests/campaign/kinds.py [--seed S] [--write]
+"""The campaign of bodies of every kind below a mass on a spring.
 
-The reference of a run is one in steps of H/16 at degree 2: elements, functions of the caller and FMUs of others have no
-other. Scenes are drawn from the ranges below; the macro step is a share of the shortest period.
+Elements, bodies of the caller and FMUs of others have no event-driven reference: that of all runs of a scene has our
+own spring, in steps of H/16.
 """
 
-import argparse
-import os
-import sys
-import tempfile
 from pathlib import Path
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.append(str(Path(__file__).parents[1] / "system"))
-sys.path.append(str(Path(__file__).parents[2] / "docs"))
+from tempfile import TemporaryDirectory
+from typing import ClassVar
 
 import numpy as np
 import oscillator
-from pages import table, write_section
+from campaign import HEAD, Campaign, row
+from draw import KINDS, drawn
+from judge import WRONG, ended
+from pages import table
 
 from springbeam import RunStopped, SpringDamper, simulate, with_changes
 from springbeam.results.distance import distance
 from springbeam.run.companion import LONGER
 from springbeam.scene import scene_from_dict
+from springbeam.studies.tables import Findings
 
-#: An end is wrong if it is further from the reference than this share of its range, as in `judge`.
-WRONG = 0.01
-LAWS = ("compliance", "link", "tie")
-#: What takes the place of the spring.
-BELOW = ("our own", "an element", "the caller's", "an FMU of others", "an FMU without abilities")
+OWN = "our own"
+OF_THE_CALLER = "the caller's"
 #: Keys that a scene leaves out for an FMU without abilities.
 LACKS = ("velocity", "integral", "integral_2")
 
 
-def drawn(random, fmu):
-    """Return the tables of a scene for each kind of lower body, and what is its period over the macro step."""
-    m1, m2 = random.uniform(0.5, 3.0, 2)
-    k1, k2 = 10.0 ** random.uniform(1.0, 4.0, 2)
-    law = random.choice(LAWS)
-    stiff = 10.0 ** random.uniform(4.0, 6.0)
-    fastest = np.sqrt(max(k1 / m1, k2 / m2, (1.0 / m1 + 1.0 / m2) * (0.0 if law == "tie" else stiff)))
-    share = random.choice([15.0, 50.0, 200.0])
-    upper = {"element": "spring_damper", "mass": m1, "stiffness": k1, "damping": random.choice([0.0, 0.5])}
-    upper |= {"displacement": 0.0 if law == "tie" else 0.01, "velocity": -random.uniform(0.3, 2.0)}
-    contact = {"law": law} | ({} if law == "tie" else {"stiffness": stiff})
-    if law == "compliance":
-        contact["exponent"] = float(random.choice([1.0, 1.5]))
-    names = {"fmu": fmu, "force_sign": -1, "parameters": {"m": m2, "k": k2, "c": 0.0}}
-    fewer = {name: of for name, of in oscillator.ALL.items() if name not in LACKS}
-    below = {
-        "our own": {"mass": m2, "linear_stiffness": k2},
-        "an element": {"element": "spring_damper", "mass": m2, "stiffness": k2},
-        "the caller's": {"mass": m2, "linear_stiffness": k2},
-        "an FMU of others": {**oscillator.ALL, **names},
-        "an FMU without abilities": {**fewer, **names},
+def below(cell, fmu):
+    """Return the tables of the lower body of a cell by its kind: the same oscillator."""
+    mass = cell["mass"]
+    k = cell["k"]
+    of_others = {**oscillator.ALL, "fmu": fmu, "force_sign": -1, "parameters": {"m": mass, "k": k, "c": 0.0}}
+    own = {"mass": mass, "linear_stiffness": k}
+    return {
+        OWN: own,
+        "an element": {"element": "spring_damper", "mass": mass, "stiffness": k},
+        OF_THE_CALLER: own,
+        "an FMU of others": of_others,
+        "an FMU without abilities": {name: value for name, value in of_others.items() if name not in LACKS},
     }
-    slowest = 2.0 * np.pi / np.sqrt(min(k1 / m1, k2 / m2))
-    H = 2.0 * np.pi / fastest / share
-    time = {"t_end": float(min(slowest, 400.0 * H))}
-    base = {"time": time, "beam": upper, "contact": contact, "coupling": {"macro_step": float(H)}}
-    return {kind: {**base, "spring": lower} for kind, lower in below.items()}, (m2, k2)
 
 
-def judged(kind, tables, own):
-    """Return whether a run is wrong and whether it says so, and the steps of its companion over its own."""
+def scene_of(cell, lower):
+    """Return the scene of a cell, in steps of a share of its shortest period."""
+    rigid = cell["law"] == "tie"
+    upper = {"mass": cell["upper_mass"], "stiffness": cell["upper_k"], "damping": cell["damping"]}
+    squares = [upper["stiffness"] / upper["mass"], cell["k"] / cell["mass"]]
+    joint = 0.0 if rigid else cell["stiffness"] * (1.0 / upper["mass"] + 1.0 / cell["mass"])
+    H = 2.0 * np.pi / np.sqrt(max(*squares, joint)) / cell["steps_per_period"]
+    contact = {"law": cell["law"]} | ({} if rigid else {"stiffness": cell["stiffness"]})
+    if cell["law"] == "compliance":
+        contact["exponent"] = cell["exponent"]
+    start = {"displacement": 0.0 if rigid else 0.01, "velocity": -cell["speed"]}
+    return scene_from_dict(
+        {
+            "time": {"t_end": float(min(2.0 * np.pi / np.sqrt(min(squares)), 400.0 * H))},
+            "beam": {"element": "spring_damper", **upper, **start},
+            "spring": lower,
+            "contact": contact,
+            "coupling": {"macro_step": float(H)},
+        }
+    )
 
-    def made(scene, **options):
-        lower = {"lower": SpringDamper(*own)} if kind == "the caller's" else {}
-        return simulate(scene, **lower, **options)
 
-    scene = scene_from_dict(tables)
+def judged(scene, fine, **bodies):
+    """Return the record of a run, as of `judge.ended`; one that is not judged warns."""
     try:
-        run = made(scene)
-        H = scene.coupling.H
-        # The reference has our own body: all of them are the same oscillator.
-        fine = {**tables, "spring": {"mass": own[0], "linear_stiffness": own[1]}}
-        exact = simulate(with_changes(scene_from_dict(fine), coupling={"macro_step": H / 16.0}), check=False)
-    except RunStopped:
-        return None
-    return distance(run, exact, LONGER * H).motion > WRONG, run.summary["resolved"]
+        run = simulate(scene, **bodies)
+    except RunStopped as stopped:
+        return ended("stopped", str(stopped))
+    factor = distance(run, fine, LONGER * scene.coupling.H).motion / WRONG
+    return ended("done") | {"factor": factor, "warns": not run.summary["resolved"], "do_steps": run.do_steps}
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--scenes", type=int, default=30)
-    parser.add_argument("--write", action="store_true", help="write the table into docs/measured.md")
-    options = parser.parse_args()
-    random = np.random.default_rng(options.seed)
-    found = {kind: [] for kind in BELOW}
-    with tempfile.TemporaryDirectory() as folder:
-        fmu = str(oscillator.made(Path(folder) / "oscillator.fmu"))
-        for _ in range(options.scenes):
-            kinds, own = drawn(random, fmu)
-            for kind, tables in kinds.items():
-                found[kind].append(judged(kind, tables, own))
-    rows = []
-    for kind, runs in found.items():
-        done = [run for run in runs if run is not None]
-        counts = (
-            len(done),
-            sum(wrong and resolved is False for wrong, resolved in done),
-            sum(wrong and resolved is not False for wrong, resolved in done),
-            sum(not wrong and resolved is False for wrong, resolved in done),
-            sum(resolved is None for _, resolved in done),
-            len(runs) - len(done),
-        )
-        rows.append((kind, *map(str, counts)))
-    head = ("below", "compared", "wrong, warned", "wrong, unwarned", "right, warned", "not judged", "stopped")
-    shown = table(head, rows)
-    print(*shown, sep="\n")
-    if options.write:
-        write_section("measured.md", "kinds", shown)
+class Kinds(Campaign):
+    """Scenes of the range `KINDS`. A case is a scene; its record has a run for each kind of body below."""
 
+    kind: ClassVar[str] = "kinds"
+    parallel: ClassVar[bool] = False
+    names: tuple[str, ...] = tuple(below(dict.fromkeys(("mass", "k"), 1.0), ""))
 
-if __name__ == "__main__":
-    main()
+    def cases(self):
+        return {f"{self.seed}-{number}": cell for number, cell in enumerate(drawn(KINDS, self.samples, self.seed))}
+
+    def record(self, case):
+        with TemporaryDirectory() as folder:
+            lower = below(case, str(oscillator.made(Path(folder) / "oscillator.fmu")))
+            own = scene_of(case, lower[OWN])
+            fine = simulate(with_changes(own, coupling={"macro_step": own.coupling.H / 16.0}), check=False)
+            of_the_caller = {"lower": SpringDamper(case["mass"], case["k"])}
+            return {
+                kind: judged(scene_of(case, tables), fine, **(of_the_caller if kind == OF_THE_CALLER else {}))
+                for kind, tables in lower.items()
+            }
+
+    def findings(self, records):
+        rows = [row(kind, [record[kind] for record in records.values()]) for kind in self.names]
+        return Findings({}, [*table(("below", *HEAD[1:]), rows), ""])

@@ -107,13 +107,13 @@ def test_a_run_without_records_is_kept_by_its_columns(tmp_path):
 def test_a_kill_at_any_byte_leaves_all_blocks_but_the_last(tmp_path, monkeypatch):
     """Files with the first bytes, so many of them, of what a run writes to them one after the other."""
     writes = []
-    append = recording._append
+    append = recording.append
 
     def noted(file, content):
         writes.append((Path(file.name).name, content))
         append(file, content)
 
-    monkeypatch.setattr(recording, "_append", noted)
+    monkeypatch.setattr(recording, "append", noted)
     recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path / "whole"))
     done = {0: 0}  #: records by the bytes that are written with them
     for rows, begin, t_end in ((5, 0, 0.1), (4, 5, 0.2), (12, 9, 0.9)):

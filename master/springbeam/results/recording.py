@@ -130,7 +130,7 @@ class FileRecorder(AbstractContextManager["FileRecorder"]):
         self._begin()
         contents = (shapes, events_as_array(events), steps)
         for file, content in zip(self._files.values(), contents[-len(self._files) :], strict=True):
-            _append(file, content.tobytes())
+            append(file, content.tobytes())
 
     def steps(self) -> np.ndarray:
         return mapped(self.directory.steps, STEP) if self.begun else np.empty(0, STEP)
@@ -210,7 +210,7 @@ def _with_scene(summary: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
     return {**summary, "scene": scene.model_dump(exclude_none=True)}
 
 
-def _append(file: FileIO, content: bytes) -> None:
+def append(file: FileIO, content: bytes) -> None:
     written = 0
     while written < len(content):  # a disk that is almost full takes a part, and then refuses
         written += file.write(content[written:])
