@@ -1,6 +1,7 @@
 """Judge a run: classify it by its records, and compare it with the event-driven reference."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
@@ -16,9 +17,9 @@ from springbeam.run.ledger import EXACT, bounds
 from springbeam.run.outcome import RunStopped
 from springbeam.run.peaks import PEAK_DOUBTED
 from springbeam.run.runner import Simulation
-from springbeam.scene import Scene, SceneError
+from springbeam.scene import Scene, SceneError, with_changes
 from springbeam.scene.plausibility import warnings_of
-from springbeam.studies.comparison import perturbed
+from springbeam.studies.comparison import initial_speed
 from springbeam.studies.tables import Row
 
 #: Classes of runs (bounds: `ledger.EXACT`, `ledger.bounds`), in the order of pictures and tables; the last must stay
@@ -88,6 +89,23 @@ class Reference:
         except (ValueError, event_driven.ReferenceFailure):
             return np.inf
         return found
+
+
+def perturbed(scene: Scene, share: float, **options: Any) -> Iterator[Trajectory]:
+    """Yield the reference of ``scene`` from initial velocities changed by ``share`` of them; ``options`` of its run.
+
+    First the beam's; then that of a spring, decreased and increased, if it may have any: a spring that the tip meets a
+    little above Ψ may be met a little below it, where another phase follows.
+    """
+    change = share * initial_speed(scene)
+    yield event_driven.integrate(scene, velocity_perturbation=change, **options)
+    if scene.spring is not None and scene.beam is not None:
+        start = scene.spring.initial_velocity
+        speed = change * scene.beam.length
+        for velocity in (start - speed, start + speed):
+            with suppress(SceneError):  # a spring that is held until the tip arrives
+                pushed = with_changes(scene, spring={"initial_velocity": velocity})
+                yield event_driven.integrate(pushed, **options)
 
 
 def judge(scene: Scene, reference: Reference | None = None) -> Row:

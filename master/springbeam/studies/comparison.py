@@ -22,8 +22,7 @@ step cannot be compared at all.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Iterable
 from typing import Any, Literal
 
 import numpy as np
@@ -37,13 +36,11 @@ from ..results.trajectory import BODY_COLUMNS, Trajectory, columns_of
 from ..run.companion import check
 from ..run.runner import run_in_memory
 from ..run.summary import NOT_RESOLVED
-from ..scene import Scene, SceneError, with_changes
+from ..scene import Scene, with_changes
 from ..scene.frequencies import mesh_frequency, slowest_frequency
 from .tables import Done, Row, unseen
 
 Verdict = Literal["agrees", "differs", "not comparable"]
-#: Largest change by the steps of the companion, relative to the largest displacement (velocity), of a resolved motion.
-_RESOLVED = {"u_tip": 0.05, "y": 0.05, "v_tip": 0.25, "z": 0.25}
 #: Factor on the difference from the companion; of differences from it and from a run at a quarter of the macro step,
 #: whose error is a quarter at order 1, shape (2, 1).
 _SAFETY = 2.0
@@ -185,21 +182,9 @@ def _known_next(values: np.ndarray) -> np.ndarray:
 
 
 def _same_story_until(run: Trajectory, other: Trajectory) -> float:
-    """Return the time [s] up to which a run and one in other steps agree.
-
-    They agree if they have the same events, and hardly differ in displacements and velocities away from events.
-    """
-    times = macro_points(run.scene)
-    size = run.scene.coupling.H
-    changes, others = (contact_changes(each, SHORT * size) for each in (run, other))
-    horizon = _agree_until(changes, others, float(times[0]), float(run.time[-1]))
-    away = away_from(times, (event.time for each in (run, other) for event in each.events), size)
-    values, beside = (rows_at(each, times) for each in (run, other))
-    for name in present(run, _RESOLVED):
-        differ = away & (apart(beside[name], values[name]) > _RESOLVED[name])
-        if differ[1:].any():
-            horizon = min(horizon, float(times[1:][differ[1:]][0]) - size)
-    return horizon
+    """Return the time [s] up to which a run and one in other steps have the same changes of contact."""
+    changes, others = (contact_changes(each, SHORT * run.scene.coupling.H) for each in (run, other))
+    return _agree_until(changes, others, float(run.time[0]), float(run.time[-1]))
 
 
 def _step_error(scene: Scene) -> float:
@@ -260,23 +245,6 @@ def reference_and_perturbed(scene: Scene, times: np.ndarray, done: Done = unseen
     moved = event_driven.integrate(equations, sample_times=times, velocity_perturbation=change)
     done()
     return reference, moved
-
-
-def perturbed(scene: Scene, share: float, **options: Any) -> Iterator[Trajectory]:
-    """Yield the reference of ``scene`` from initial velocities changed by ``share`` of them; ``options`` of its run.
-
-    First the beam's; then that of a spring, decreased and increased, if it may have any: a spring that the tip meets a
-    little above Ψ may be met a little below it, where another phase follows.
-    """
-    change = share * initial_speed(scene)
-    yield event_driven.integrate(scene, velocity_perturbation=change, **options)
-    if scene.spring is not None and scene.beam is not None:
-        start = scene.spring.initial_velocity
-        speed = change * scene.beam.length
-        for velocity in (start - speed, start + speed):
-            with suppress(SceneError):  # a spring that is held until the tip arrives
-                pushed = with_changes(scene, spring={"initial_velocity": velocity})
-                yield event_driven.integrate(pushed, **options)
 
 
 def initial_speed(scene: Scene) -> float:
