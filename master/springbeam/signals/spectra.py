@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -97,25 +97,30 @@ def largest_jump(run: Trajectory, column: str) -> float:
     return largest if largest > _JUMP * float(np.abs(after).max()) else 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Spectra:
-    """Spectra of a run by signal."""
+    """Spectra of a run, or of records, by signal."""
 
-    shock: Mapping[str, ShockSpectrum]  #: by the end, "tip" or "spring", and of the "base"
-    jumps: Mapping[str, float]  #: largest jump of each end's velocity [m/s]
+    shock: Mapping[str, ShockSpectrum]  #: by the end, "tip" or "spring", and of the "base"; or by the record
     power: Mapping[str, PowerSpectrum]
-    without_peak: Mapping[str, str]  #: why signals with accelerations of rigid impacts have no peak
-    responses: Mapping[str, list[Response]]  #: to each chirp
-    points: tuple[np.ndarray, np.ndarray] | None  #: `poincare` once a period of the drive, if there is one
-    settled: Settled | None
     quality: float
+    recorded: Mapping[str, float] = field(default_factory=dict)  #: largest acceleration of each record [m/s²]
+    jumps: Mapping[str, float] = field(default_factory=dict)  #: largest jump of each end's velocity [m/s]
+    #: Why signals with accelerations of rigid impacts have no peak.
+    without_peak: Mapping[str, str] = field(default_factory=dict)
+    responses: Mapping[str, list[Response]] = field(default_factory=dict)  #: to each chirp
+    points: tuple[np.ndarray, np.ndarray] | None = None  #: `poincare` once a period of the drive, if there is one
+    settled: Settled | None = None
 
     def in_words(self, unit: str = "m/s²", size: float = 1.0) -> Iterator[tuple[str, str]]:
         """Yield what is found, and how much; accelerations in a ``unit`` of a ``size`` [m/s²]."""
         for end, found in self.shock.items():
             at = int(np.argmax(found.maximax))
             peak = f"{found.maximax[at] / size:.4g} {unit} at {found.frequency[at]:.4g} Hz, Q = {self.quality:g}"
-            yield f"shock at the {end}", peak
+            if end in self.recorded:
+                yield f"shock of {end}", f"{peak} (record: {self.recorded[end] / size:.4g})"
+            else:
+                yield f"shock at the {end}", peak
             if self.jumps.get(end):
                 jump = f"its velocity jumps by up to {self.jumps[end]:.4g} m/s"
                 yield "", f"{jump}: the spectrum rises with frequency without limit, there is no peak acceleration"
