@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -106,43 +106,64 @@ def read_measured(
     Raises SceneError, which names file, line, column and remedy.
     """
     path = Path(path)
-    units = columns_of(scene)
-    try:
-        return _read(Recorded(path, reading), units, names or {}, scales or {})
-    except OSError as error:
-        raise SceneError(f"{path}: {error.strerror}") from error
-    except ValueError as error:
-        raise ArgumentError(f"{path}: {error}") from error
+    with errors_of(path):
+        return _read(Recorded(path, reading), columns_of(scene), names or {}, scales or {})
 
 
 def _read(file: Recorded, units: Mapping[str, str], names: Mapping[str, str], scales: Mapping[str, str]) -> Measured:
     if not file.names:
         raise ValueError("the first line must name the columns, as in time [ms],acceleration [g]")
-    there = [name for k, name in enumerate(file.names) if k != file.time]
-    for option, given in {"map": names, "scale": scales}.items():
-        if wrong := [name for name in given if name not in there]:
-            raise ValueError(f"--{option} {wrong[0]}: there are the columns {', '.join(there)}")
+    there, factors = scaled(file, scales, map=names)
     wanted = names or {name: name for name in there if name in units and name != "phase"}
     if not wanted:
         raise ValueError(
             f"no column is called as one of the run ({', '.join(units)}); --map NAME=COLUMN says which is which"
         )
-    factors = {}
     wanted_units = {}
     for name, what in wanted.items():
         check(what, units)
-        k = file.names.index(name)
-        factors[k], unit = scale_of(name, scales[name]) if name in scales else (1.0, "")
-        file.units[k] = f"{file.units[k]} {unit}".strip()
-        wanted_units[k] = unit_of(what, units)
-        if file.units[k] and not wanted_units[k]:
+        given = file.units[there[name]]
+        wanted_units[there[name]] = unit_of(what, units)
+        if given and not wanted_units[there[name]]:
             raise ValueError(
-                f"{what}: the measurement is in {file.units[k]}, and the function states no unit; write "
-                f'{what.partition(":")[2]}.unit = "{file.units[k]}" below it, if it has this one'
+                f"{what}: the measurement is in {given}, and the function states no unit; write "
+                f'{what.partition(":")[2]}.unit = "{given}" below it, if it has this one'
             )
     times, values = file.read(wanted_units)
-    curves = {what: values[k] * factors[k] for k, what in zip(factors, wanted.values(), strict=True)}
+    curves = {what: values[there[name]] * factors[there[name]] for name, what in wanted.items()}
     return Measured(times, curves, file.notes)
+
+
+@contextmanager
+def errors_of(path: Path) -> Iterator[None]:
+    """Raise SceneError with the path of a file for what is wrong in it."""
+    try:
+        yield
+    except OSError as error:
+        raise SceneError(f"{path}: {error.strerror}") from error
+    except ArgumentError:
+        raise
+    except ValueError as error:
+        raise ArgumentError(f"{path}: {error}") from error
+
+
+def scaled(
+    file: Recorded, scales: Mapping[str, str], **named: Iterable[str]
+) -> tuple[dict[str, int], dict[int, float]]:
+    """Return the numbers of the columns of a file but that of times, and their factors.
+
+    Units in ``scales`` are added to those of the columns. Raises ArgumentError if these, or options ``named`` with
+    columns, name another.
+    """
+    there = {name: k for k, name in enumerate(file.labels) if k != file.time}
+    for option, names in {**named, "scale": scales}.items():
+        if wrong := [name for name in names if name not in there]:
+            raise ValueError(f"--{option} {wrong[0]}: there are the columns {', '.join(there)}")
+    factors = dict.fromkeys(there.values(), 1.0)
+    for name, text in scales.items():
+        factors[there[name]], unit = scale_of(name, text)
+        file.units[there[name]] = f"{file.units[there[name]]} {unit}".strip()
+    return there, factors
 
 
 def scale_of(name: str, text: str) -> tuple[float, str]:

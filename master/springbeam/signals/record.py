@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from ..scene import ArgumentError, SceneError
+from ..scene import SceneError
 from ..scene.recorded import Reading, Recorded
 from ..scene.units import factor
-from .measured import scale_of
+from .measured import errors_of, scaled
 
 #: Steps that differ by less than this share are equal.
 _EQUAL = 1e-3
@@ -40,16 +39,9 @@ def read_record(path: Path, of: Sequence[str], reading: Reading, scales: Mapping
     longer than the shortest, with values on the lines between samples. Raises SceneError, which names file, line,
     column and remedy.
     """
-    with _errors_of(path):
+    with errors_of(path):
         file = Recorded(path, reading)
-        there = {name: k for k, name in enumerate(file.labels) if k != file.time}
-        for option, names in {"of": of, "scale": scales}.items():
-            if wrong := [name for name in names if name not in there]:
-                raise ArgumentError(f"{path}: --{option} {wrong[0]}: there are the columns {', '.join(there)}")
-        factors = {}
-        for name, text in scales.items():
-            factors[there[name]], unit = scale_of(name, text)
-            file.units[there[name]] = f"{file.units[there[name]]} {unit}".strip()
+        there, factors = scaled(file, scales, of=of)
         wanted = [there[name] for name in of] or [k for k in there.values() if _may_be_acceleration(file.units[k])]
         if not wanted:
             raise ValueError(f"no column is an acceleration ({', '.join(there)}); --of COLUMN, with --scale, names one")
@@ -63,7 +55,7 @@ def read_record(path: Path, of: Sequence[str], reading: Reading, scales: Mapping
             raise SceneError(f"{path}: the steps are from {steps.min():.3g} to {steps.max():.3g} s; give equal ones")
         notes = [*notes, f"steps of {steps.min():.3g} to {steps.max():.3g} s are made equal, by lines between samples"]
     equal = np.linspace(times[0], times[-1], count)
-    values = {file.labels[k]: np.interp(equal, times, factors.get(k, 1.0) * columns[k]) for k in wanted}
+    values = {file.labels[k]: np.interp(equal, times, factors[k] * columns[k]) for k in wanted}
     in_g = any("g" in file.units[k].replace("/", " ").split() for k in wanted)
     return Record(equal, values, "g" if in_g else _ACCELERATION, notes)
 
@@ -73,7 +65,7 @@ def columns_along(path: Path, along: str, unit: str) -> tuple[np.ndarray, np.nda
 
     Raises SceneError, which names file, line, column and remedy.
     """
-    with _errors_of(path):
+    with errors_of(path):
         file = Recorded(path, Reading(time_column="1"))
         if len(file.units) != 2:
             raise ValueError(f"{len(file.units)} columns; there must be two, in {along} and {unit}")
@@ -86,16 +78,3 @@ def _may_be_acceleration(unit: str) -> bool:
         return not unit or factor(unit, _ACCELERATION) > 0.0
     except ValueError:
         return False
-
-
-@contextmanager
-def _errors_of(path: Path) -> Iterator[None]:
-    """Raise SceneError with the path of a file for what is wrong in it."""
-    try:
-        yield
-    except OSError as error:
-        raise SceneError(f"{path}: {error.strerror}") from error
-    except SceneError:
-        raise
-    except ValueError as error:
-        raise ArgumentError(f"{path}: {error}") from error
