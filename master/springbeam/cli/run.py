@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
-from math import floor, inf, log10
+from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any
@@ -51,6 +51,18 @@ _LONG = 7200.0
 _FIRST_OF_KIND = 8
 #: So many contacts are shown one by one.
 _CONTACTS = 10
+#: Columns of the table of contacts, and their units.
+_OF_CONTACT = {
+    "begin": "s",
+    "length": "s",
+    "impulse": "N·s",
+    "peak": "N",
+    "at": "s",
+    "depth": "m",
+    "lost": "J",
+    "before": "m/s",
+    "after": "m/s",
+}
 #: Columns of a contact before its velocities.
 _VELOCITIES = 7
 
@@ -319,6 +331,8 @@ def _event_table(events: list[Event], scene: Scene) -> Table:
 
 def _contact_table(contacts: list[Contact]) -> Table:
     """Return the first contacts as a table, and sums or the largest of the others."""
+    from ..studies.picture import readable
+
     rows = [(*contact[:_VELOCITIES], -contact.closing, contact.opening) for contact in contacts[:_CONTACTS]]
     if others := contacts[_CONTACTS:]:
         highest = max(others, key=lambda contact: contact.peak_force or 0.0)
@@ -326,23 +340,10 @@ def _contact_table(contacts: list[Contact]) -> Table:
         depth = max(contact.depth for contact in others)
         peak = highest.peak_force, highest.peak_time
         rows.append((others[-1].begin, length, impulse, *peak, depth, loss, None, others[-1].opening))
-    heads = ("begin", "length", "impulse", "peak", "at", "depth", "lost", "before", "after")
-    columns = [""]
-    scaled = []
-    for head, unit, values in zip(
-        heads, ("s", "s", "N·s", "N", "s", "m", "J", "m/s", "m/s"), zip(*rows, strict=True), strict=True
-    ):
-        power = _thousands(max(abs(value or 0.0) for value in values))
-        prefix = f"{'pnµm kMGT'[power + 4].strip()}{unit}"
-        columns.append(f"{head}\n[{prefix}]:.4g")
-        scaled.append([None if value is None else value * 1000.0**-power for value in values])
-    numbers = [*range(1, min(len(contacts), _CONTACTS) + 1), *([f"+{len(others)}"] if others else [])]
-    return table(columns, [(str(number), *row) for number, row in zip(numbers, zip(*scaled, strict=True), strict=True)])
-
-
-def _thousands(largest: float) -> int:
-    """Return the power of 1000 that reads well of a number: −1 of 0.15."""
-    return 0 if largest == 0.0 or 1.0 <= largest < 1e4 else min(max(floor(log10(largest) / 3.0), -4), 4)
+    scaled, heads = readable([dict(zip(_OF_CONTACT, row, strict=True)) for row in rows], _OF_CONTACT)
+    columns = ("", *(f"{head.replace(' [', chr(10) + '[')}:.4g" for head in heads.values()))
+    numbers = [*map(str, range(1, min(len(contacts), _CONTACTS) + 1)), *[f"+{len(others)}"] * bool(others)]
+    return table(columns, [(number, *row.values()) for number, row in zip(numbers, scaled, strict=True)])
 
 
 def _sums(events: list[Event]) -> tuple[float | None, ...]:

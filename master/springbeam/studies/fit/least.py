@@ -2,19 +2,20 @@
 
 Unknowns are logarithms of keys, which so keep their signs. The shift of the clock is eliminated inside each residual:
 what is left of the curves at the best shift is projected onto what a further shift does not change (variable
-projection; Golub & Pereyra 1973, Kaufman 1975). Steps are those of Levenberg and Marquardt. In a valley, where two keys
-nearly make up for each other, a step along it leaves it to second order: it is corrected by the derivatives there are
-before it is shortened (in 25 steps without that, those of scipy's ``least_squares`` do not reach the end of one).
+projection; Golub & Pereyra 1973, Kaufman 1975). Steps are those of Gauss and Newton within a box. In a valley, where
+two keys nearly make up for each other, a step along it leaves it to second order: it is corrected by the derivatives
+there are before it is shortened (in 25 steps without that, those of scipy's ``least_squares`` do not reach the end of
+one).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from ...signals.measured import Measured, period, rms
 from ..tables import Row
@@ -209,7 +210,7 @@ class Search:
     def _ended(self, slopes: np.ndarray) -> bool:
         """Return whether a step by Newton's method from here has a negligible gain compared with noise."""
         left = self._residual(self.at)
-        step = self._step(_newton, slopes, left)
+        step = self._step(slopes, left)
         freedom = max(len(left) - len(step) - self._free, 1)
         noise = np.linalg.norm(left) * np.sqrt(len(step) / freedom)
         return bool(np.linalg.norm(slopes @ step) <= _SHARE * noise or np.abs(step).max() <= _LEAST)
@@ -227,7 +228,7 @@ class Search:
         """Move to a lower cost, by derivatives of the residual and of the shift; return whether there is one."""
         left = self._residual(self.at)
         while self._reach > _LEAST:
-            step = self._step(partial(_levenberg_marquardt, reach=self._reach), slopes, left)
+            step = self._step(slopes, left, self._reach)
             length = float(np.linalg.norm(step))
             foreseen = left + slopes @ step
             before = np.inf
@@ -243,30 +244,21 @@ class Search:
                 if row["error"] or size > 0.5 * before:
                     break
                 before = size
-                step = self._within(step - np.linalg.lstsq(slopes, found - foreseen, _UNDETERMINED)[0])
+                step = self._step(slopes, found - foreseen - slopes @ step)
             self._reach = 0.25 * min(length, self._reach)
         return False
 
-    def _step(self, method: Callable[..., np.ndarray], slopes: np.ndarray, left: np.ndarray) -> np.ndarray:
-        """Return the step of a ``method`` within the limits; unknowns that it takes beyond theirs end there.
+    def _step(self, slopes: np.ndarray, left: np.ndarray, reach: float = np.inf) -> np.ndarray:
+        """Return the step that is foreseen to leave least, within the limits and ``reach``, the shortest of several.
 
-        The others make up for these, so that a search along a valley ends where its limit crosses it.
+        Unknowns that would go beyond theirs end there, and the others make up for these, so that a search along a
+        valley ends where its limit crosses it.
         """
-        low, high = (limit - self.at for limit in self._limits)
-        step = np.zeros(len(self.at))
-        free = np.ones(len(self.at), bool)
-        while free.any():
-            step[free] = method(slopes[:, free], left + slopes[:, ~free] @ step[~free])
-            beyond = (step < low) | (step > high)
-            step = np.clip(step, low, high)
-            if not beyond.any():
-                break
-            free &= ~beyond
-        return step
-
-    def _within(self, step: np.ndarray) -> np.ndarray:
-        """Return a step that ends within the limits."""
-        return np.asarray(np.clip(self.at + step, *self._limits) - self.at)
+        low, high = (np.clip(limit - self.at, -reach, reach) for limit in self._limits)
+        turned, sizes, directions = np.linalg.svd(slopes, full_matrices=False)
+        known = sizes >= _UNDETERMINED * sizes.max(initial=0.0)
+        of_known = sizes[known, None] * directions[known]
+        return np.asarray(lsq_linear(of_known, -(turned.T @ left)[known], (low, high), "bvls").x)
 
     def minimum(self) -> Minimum:
         """Return what is left and the derivatives where the search has ended."""
@@ -282,28 +274,6 @@ class Search:
 def window(shifts: Sequence[float], part: slice) -> Row:
     """Return what a case says of the clock: the lowest, a first and the highest shift [s], and which points count."""
     return {"clock": shifts, "points": (part.start, part.stop)}
-
-
-def _newton(slopes: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """Return the step that is foreseen to leave least."""
-    return np.asarray(np.linalg.lstsq(slopes, -left, _UNDETERMINED)[0])
-
-
-def _levenberg_marquardt(slopes: np.ndarray, left: np.ndarray, reach: float) -> np.ndarray:
-    """Return the step that is foreseen to leave least, no longer than ``reach``."""
-    turned, sizes, directions = np.linalg.svd(slopes, full_matrices=False)
-    known = sizes > _UNDETERMINED * sizes.max(initial=0.0)
-    aim = -(turned.T @ left)[known]
-    sizes = sizes[known]
-    directions = directions[known]
-
-    def step(damping: float) -> np.ndarray:
-        return np.asarray((sizes * aim / (sizes**2 + damping)) @ directions)
-
-    damping = 0.0
-    while np.linalg.norm(step(damping)) > reach:
-        damping = max(2.0 * damping, 1e-6 * float(sizes[-1]) ** 2)
-    return step(damping)
 
 
 def _mean_square(row: Row, data: Measured) -> float:
