@@ -11,9 +11,8 @@ from hypothesis.extra import numpy as npst
 from runs import SCENES, a_trajectory
 
 from springbeam.pictures.drawing import decimated
-from springbeam.pictures.plots import figure_of, plot_run
+from springbeam.pictures.plots import plot_run
 from springbeam.results.directory import PICTURES
-from springbeam.scene import with_changes
 
 #: Which are not drawn: of a run without a beam, and of one that stopped before its tip met anything.
 OF_A_BEAM = {"shapes_after_contact", "shapes_later", "moments"}
@@ -60,17 +59,3 @@ def test_thinning_keeps_ends_order_and_the_extremes_of_every_column_of_pixels(va
         if len(span):
             kept = values[rows[np.isin(rows, span)]]
             assert (kept.min(), kept.max()) == (values[span].min(), values[span].max())
-
-
-@pytest.mark.parametrize("picture", sorted(OF_A_BEAM))
-@pytest.mark.parametrize(
-    "title", ["A board", 2 * "A dropped package: a circuit board on a foam pad, under a shock of 50 g "]
-)
-def test_the_title_stands_above_the_axes_and_their_remarks(picture, title):
-    """It stood over them in the three pictures along the beam."""
-    run = a_trajectory(with_changes(SCENES["all"], title=title), 400)
-    figure = figure_of(run, picture)
-    figure.canvas.draw()
-    lowest = figure._suptitle.get_window_extent().y0
-    for ax in figure.axes:
-        assert ax.get_tightbbox().y1 <= lowest

@@ -13,9 +13,9 @@ from lxml import html
 from runs import EVERY_EVENT, PAIR, SCENES, a_trajectory
 
 from springbeam.pictures.panels import panels
-from springbeam.pictures.report import described, page
+from springbeam.pictures.report import page
 from springbeam.results.trajectory import BODY_COLUMNS
-from springbeam.scene import load_scene, scene_from_dict, with_changes
+from springbeam.scene import scene_from_dict, with_changes
 from springbeam.scene.files import tomllib
 
 VOID = {"meta", "input", "br", "link", "img", "hr"}
@@ -119,10 +119,3 @@ def test_the_scene_as_run_is_on_the_page():
     assert "springbeam run scene.toml" in found["reproduce"]
     text = found.root.get_element_by_id("scene").text_content().split("Scene as run")[1]
     assert scene_from_dict(tomllib.loads(text)) == own
-
-
-def test_a_load_is_described_with_the_sign_of_its_amplitude():
-    """A pull of 9 N was described as 9 N."""
-    loads = [{"on": "tip", "amplitude": -9.0}, {"on": "tip", "amplitude": 9.0}]
-    said = dict(described(with_changes(load_scene("soft"), loads=loads)))
-    assert (said["load_0"], said["load_1"]) == ("constant on the tip, -9 N", "constant on the tip, 9 N")

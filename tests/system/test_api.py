@@ -168,15 +168,6 @@ def test_keys_have_dotted_names_wherever_a_scene_is_changed(here):
     assert simulate(flat).scene.spring.equilibrium == 0.1
 
 
-def test_tables_are_made_of_their_keys():
-    contact = springbeam.Contact(law="kelvin_voigt", stiffness=1e4, damping=5.0)
-    assert contact.force().force(0.01, 1.0) == 105.0
-    made = with_changes(load_scene("soft"), contact=contact, spring=springbeam.Spring(mass=2.0, linear_stiffness=3.0))
-    assert (made.contact, made.spring.mass) == (contact, 2.0)
-    with pytest.raises(ValueError, match="exponent"):
-        springbeam.Contact(law="tie", exponent=2.0)
-
-
 def test_a_dataset_has_each_time_once_and_both_sides_of_an_impact():
     run = simulate(with_changes(SOFT, {"time.t_end": 0.16}))
     dataset = run.to_xarray()

@@ -1,14 +1,12 @@
 """The command as people and programs meet it: tables, JSON, completion, help, and the likeliest mistakes."""
 
 import ast
-import inspect
 import json
 import os
 import re
 import shlex
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +15,7 @@ from commands import COMMAND, printed, ran, refused
 from typer.testing import CliRunner
 
 from springbeam import simulate
-from springbeam.cli import _TITLES, app
+from springbeam.cli import app
 from springbeam.scene import load_scene
 
 pytestmark = pytest.mark.usefixtures("unpainted", "kept_references")
@@ -111,30 +109,6 @@ def test_the_help_of_a_command_has_an_example_that_it_understands(name):
     program, first, *arguments = shlex.split(example)
     assert (program, first) == ("springbeam", name)
     described.make_context(name, arguments)  # raises if an option or a value is wrong
-
-
-@pytest.mark.parametrize("name", COMMAND.commands)
-def test_the_help_of_a_command_has_all_that_its_source_says(name, monkeypatch):
-    """Rich took ``[s]`` for strike-through and ``[[loads]]`` away, and the usage had ``{SCENE}``."""
-    monkeypatch.setenv("COLUMNS", "1000")
-    shown = " ".join(re.sub("[│╭╮╰╯─]", " ", printed(name, "--help")).split())
-    (module,) = (module for modules in _TITLES.values() for module, names in modules.items() if name in names)
-    function = getattr(import_module(f"springbeam.cli.{module}"), name)
-    texts = [function.__doc__]
-    for parameter in inspect.signature(function, eval_str=True).parameters.values():
-        texts += [given.help for given in getattr(parameter.annotation, "__metadata__", ())]
-    assert len(texts) > 1
-    for text in texts:
-        assert " ".join(text.split()) in shown
-    assert "{" not in shown
-
-
-def test_the_command_alone_shows_how_to_start():
-    text = printed()
-    shown = re.findall(r"^  springbeam (\w+)(.*?)   ", text, re.M)
-    assert [name for name, _ in shown] == ["scenes", "run", "report", "crosscheck", "doctor"]
-    for name, arguments in shown:
-        COMMAND.get_command(None, name).make_context(name, arguments.split())
 
 
 # -- completion -----------------------------------------------------------------------------------------------------

@@ -5,9 +5,6 @@ from functools import partialmethod
 
 import exact
 import pytest
-from exact.coupled import _airy_overshoot
-from scipy.integrate import quad
-from scipy.special import airy
 
 from springbeam.bodies.own import FmuBeam, FmuSpring
 from springbeam.coupling import solver
@@ -104,10 +101,3 @@ def test_a_scheme_whose_conditions_are_met_late_fails(monkeypatch, none_kept):
 
 
 # -- the exact values themselves ------------------------------------------------------------------------------------
-
-
-def test_the_overshoot_of_a_dispersed_step_is_the_integral_of_airy():
-    """The integral from the first zero on: Ai is negative below it. `itairy` is good for single precision, 1e-7."""
-    first_zero = -2.338107410459767
-    value, _ = quad(lambda x: airy(x)[0], first_zero, 20.0, epsabs=1e-12)
-    assert _airy_overshoot() == pytest.approx(value, abs=1e-7)

@@ -54,20 +54,9 @@ def test_the_settled_amplitude_is_that_of_the_frequency_response(driven):
     assert METRICS["settled_y"](driven) == pytest.approx(exact, rel=1e-3)
     assert METRICS["settled_a_y"](driven) == pytest.approx(exact * rate**2, rel=1e-3)
     assert METRICS["max_y"](driven) > 1.05 * exact
-
-
-def amplitude_in(macro_step, column):
-    """The settled amplitude, over that of a sine of the exact one in y."""
-    scene = with_changes(oscillator(), spring={"initial_velocity": 4.0}, coupling={"macro_step": macro_step})
-    rate = 2.0 * pi * DRIVE
-    exact = FORCE / sqrt((STIFFNESS - MASS * rate**2) ** 2 + (DAMPING * rate) ** 2)
-    return METRICS[f"settled_{column}"](simulate(scene)) / (exact * rate ** ("y", "z", "a_y").index(column))
-
-
-@pytest.mark.parametrize("column", ["y", "z"])
-def test_the_settled_amplitude_of_a_motion_is_that_of_its_curve(column):
-    """In rows at five phases of the drive it was 5 % lower or more."""
-    assert amplitude_in(1.0 / (5.0 * DRIVE), column) == pytest.approx(1.0, rel=2e-3)
+    # Of the curve: in five rows a period it was 5 % lower.
+    coarse = simulate(with_changes(driven.scene, coupling={"macro_step": 0.2 / DRIVE}))
+    assert METRICS["settled_y"](coarse) == pytest.approx(exact, rel=2e-3)
 
 
 def test_an_oscillator_driven_at_its_resonance_without_damping_never_settles():
@@ -110,15 +99,6 @@ def test_a_motion_whose_impacts_fall_on_the_strobe_has_its_period(multiple, ampl
     found = settled(simulate(scene))
     assert found is not None
     assert found.multiple == multiple
-
-
-@pytest.mark.parametrize(("t_end", "words"), [(8.0, "no period of 1 to 7 times"), (0.5, "4 periods of the drive are")])
-def test_a_motion_that_repeats_nothing_is_not_called_chaotic(t_end, words):
-    """A beat of 7 Hz and of 10.07 Hz without damping has no period in 8 s."""
-    run = simulate(with_changes(oscillator(t_end=t_end), spring={"damping": 0.0}))
-    said = dict(spectra(run).in_words())["motion"]
-    assert words in said
-    assert "within 1% of the range: it may be longer" in said or t_end < 1.0
 
 
 @pytest.mark.parametrize("duration", [5e-4, 1e-6])
@@ -221,7 +201,7 @@ def test_a_rigid_impact_has_no_peak_acceleration_and_a_soft_one_has():
     assert not any("no peak acceleration" in words for _, words in soft.in_words())
 
 
-def swept(first, last, seconds, size, cubic=0.0):
+def swept(first, last, seconds, size):
     """The oscillator under a chirp up and one down, which goes on in phase."""
     common = {"on": "spring", "amplitude": 0.3, "signal": "chirp", "duration": seconds}
     turned = np.pi * (first + last) * seconds  # by the first
@@ -229,7 +209,7 @@ def swept(first, last, seconds, size, cubic=0.0):
         {**common, "frequency": first, "frequency_end": last},
         {**common, "frequency": last, "frequency_end": first, "start": seconds, "phase": float(turned % (2.0 * pi))},
     ]
-    changes = {"spring": {"cubic_stiffness": cubic, "initial_velocity": 0.0}, "coupling": {"macro_step": size}}
+    changes = {"spring": {"initial_velocity": 0.0}, "coupling": {"macro_step": size}}
     return simulate(with_changes(oscillator(t_end=2.0 * seconds), loads=loads, **changes))
 
 
@@ -242,14 +222,6 @@ def test_a_slow_sweep_of_a_linear_oscillator_is_its_frequency_response():
         late = slice(20, None)  # the second begins as the first has ended; the first from rest
         assert found.amplitude[late] == pytest.approx(exact[late], rel=0.02)
     assert responses(run, "y")[1].frequency[0] > responses(run, "y")[1].frequency[-1]
-
-
-def test_up_and_down_are_different_motions_of_a_hardening_spring():
-    up, down = responses(swept(9.0, 16.0, 20.0, 1e-2, cubic=5e7), "y")
-    high = np.interp(12.0, up.frequency, up.amplitude)
-    low = np.interp(12.0, down.frequency[::-1], down.amplitude[::-1])
-    assert high > 2.0 * low
-    assert (up.way, down.way) == ("up", "down")
 
 
 # -- records ------------------------------------------------------------------------------------------------------
