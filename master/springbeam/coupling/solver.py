@@ -124,26 +124,25 @@ class StepSolver(Coupling):
         step, gap = self._advanced(upper, lower, time, size, start, a)
         if not any(a) and self.no_contact(gap, size, start):
             return step
-        upper_end, lower_end = step.end
+        tip, low = step.end
         remembered = self.state.of_size.pop(size, None)
-        B, descents = remembered or (self._response(upper, step, upper_end, a, 1.0, self._expected or _LEAST), {})
+        B, descents = remembered or (self._response(upper, step, tip, a, 1.0, self._expected or _LEAST), {})
         descent = known = descents.get(lower.mass)
         if descent is None:
             # A size that comes again may come often: to measure S then saves a step of each body in most.
             S = self._free_response(lower, size)
             if remembered:
-                S = self._response(lower, step, lower_end, a, _LITTLE, _LEAST)
+                S = self._response(lower, step, low, a, _LITTLE, _LEAST)
             descent = _descent(B, S)
         goal, change, better = self.aim(gap, a, descent, size, start)
         # Rounding is always enough; the tolerance follows from the motion, and counts if rounding is not reached.
         rounding = _ROUNDING * max(self.state.reach, abs(start[0].displacement))
-        settled = known is not None and max(map(abs, change)) <= EPS * max(map(abs, a))
         for iteration in count():
             missed = list(map(sub, gap, goal))
             norm = max(map(abs, missed))
             if not norm < inf or iteration == _MAX_ITERATIONS:
                 raise NotConverged(norm, iteration)
-            if norm <= rounding and (iteration or settled):
+            if norm <= rounding and (iteration or (known and max(map(abs, change)) <= EPS * max(map(abs, a)))):
                 break
             if iteration:
                 if norm <= self._absolute_tolerance(step, times(B, a), late=iteration >= _LATE):
@@ -156,7 +155,8 @@ class StepSolver(Coupling):
         _log.debug("t = %.9g s, H = %.3g s: %d iterations, residual %.2g m", time, size, iteration, norm)
         state = self.state
         # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
-        state.reach = max(state.reach, *(abs(end.displacement) for end in step.end))
+        tip, low = step.end
+        state.reach = max(state.reach, abs(tip.displacement), abs(low.displacement))
         if remembered:
             descents[lower.mass] = descent
         state.of_size[size] = (B, descents)

@@ -7,7 +7,9 @@ state after the event of the row before, the end of the step and its two moments
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from itertools import chain
 from math import nan
+from operator import itemgetter
 from struct import Struct
 from typing import Any
 
@@ -16,39 +18,45 @@ import numpy as np
 from ..motion.events import EVENT_COLUMNS, Event
 from .trajectory import SHAPE_COLUMNS
 
-#: Numbers of a record in the order of the file ``steps.bin``.
-STEP_COLUMNS = (
+#: Numbers of a record in the order of the file ``steps.bin``, by the names that `packed` takes.
+_PARTS = {
     # The step's end [s] and size [s], 0 for a row that ends no step.
-    *("time", "size"),
+    "time": ("time", "size"),
     # The ends before the event of the row: displacements [m], velocities [m/s], integrals [m·s] and [m·s²] over it.
-    *("u_tip", "v_tip", "u_tip_integral", "u_tip_integral_2", "y", "z", "y_integral", "y_integral_2"),
+    "tip": ("u_tip", "v_tip", "u_tip_integral", "u_tip_integral_2"),
+    "low": ("y", "z", "y_integral", "y_integral_2"),
     # Contact force and foundation force with two derivatives at its start; where it has no size, at the row.
-    *("contact_force", "contact_force_rate", "contact_force_rate_2"),
-    *("foundation_force", "foundation_force_rate", "foundation_force_rate_2"),
+    "contact": ("contact_force", "contact_force_rate", "contact_force_rate_2"),
+    "foundation": ("foundation_force", "foundation_force_rate", "foundation_force_rate_2"),
     # Contact force and foundation force at the end of the step [N], which may differ from the polynomials.
-    *("contact_force_end", "foundation_force_end"),
+    "forces": ("contact_force_end", "foundation_force_end"),
     # The row: the ends and both forces after its event, the phase (`PHASE_NAMES`), and the number of events up to here.
-    *("u_tip_after", "v_tip_after", "y_after", "z_after", "contact_force_after", "foundation_force_after"),
-    *("phase", "events"),
+    "tip_after": ("u_tip_after", "v_tip_after"),
+    "low_after": ("y_after", "z_after"),
+    "forces_after": ("contact_force_after", "foundation_force_after"),
+    "phase": ("phase", "events"),
     # Energies of the bodies after the event [J], as of `springbeam.bodies.protocol.Energies`.
-    *("beam_kinetic", "beam_potential", "beam_dissipated", "beam_load"),
-    *("spring_kinetic", "spring_potential", "spring_dissipated", "spring_load"),
+    "upper_energies": ("beam_kinetic", "beam_potential", "beam_dissipated", "beam_load"),
+    "lower_energies": ("spring_kinetic", "spring_potential", "spring_dissipated", "spring_load"),
     # In the contact law: stored, and dissipated since the start [J].
-    *("law_stored", "law_dissipated"),
+    "law_energies": ("law_stored", "law_dissipated"),
     # Taken by events since the start, and the work that foreign bodies have received [J].
-    *("impact_loss", "beam_received", "spring_received"),
+    "lost": ("impact_loss",),
+    "received": ("beam_received", "spring_received"),
     # All energies when the run began, before an impact at its start [J].
-    "energy_at_start",
+    "energy_at_start": ("energy_at_start",),
     # Inner forces of the beam at the end of the step, before the event (`springbeam.bodies.protocol.InnerForces`); and
     # the bodies that report them, the sum of `BEAM_REPORTS` and `SPRING_REPORTS`, the same in all records of a run.
-    *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress", "reports"),
+    "inner_forces": ("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress"),
+    "reports": ("reports",),
     # The same in all records: the degree of the contact force, and the tip's share of the common velocity of joined
     # ends, m_tip/(m_tip + m). Reduced mass of ends that a rigid law has joined over the step, 1/(1/m_tip + 1/m) [kg],
     # the tip's alone on a seat; else 0.
-    *("degree", "tip_share", "reduced_mass"),
-)
+    "joined": ("degree", "tip_share", "reduced_mass"),
+}
+STEP_COLUMNS = tuple(chain.from_iterable(_PARTS.values()))
 #: The contact force of a step: C and its two derivatives at the step's start.
-FORCE_COLUMNS = ("contact_force", "contact_force_rate", "contact_force_rate_2")
+FORCE_COLUMNS = _PARTS["contact"]
 #: Flags in ``reports``: the record has the inner forces of the beam; the lower body is the spring of the scene.
 BEAM_REPORTS = 1
 SPRING_REPORTS = 2
@@ -59,12 +67,17 @@ _OF_BODIES = ("y", "z", "u_tip", "v_tip")
 EVENT = np.dtype([(n, {"kind": "<U11", "joint": "<U5", "seated": "?"}.get(n, "<f8")) for n in EVENT_COLUMNS])
 #: A shape of the beam.
 SHAPE = np.dtype([(name, "<f8") for name in SHAPE_COLUMNS])
-#: Bytes of a record from its numbers.
-packed = Struct(f"<{len(STEP_COLUMNS)}d").pack
+_pack = Struct(f"<{len(STEP_COLUMNS)}d").pack
+_in_order = itemgetter(*_PARTS)
 #: The column ``phase`` by the number in a record: how the ends are joined, and 3 more while the lower end is seated.
 PHASE_NAMES = np.array(["free", "tied", "touch", "seated", "seated", "seated"])
 #: The first number of the phases in which the lower end is seated.
 _SEATED = 3.0
+
+
+def packed(**parts: Iterable[float]) -> bytes:
+    """Return the bytes of a record from its numbers, those of each part of `_PARTS`."""
+    return _pack(*chain.from_iterable(_in_order(parts)))
 
 
 class Rows:

@@ -274,7 +274,7 @@ class Master:
         if size == 0.0:
             contact = state.contact
             foundation = state.foundation
-        (u, v, _, _), (y, z, _, _) = ends
+        tip, low = ends
         of_upper = pair.upper.energies()
         of_lower = pair.lower.energies()
         in_law = pair.joined.energies(ends)
@@ -282,19 +282,25 @@ class Master:
             energies = abs(of_upper.kinetic + of_upper.potential) + abs(of_lower.kinetic + of_lower.potential)
             self._adaptive.note(energies + in_law.stored)
         return packed(
-            *(state.time, size, *before[0], *before[1], *contact, *foundation),
-            *(*forces, u, v, y, z, *state.present, state.phase.number, state.events),
-            *(
-                *of_upper,
-                *of_lower,
-                *in_law,
-                state.lost,
-                pair.upper.received or 0.0,
-                pair.lower.received or 0.0,
-                state.energy_at_start,
-            ),
-            *(pair.upper.inner_forces() if self._reports & BEAM_REPORTS else _NO_INNER_FORCES),
-            *(self._reports, pair.joined.degree, pair.interface.tip_share, mass),
+            time=(state.time, size),
+            tip=before[0],
+            low=before[1],
+            contact=contact,
+            foundation=foundation,
+            forces=forces,
+            tip_after=tip[:2],
+            low_after=low[:2],
+            forces_after=state.present,
+            phase=(state.phase.number, state.events),
+            upper_energies=of_upper,
+            lower_energies=of_lower,
+            law_energies=in_law,
+            lost=(state.lost,),
+            received=(pair.upper.received or 0.0, pair.lower.received or 0.0),
+            energy_at_start=(state.energy_at_start,),
+            inner_forces=pair.upper.inner_forces() if self._reports & BEAM_REPORTS else _NO_INNER_FORCES,
+            reports=(self._reports,),
+            joined=(pair.joined.degree, pair.interface.tip_share, mass),
         )
 
     def _shape(self, early: bool) -> None:

@@ -12,7 +12,7 @@ from math import inf
 
 import numpy as np
 
-from ..bodies.protocol import NO_FORCE, Abilities, Body, BodyFailed, Force, StepRefused
+from ..bodies.protocol import Abilities, Body, BodyFailed, StepRefused
 from ..contact.interface import Rigid
 from .setup import SAME, SceneError, Setup
 
@@ -119,40 +119,40 @@ def tried(body: Body, time: float, macro_step: float) -> Abilities:
     able = body.can()
     if not able.state or not 0.0 < body.mass < inf:
         return able
-    h = _TRIAL * macro_step if able.any_size else macro_step
+    h, short = (share * macro_step if able.any_size else macro_step for share in (_TRIAL, _SHORT))
     w, v, _, _ = body.motion()
-    short = _SHORT * macro_step if able.any_size else macro_step
-    moved = _MOVED * (max(abs(w), h * abs(v)) or 1.0)
-    push, hard = (2.0 * body.mass * moved / (size * size) for size in (h, short))  # they move a free mass as far
-    tries: list[tuple[float, Force]] = [
-        (h, NO_FORCE),
-        *((h, force) for force in ((push, 0.0, 0.0), (0.0, push / h, 0.0), (0.0, 0.0, 2.0 * push / h**2))),
-        (short, NO_FORCE),
-        (short, (hard, 0.0, 0.0)),
-    ]
-    body.mark()
-    ends = []
-    try:
-        for size, force in tries:
-            ends.append(body.advance(time, size, force))
+    length = _MOVED * (max(abs(w), h * abs(v)) or 1.0)
+
+    def response(size: float, *force: float) -> np.ndarray:
+        """Return the change of the motion by a ``force`` as large as moves a free mass by ``length``."""
+
+        def after(push: float) -> np.ndarray:
             body.rewind()
+            return np.array(body.advance(time, size, (push * force[0], push * force[1], push * force[2])))
+
+        return np.subtract(after(2.0 * body.mass * length / (size * size)), after(0.0))
+
+    body.mark()
+    try:
+        held, grown, bent = np.abs(
+            [response(h, 1.0, 0.0, 0.0), response(h, 0.0, 1.0 / h, 0.0), response(h, 0.0, 0.0, 2.0 / h**2)]
+        )
+        displaced, faster, *_ = response(short, 1.0, 0.0, 0.0)
     except (BodyFailed, StepRefused, OverflowError):
-        body.rewind()
         return able
-    alone, *others, at_once, pushed = np.array(ends)
-    displaced, faster, *_ = pushed - at_once
+    finally:
+        body.rewind()
     if able.any_size and able.velocity and abs(displaced - 0.5 * short * faster) > _AS_FREE * abs(0.5 * short * faster):
         able = replace(able, order=1)
-    held, grown, bent = (np.abs(end - alone) for end in others)
     if held[0] == 0.0:
         return able
     # Of a free mass the responses are 1/3, 1/6 and L h/3, L h²/12: a stiff body's are larger.
-    slopes = [grown[0] > held[0] / 6.0, bent[0] > held[0] / 12.0]
-    integrals = [held[2] > held[0] * h / 6.0, held[3] > held[0] * h * h / 24.0]
+    slopes = (grown[0] > held[0] / 6.0, bent[0] > held[0] / 12.0, False)
+    integrals = (held[2] > held[0] * h / 6.0, held[3] > held[0] * h * h / 24.0, False)
     return replace(
         able,
-        slopes=min(able.slopes, [*slopes, False].index(False)),
-        integrals=min(able.integrals, [*integrals, False].index(False)),
+        slopes=min(able.slopes, slopes.index(False)),
+        integrals=min(able.integrals, integrals.index(False)),
     )
 
 
