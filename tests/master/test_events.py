@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from springbeam.contact.events import locate
-from springbeam.motion.paths import Path
+from springbeam.motion.curves import Curve
 from springbeam.run.macro_steps import MacroGrid
 
 
@@ -25,7 +25,7 @@ class Counted:
 
 def located(f, size, tolerance, time):
     """`locate`, from where the cubic through both ends falls through zero."""
-    guess = Path.through(f(0.0), f(size), size).falls_through_zero() * size
+    guess = Curve.cubic(f(0.0), f(size), size).falls_through_zero() * size
     return locate(f, guess, size, tolerance, time)
 
 
@@ -57,7 +57,7 @@ def test_locate_does_not_take_a_zero_that_the_function_rises_from():
     def f(size):
         return size**2 * math.cos(size) - 1e-15, 2.0 * size * math.cos(size) - size**2 * math.sin(size)
 
-    assert Path.through(f(0.0), f(math.pi), math.pi).falls_through_zero() < 1e-12
+    assert Curve.cubic(f(0.0), f(math.pi), math.pi).falls_through_zero() < 1e-12
     # ḟ(π/2) = −(π/2)²
     assert located(f, math.pi, 1e-14, 0.0) == pytest.approx(0.5 * math.pi, abs=1e-14)
 

@@ -1,4 +1,4 @@
-"""Inside a step: paths of positions, sign changes of polynomials, the contact force."""
+"""Inside a step: curves of positions, sign changes of polynomials, the contact force."""
 
 import numpy as np
 import pytest
@@ -6,20 +6,20 @@ from numpy.polynomial import Legendre, Polynomial
 
 from springbeam.bodies import force
 from springbeam.bodies.protocol import Motion
-from springbeam.motion.paths import Path, sign_changes
+from springbeam.motion.curves import Curve, sign_changes
 
-# -- The path of a position inside a step: quintics exactly, minima, zeros, the order of its error and of the cubic's
+# -- The curve of a position inside a step: quintics exactly, minima, zeros, the order of its error and of the cubic's
 
 
 SIZE = 0.02
 
 
 def through(p, size=SIZE):
-    """Path through what a step would tell of p(τ/H): values, rates and means."""
+    """Curve through what a step would tell of p(τ/H): values, rates and integrals."""
     q = p.integ()
     q0 = p.integ(2)
-    samples = [(float(p(s)), float(p.deriv()(s)) / size) for s in (0.0, 1.0)]
-    return Path.through(*samples, size, (float(q(1.0)), float(q0(1.0))))
+    start, end = ((float(p(s)), float(p.deriv()(s)) / size) for s in (0.0, 1.0))
+    return Curve.quintic(start, (*end, size * float(q(1.0)), size**2 * float(q0(1.0))), size)
 
 
 # -- where polynomials change their sign: their roots, to rounding ----------------------------------------------------

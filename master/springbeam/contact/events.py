@@ -1,17 +1,17 @@
 """Event functions, and where inside a step one of them vanishes.
 
-An event function f is positive while nothing happens and falls through zero at the event. A step knows f and ḟ at
-both ends and the means of f; from these `springbeam.motion.paths` finds where to look, also for a contact that closes
+An event function f is positive while nothing happens and falls through zero at the event. A step has f and ḟ at both
+ends and two integrals of f; from these `springbeam.motion.curves` finds where to look, also for a contact that closes
 and opens again inside the step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ..bodies.protocol import Body, Ends
-from ..motion.paths import EPS, Means, Sample
+from ..bodies.protocol import Ends
+from ..motion.curves import EPS, Sample
 
 _MAX_EVALUATIONS = 60
 
@@ -19,13 +19,9 @@ _MAX_EVALUATIONS = 60
 class Gap:
     """g = u_tip − y, or what lies below the tip instead of y."""
 
-    def __call__(self, ends: Ends) -> Sample:
-        tip, low = ends
-        return tip.displacement - low.displacement, tip.velocity - low.velocity
-
-    def means(self, ends: Ends, size: float) -> Means:
-        tip, low = ends
-        return (tip.integral - low.integral) / size, (tip.integral_2 - low.integral_2) / (size * size)
+    def __call__(self, ends: Ends, size: float) -> Sample:
+        (u, v, u_1, u_2), (y, z, y_1, y_2) = ends
+        return u - y, v - z, u_1 - y_1, u_2 - y_2
 
 
 gap = Gap()
@@ -40,43 +36,17 @@ class Height:
     share: float
     sign: float = 1.0  #: −1: below
 
-    def __call__(self, ends: Ends) -> Sample:
-        tip, low = ends
-        rate = low.velocity + self.share * (tip.velocity - low.velocity)
-        return self.sign * (ends[self.end].displacement - self.level), self.sign * rate
-
-    def means(self, ends: Ends, size: float) -> Means:
-        end = ends[self.end]
-        level = self.level
-        return self.sign * (end.integral / size - level), self.sign * (end.integral_2 / (size * size) - 0.5 * level)
+    def __call__(self, ends: Ends, size: float) -> Sample:
+        sign = self.sign
+        (_, v, _, _), (_, z, _, _) = ends
+        w, _, once, twice = ends[self.end]
+        below = self.level * size
+        rate = z + self.share * (v - z)
+        return sign * (w - self.level), sign * rate, sign * (once - below), sign * (twice - 0.5 * below * size)
 
 
-class Holding:
-    """C/k of a massless tip on the lower end [m]: known from where they are, not from a step's force.
-
-    ż of its rate is that of the lower end with the tip on it, off the foundation.
-    """
-
-    def __init__(self, tip: Body, low: Body) -> None:
-        assert tip.damping is not None
-        self._tip = tip
-        self._low = low
-        self._stiffness: float = tip.stiffness(0.0)
-        self._relaxation = tip.damping / self._stiffness
-
-    def __call__(self, ends: Ends) -> Sample:
-        _, low = ends
-        C = self._tip.holding_force(low.displacement, low.velocity)
-        acceleration = -(C + self._low.holding_force(low.displacement, low.velocity)) / self._low.mass
-        return C / self._stiffness, low.velocity + self._relaxation * acceleration
-
-    def means(self, ends: Ends, size: float) -> None:
-        return None
-
-
-#: f of the ends (tip, lower end), positive while nothing happens. A call returns f and ḟ, `means` those of f over the
-#: step of a size [s] that has ended at ``ends``, ``None`` if nobody knows.
-EventFunction = Gap | Height | Holding
+#: f of the ends (tip, lower end), positive while nothing happens, after a step of a size [s].
+EventFunction = Gap | Height
 
 
 def position_tolerance(ends: Ends, macro_step: float) -> float:
@@ -90,16 +60,18 @@ def no_dip(start: Sample, end: Sample, size: float, fastest: float) -> bool:
 
     Not even if both ends move against each other as fast as the ``fastest`` so far [m/s], nor by the cubic.
     """
-    f0, d0 = start
-    f1, d1 = end
+    f0, d0, _, _ = start
+    f1, d1, _, _ = end
     low = f0 if f0 < f1 else f1
     return f0 + f1 > 2.0 * fastest * size and low > abs(f1 - f0) + size / 3.0 * (abs(d0) + abs(d1))
 
 
-def locate(evaluate: Callable[[float], Sample], guess: float, size: float, tolerance: float, time: float) -> float:
+def locate(
+    evaluate: Callable[[float], Sequence[float]], guess: float, size: float, tolerance: float, time: float
+) -> float:
     """Step size at which f = 0 to ``tolerance``, by Newton's method inside a bracket, then by secants.
 
-    ``evaluate(h)`` repeats the step with size h and returns f, ḟ at its end; the last size evaluated is the one
+    ``evaluate(h)`` repeats the step with size h and returns f, ḟ, … at its end; the last size evaluated is the one
     returned, so the bodies are left there. ``guess`` is the first one. f(0) ≥ 0 > f(size); ``time`` is the step's start
     (its rounding bounds the resolution). A zero that f rises from, as it may at the start, is none of these. ḟ
     is only the first guess of df/dh: where both ends differ in velocity, the force of a step, and with it the motion,
@@ -110,7 +82,7 @@ def locate(evaluate: Callable[[float], Sample], guess: float, size: float, toler
     h = max(guess, EPS * size)
     last: tuple[float, float] | None = None
     for _ in range(_MAX_EVALUATIONS):
-        value, rate = evaluate(h)
+        value, rate, *_ = evaluate(h)
         if abs(value) <= tolerance and rate < 0.0:
             return h
         if value > 0.0 or (value >= -tolerance and rate >= 0.0):

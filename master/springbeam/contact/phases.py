@@ -15,8 +15,7 @@ from typing import Literal, NamedTuple
 
 from ..bodies.protocol import Ends
 from ..motion.events import EventKind, Joint
-from ..motion.paths import Sample
-from .events import EventFunction, Height, Holding, gap
+from .events import EventFunction, Height, gap
 from .impacts import NO_IMPACT, Impact, foundation_impact, meeting, rebound
 from .interface import Interface, Rigid, common_velocity
 
@@ -76,15 +75,8 @@ class Outcome(NamedTuple):
     impact: Impact = NO_IMPACT
 
 
-class Guards(NamedTuple):
-    """What may end a phase."""
-
-    functions: list[tuple[EventKind, EventFunction]]
-    forces: list[tuple[EventKind, PushingForce]]
-
-
 class Automaton:
-    """The phases of one pair of ends; keeps the guards of the present phase.
+    """The phases of one pair of ends.
 
     Joined ends have the rate of their common velocity in the guards: they differ from each other by what the energy
     schemes leave open, and one of them may even go the other way.
@@ -100,42 +92,18 @@ class Automaton:
         self._tip_mass = interface.upper.mass
         self._mass = interface.lower.mass
         self._hardest = 0.0  #: speed of the fastest impact on the foundation so far [m/s]
-        self._phase: Phase | None = None
-        self._guards = Guards([], [])
-        #: The ends of the last call, and the samples there: a step starts where the one before has ended.
-        self._ends: Ends | None = None
-        self._samples: list[Sample] = []
 
-    def guards(self, phase: Phase) -> Guards:
+    def guards(self, phase: Phase) -> list[tuple[EventKind, EventFunction | PushingForce]]:
         """Return what may end ``phase``."""
-        if phase is not self._phase:
-            self._phase = phase
-            self._guards = self._guards_of(phase)
-            self._ends = None
-        return self._guards
-
-    def samples(self, phase: Phase, ends: Ends) -> list[Sample]:
-        """Return f, ḟ of each function of ``phase``."""
-        if phase is not self._phase or ends != self._ends:
-            self._samples = [function(ends) for _, function in self.guards(phase).functions]
-            self._ends = ends
-        return self._samples
+        return [
+            (row.kind, row.guard(self._interface, phase))
+            for row in TRANSITIONS
+            if row.where(self._interface) and row.joint in (None, phase.joint) and phase.seated in row.seated
+        ]
 
     def after(self, kind: EventKind, at: Instant) -> Outcome:
         """Return what happens where the guard of ``kind`` has become zero."""
         return _EFFECTS[kind](self, at)
-
-    def _guards_of(self, phase: Phase) -> Guards:
-        functions: list[tuple[EventKind, EventFunction]] = []
-        forces: list[tuple[EventKind, PushingForce]] = []
-        for row in TRANSITIONS:
-            if row.where(self._interface) and row.joint in (None, phase.joint) and phase.seated in row.seated:
-                guard = row.guard(self._interface, phase)
-                if isinstance(guard, str):
-                    forces.append((row.kind, guard))
-                else:
-                    functions.append((row.kind, guard))
-        return Guards(functions, forces)
 
     # -- effects ----------------------------------------------------------------------------------------------------
 
@@ -299,9 +267,9 @@ def above_foundation(interface: Interface, phase: Phase) -> EventFunction:
     return Height(_LOW, interface.floor, _share(interface, phase))
 
 
-def contact_pushes(interface: Interface, phase: Phase) -> EventFunction | PushingForce:
+def contact_pushes(interface: Interface, phase: Phase) -> PushingForce:
     """C > 0"""
-    return Holding(interface.upper, interface.lower) if interface.upper.massless else "contact"
+    return "contact"
 
 
 def foundation_pushes(interface: Interface, phase: Phase) -> PushingForce:

@@ -22,7 +22,7 @@ from operator import sub
 import numpy as np
 
 from ..bodies.protocol import Ends
-from ..motion.paths import EPS, sign_changes
+from ..motion.curves import EPS, sign_changes
 from ..scene.laws import SoftLaw
 from .protocol import Counts, Coupling, LawEnergies, Step
 from .small import Matrix, Vector, transposed

@@ -29,7 +29,7 @@ import numpy as np
 
 from ..bodies import force
 from ..bodies.protocol import NO_FORCE, SIZES_REMEMBERED, Body, Ends, Force, Motion, made_of
-from ..motion.paths import EPS
+from ..motion.curves import EPS
 from .protocol import Conditions, Counts, Coupling, NotConverged, Step
 from .small import Matrix, Vector, broyden, inverse, less, times, transposed
 

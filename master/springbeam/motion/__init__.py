@@ -1,4 +1,4 @@
-"""Motion of the ends in a step: paths between two rows, and kinds of events.
+"""Motion in a step: curves of positions and forces, and kinds of events.
 
 Imports nothing of the package. Contact, coupling, run, results and references share it.
 """

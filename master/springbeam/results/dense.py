@@ -4,7 +4,7 @@ Steps end on events and on changes of phase, so that no polynomial reaches acros
 record as at a row, and its columns follow from that (`springbeam.results.columns`). In this record
 
 * positions and velocities of ends that move apart follow the path of order 6 through both ends of the step with its two
-  moments (`springbeam.motion.paths`), velocities its slope (order 5);
+  moments (`springbeam.motion.curves`), velocities its slope (order 5);
 * ends that a rigid law joins follow the path of their common motion, free of the mismatch of their velocities, plus the
   gap, linear between the rows; so does a tip that the foundation holds;
 * contact and foundation force are those of both rows and, between them, the polynomials applied, without the part of
@@ -22,14 +22,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import comb
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.polynomial.legendre import legval
-from numpy.polynomial.polynomial import polyval
 
+from ..motion.curves import LAST_MOMENT, Curve, derivative, sign_changes
 from ..motion.events import Event
-from ..motion.paths import LAST_MOMENT, Path, derivative, sign_changes, value
 from ..scene import Scene
 from .columns import columns
 from .inner import INNER, MAGNITUDE, curves
@@ -50,17 +49,16 @@ MOTION = ("u_tip", "v_tip", "y", "z", "gap")
 _TOGETHER = 65536
 #: Times closer than this share are one.
 _SAME = 1e-12
-#: Degree of the polynomials.
-_DEGREE = 5
-
-
-#: Powers of s at the places of a step where the lowest value of its path is looked for.
-_PLACES_INSIDE = np.vander(np.linspace(0.0, 1.0, 9), _DEGREE + 1, increasing=True)
+#: Powers of s of the Legendre polynomials of 2s − 1 up to degree 5, by columns.
+_LEGENDRE = np.array([[(-1.0) ** (k + j) * comb(k, j) * comb(k + j, j) for k in range(6)] for j in range(6)])
+#: Places of a step where the lowest value of its curve is looked for.
+_PLACES_INSIDE = np.linspace(0.0, 1.0, 9)[:, None]
 #: So many of the steps with the lowest values there are searched closely.
 _SEARCHED = 16
 #: Positions and velocities of both ends.
 _PLACES = ("u_tip", "y")
 _SPEEDS = ("v_tip", "z")
+_INTEGRALS = ("_integral", "_integral_2")
 #: Values that differ by less than this share of the largest one are equal: well above rounding.
 _ALIKE = 1e-13
 
@@ -104,10 +102,10 @@ def rows_at(run: Trajectory, times: Any) -> Trajectory:
     after = steps.take(row[between] + 1)
     np.put(records, between, _between(run.scene, before, after, run.events, wanted[between]))
     for name in INNER:
-        number, powers = curves(steps, name)
+        number, curve = curves(steps, name)
         begins = steps["time"][row[between]]
         share = (wanted[between] - begins) / (steps["time"][row[between] + 1] - begins)
-        there = polyval(share, powers[:, np.searchsorted(number, row[between] + 1)], tensor=False)
+        there = curve.among(np.searchsorted(number, row[between] + 1)).at(share)
         records[name][between] = np.maximum(there, 0.0) if name == MAGNITUDE else there
     made = columns(run.scene, records, steps[:1])
     return Trajectory(run.scene, made, list(run.events), summary=dict(run.summary))
@@ -130,7 +128,7 @@ def ends_at(run: Trajectory, times: np.ndarray) -> dict[str, np.ndarray]:
         curves = motion(run.scene.contact.rigid, Rows(steps, after - 1), Rows(steps, after))
         share = (times[some] - begins[step]) / steps["size"][made[step]]
         for name, values in found.items():
-            values[some] = polyval(share, curves[name][:, which], tensor=False)
+            values[some] = curves[name].among(which).at(share)
     return found
 
 
@@ -173,20 +171,20 @@ def inside(rigid: bool, steps: np.ndarray, *names: str) -> Inside:
         after = made[begin : begin + _TOGETHER]
         curves = motion(rigid, Rows(steps, after - 1), Rows(steps, after))
         for name, found in known.items():
-            for place, sign in ((0, 1.0), (2, -1.0)):
-                lowest, step, share = _lowest(sign * curves[name], below=sign * found[place])
+            for place, sign, curve in ((0, 1.0, curves[name]), (2, -1.0, -curves[name])):
+                lowest, step, share = _lowest(curve, below=sign * found[place])
                 if step >= 0:
                     end = after[step]
                     found[place] = sign * lowest
                     found[place + 1] = float(steps["time"][end - 1] + share * steps["size"][end])
         for name in _PLACES:
-            unsure = LAST_MOMENT * np.abs(curves[name][_DEGREE]).max() - rounding
+            unsure = LAST_MOMENT * np.abs(curves[name].powers[-1]).max() - rounding
             error = max(error, float(unsure) / (span(places[name], rounding) or 1.0))
     return Inside({name: Extremes(*found) for name, found in known.items()}, error)
 
 
-def motion(rigid: bool, before: Records, steps: Records) -> dict[str, np.ndarray]:
-    """Return displacements, velocities and gap over ``steps`` as polynomials of s = τ/H.
+def motion(rigid: bool, before: Records, steps: Records) -> dict[str, Curve]:
+    """Return the curves of ``u_tip``, ``v_tip``, ``y``, ``z`` and ``gap`` over ``steps``.
 
     Parameters
     ----------
@@ -194,14 +192,8 @@ def motion(rigid: bool, before: Records, steps: Records) -> dict[str, np.ndarray
         Whether ends that are joined have one position.
     before, steps
         Records of steps of sizes above 0 and those before them, shape (n,).
-
-    Returns
-    -------
-    dict
-        The coefficients of 1, s … s⁵ of ``u_tip``, ``v_tip``, ``y``, ``z`` and ``gap``, shape (6, n).
     """
-    found: dict[str, np.ndarray] = {}
-    size: Any = steps["size"]
+    size = steps["size"]
     together = rigid & joined(before)
     held = seated(before)
 
@@ -210,25 +202,27 @@ def motion(rigid: bool, before: Records, steps: Records) -> dict[str, np.ndarray
         names = [name + field for name in (_PLACES if field.startswith("_integral") else _SPEEDS)]
         return np.where(together, common(records, held, *names), records[names[end]])
 
-    for end, position in enumerate(_PLACES):
-        begins: Any = (before[f"{position}_after"], of(end, before, "_after"))
-        ends: Any = (steps[position], of(end, steps, ""))
-        means: Any = (of(end, steps, "_integral") / size, of(end, steps, "_integral_2") / size**2)
-        found[position] = np.array(Path.through(begins, ends, size, means).powers)
+    def curve(end: int, position: str) -> Curve:
+        start = before[f"{position}_after"], of(end, before, "_after")
+        return Curve.quintic(start, (steps[position], *(of(end, steps, f) for f in ("", *_INTEGRALS))), size)
+
+    apart, low = (curve(end, position) for end, position in enumerate(_PLACES))
     gap = before["u_tip_after"] - before["y_after"]
-    tip = found["y"].copy()
-    tip[:2] += gap, steps["u_tip"] - steps["y"] - gap
-    found["u_tip"] = np.where(together, tip, found["u_tip"])
-    for position, velocity in zip(_PLACES, _SPEEDS, strict=True):
-        rate = np.arange(1.0, 6.0)[:, None] * found[position][1:] / size
-        found[velocity] = np.vstack([rate, np.zeros_like(size)])
-    found["v_tip"] = np.where(together, found["z"], found["v_tip"])
-    found["gap"] = found["u_tip"] - found["y"]
-    return found
+    w, rate, *bends = low.powers
+    joint = Curve([w + gap, rate + (steps["u_tip"] - steps["y"] - gap), *bends], size)
+    tip = Curve([np.where(together, *both) for both in zip(joint.powers, apart.powers, strict=True)], size)
+    speeds = zip(low.rate.powers, apart.rate.powers, strict=True)
+    return {
+        "u_tip": tip,
+        "v_tip": Curve([np.where(together, *both) for both in speeds], size),
+        "y": low,
+        "z": low.rate,
+        "gap": Curve([u - y for u, y in zip(tip.powers, low.powers, strict=True)], size),
+    }
 
 
-def forces(exchanges: bool, before: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
-    """Return C and N over ``steps`` [N] as Legendre series of 2τ/H − 1, shape (6, n).
+def forces(exchanges: bool, before: np.ndarray, steps: np.ndarray) -> dict[str, Curve]:
+    """Return the curves of C and N over ``steps`` [N].
 
     ``exchanges`` says whether the scheme exchanges values once per macro step; other parameters are as of `motion`.
 
@@ -237,25 +231,22 @@ def forces(exchanges: bool, before: np.ndarray, steps: np.ndarray) -> dict[str, 
     bring both forces to what they are at the ends of the step. Between two exchanges of values they are linear.
     """
     size = steps["size"]
+    tied = steps["reduced_mass"] > 0.0
+    first = np.zeros(len(steps), int) if exchanges else np.where(tied, 4, steps["degree"].astype(int) + 1)
+    signs = (-1.0) ** np.arange(6)
+    each = np.arange(len(steps))
     found = {}
     for name in ("contact_force", "foundation_force"):
-        c = steps[name]
-        dc = size * steps[f"{name}_rate"]
-        ddc = size**2 * steps[f"{name}_rate_2"]
+        c, dc, ddc = (size**k * steps[name + order] for k, order in enumerate(("", "_rate", "_rate_2")))
         series = np.zeros((6, len(steps)))
         if not exchanges:
             series[:3] = c + dc / 2.0 + ddc / 6.0, dc / 2.0 + ddc / 4.0, ddc / 12.0
-            series[:4] -= _reversal(before, steps)
-            first = np.where(steps["reduced_mass"] > 0.0, 4, steps["degree"].astype(int) + 1)
-        else:
-            first = np.zeros(len(steps), int)
-        signs = (-1.0) ** np.arange(6)
-        each = np.arange(len(steps))
+            series[:4] -= np.where((name == "contact_force") | seated(before), _reversal(before, steps), 0.0)
         at_start = signs[first] * (before[f"{name}_after"] - signs @ series)
         at_end = steps[f"{name}_end"] - series.sum(axis=0)
         series[first, each] += 0.5 * (at_end + at_start)
         series[first + 1, each] += 0.5 * (at_end - at_start)
-        found[name] = series
+        found[name] = Curve(_LEGENDRE @ series, size)
     return found
 
 
@@ -284,56 +275,47 @@ def _between(
 
     found["time"] = times
     found["size"] = share * after["size"]
-    for name, series in forces(scene.coupling.exchanges, before, after).items():
-        found[f"{name}_after"] = legval(2.0 * share - 1.0, series, tensor=False)
+    for name, curve in forces(scene.coupling.exchanges, before, after).items():
+        found[f"{name}_after"] = curve.at(share)
         if name == "contact_force" and scene.contact.opens:
             found[f"{name}_after"] = np.maximum(found[f"{name}_after"], 0.0)
-    curves = {
-        name: polyval(share, powers, tensor=False)
-        for name, powers in motion(scene.contact.rigid, before, after).items()
-    }
-    for name in ("u_tip", "v_tip", "y", "z"):
-        found[f"{name}_after"] = curves[name]
+    there = {name: curve.at(share) for name, curve in motion(scene.contact.rigid, before, after).items()}
+    for name in (*_PLACES, *_SPEEDS):
+        found[f"{name}_after"] = there[name]
     if scene.coupled and not (scene.contact.rigid or scene.contact.lasting):
-        found["phase"] = np.where(seated(before), before["phase"], np.where(curves["gap"] < 0.0, 2.0, 0.0))
+        found["phase"] = np.where(seated(before), before["phase"], np.where(there["gap"] < 0.0, 2.0, 0.0))
     for name in _LINEAR:
         found[name] = linear(name, after[name])
-    # An event at the end of the step changes kinetic energy, or releases a massless tip. Where ends part without an
-    # impact, all of it counts as the spring's, because the records do not have the share of the tip.
+    # An event at the end of the step changes kinetic energy: that of the spring by an impulse times the mean velocity,
+    # that of the beam by the rest of what is lost. Where ends part, the impulse is that of their common velocity.
     lost = after["impact_loss"] - before["impact_loss"]
-    impulses = np.array([0.0, *(event.impulse_contact for event in events)])  # of the last event up to a record
-    of_tip = impulses[after["events"].astype(int)] * 0.5 * (after["v_tip"] + after["v_tip_after"])
-    of_spring = np.where(after["z_after"] != after["z"], -lost - of_tip, 0.0)
-    found["beam_kinetic"] = linear("beam_kinetic", after["beam_kinetic"] + lost + of_spring)
-    found["spring_kinetic"] = linear("spring_kinetic", after["spring_kinetic"] - of_spring)
+    kicks = [(0.0, 0.0, False), *((e.impulse_contact, e.impulse_foundation, e.kind.opens) for e in events)]
+    on_tip, of_foundation, opens = np.array(kicks)[after["events"].astype(int)].T
+    on_tip = np.where(opens > 0.0, after["reduced_mass"] * (after["z"] - after["v_tip"]), on_tip)
+    to_spring = (after["events"] > before["events"]) * (of_foundation - on_tip) * 0.5 * (after["z"] + after["z_after"])
+    found["beam_kinetic"] = linear("beam_kinetic", after["beam_kinetic"] + lost + to_spring)
+    found["spring_kinetic"] = linear("spring_kinetic", after["spring_kinetic"] - to_spring)
     return found
 
 
-def _lowest(powers: np.ndarray, below: float) -> tuple[float, int, float]:
-    """Return the lowest value on [0, 1] of any of n polynomials, which one has it, and where.
+def _lowest(curve: Curve, below: float) -> tuple[float, int, float]:
+    """Return the lowest value of any of n curves, which one has it, and at which s.
 
-    The number is -1 if none is lower than ``below``, but for rounding. Minima are looked for in the polynomials that
-    are lowest at some places.
-
-    Parameters
-    ----------
-    powers
-        Coefficients of 1, s … s⁵, shape (6, n).
-    below
-        A value that is known.
+    The number is -1 if none is lower than ``below``, a value that is known, but for rounding. Minima are looked for in
+    the curves that are lowest at some places.
     """
     best = below
     step = -1
     share = 0.0
-    values = _PLACES_INSIDE @ powers
+    values = curve.at(_PLACES_INSIDE)
     tolerance = _ALIKE * float(np.abs(values).max(initial=0.0))
     lowest = values.min(axis=0)
     few = min(_SEARCHED, len(lowest))
     for i in np.argpartition(lowest, few - 1)[:few].tolist():
-        path = powers[:, i].tolist()
+        one = curve.one(i)
         # Not at 0: where it begins another one ends, or there is a row.
-        for s in (*sign_changes(derivative(path), 0.0, 1.0), 1.0):
-            there = value(path, s)
+        for s in (*sign_changes(derivative(one.powers), 0.0, 1.0), 1.0):
+            there = one.at(s)
             if there < best - tolerance:
                 best = there
                 step = i

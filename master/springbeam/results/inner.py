@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.polynomial.polynomial import polyval
 
+from ..motion.curves import Curve
 from .spans import Extremes
 from .trajectory import Trajectory
 
@@ -21,8 +21,8 @@ INNER = ("clamp_force", "clamp_moment", "bending_stress")
 MAGNITUDE = "bending_stress"
 
 
-def curves(steps: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the numbers of the records that end a step, and the curve of a column over each as powers of s = τ/H.
+def curves(steps: np.ndarray, name: str) -> tuple[np.ndarray, Curve]:
+    """Return the numbers of the records that end a step, shape (n,), and the curve of a column over each.
 
     Parameters
     ----------
@@ -30,15 +30,10 @@ def curves(steps: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
         Consecutive records of dtype `springbeam.results.records.STEP`.
     name
         One of `INNER`.
-
-    Returns
-    -------
-    tuple
-        Shapes (n,) and (4, n).
     """
     made = np.flatnonzero(steps["size"][1:] > 0.0) + 1
     if not len(made):
-        return made, np.zeros((4, 0))
+        return made, Curve(np.zeros((4, 0)), np.zeros(0))
     size: Any = steps["size"][made]
     start = steps[name][made - 1]
     end = steps[name][made]
@@ -57,20 +52,17 @@ def curves(steps: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     first[only] = 2.0 * rate[only] - last[only]
     only = ends & ~begins
     last[only] = 2.0 * rate[only] - first[only]
-    rise = end - start
-    d0 = first * size
-    d1 = last * size
-    return made, np.array([start, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise])
+    return made, Curve.cubic((start, first), (end, last), size)
 
 
 def inside(steps: np.ndarray, name: str) -> Extremes:
     """Return the extremes of a column of `INNER` on its curve."""
     rows = Extremes.of_rows(steps["time"], steps[name])
-    made, powers = curves(steps, name)
+    made, curve = curves(steps, name)
     if not len(made):
         return rows
-    places = _turning(powers)
-    values = np.concatenate([polyval(s, powers, tensor=False) for s in places])
+    places = _turning(curve)
+    values = np.concatenate([curve.at(s) for s in places])
     if name == MAGNITUDE:
         values = np.maximum(values, 0.0)
     times = np.concatenate([steps["time"][made] - (1.0 - s) * steps["size"][made] for s in places])
@@ -91,9 +83,9 @@ def largest(run: Trajectory, name: str) -> Extremes:
     return inside(run.steps[-len(later) :], name)
 
 
-def _turning(powers: np.ndarray) -> list[np.ndarray]:
-    """Return where cubics of coefficients (4, n) turn, twice (n,): shares of the step, 0 where that is outside."""
-    _, a, b, c = powers
+def _turning(curve: Curve) -> list[np.ndarray]:
+    """Return where cubics turn, twice (n,): shares of the step, 0 where that is outside."""
+    _, a, b, c = curve.powers
     # Roots of a + 2 b s + 3 c s², in the form that loses no digits.
     root = np.sqrt(np.maximum(b * b - 3.0 * a * c, 0.0))
     q = -(b + np.copysign(root, b))

@@ -6,13 +6,11 @@ from math import comb
 
 import numpy as np
 
-from ..motion.paths import derivative, value
+from ..motion.curves import Curve
 from ..scene.laws import SoftLaw
 from .dense import motion
 from .records import Rows
 
-#: From powers of s to Bernstein coefficients on [0, 1], which enclose a polynomial.
-_BERNSTEIN = np.array([[comb(i, k) / comb(5, k) for k in range(6)] for i in range(6)])
 #: Steps whose forces are looked at together, to bound the memory for a long run.
 _TOGETHER = 65536
 #: Places in a step among which the largest force is looked for.
@@ -37,29 +35,33 @@ def peak_of_law(law: SoftLaw, steps: np.ndarray) -> tuple[float, float]:
     made = np.flatnonzero(steps["size"][1:] > 0.0) + 1  # the first record has the row at which the others begin
     for begin in range(0, len(made), _TOGETHER):
         after = made[begin : begin + _TOGETHER]
-        paths = -motion(False, Rows(steps, after - 1), Rows(steps, after))["gap"]
-        sizes = steps["size"][after]
-        deepest = (_BERNSTEIN @ paths).max(axis=0)
-        rates = np.vstack([np.arange(1.0, 6.0)[:, None] * paths[1:] / sizes, np.zeros_like(sizes)])
-        fastest = (_BERNSTEIN @ rates).max(axis=0) if law.damped else np.zeros_like(deepest)
+        penetration = -motion(False, Rows(steps, after - 1), Rows(steps, after))["gap"]
+        deepest = _most(penetration)
+        fastest = _most(penetration.rate) if law.damped else np.zeros_like(deepest)
         most = np.array([law.force(*there) for there in zip(deepest.tolist(), fastest.tolist(), strict=True)])
         for k in np.argsort(-most):
             if most[k] <= best * (1.0 + _ALIKE):
                 break
-            size = float(sizes[k])
-            found, share = _largest(law, paths[:, k].tolist(), size)
+            found, share = _largest(law, penetration.one(k))
             if found > best:
                 best = found
-                time = float(steps["time"][after[k]] - (1.0 - share) * size)
+                time = float(steps["time"][after[k]] - (1.0 - share) * penetration.size[k])
     return max(best, 0.0), time
 
 
-def _largest(law: SoftLaw, path: list[float], size: float) -> tuple[float, float]:
-    """Return the largest force [N] along the penetration ``path`` in a step of ``size`` [s], and the share of it."""
-    rate = derivative(path)
+def _most(curve: Curve) -> np.ndarray:
+    """Return bounds from above of n curves: the largest of the Bernstein coefficients of each, which enclose it."""
+    places = range(len(curve.powers))
+    bernstein = [[comb(i, k) / comb(places[-1], k) for k in places] for i in places]
+    return np.asarray((bernstein @ np.array(curve.powers)).max(axis=0))
+
+
+def _largest(law: SoftLaw, penetration: Curve) -> tuple[float, float]:
+    """Return the largest force [N] along the ``penetration`` in one step, and at which s."""
+    rate = penetration.rate
 
     def force(s: float) -> float:
-        return law.force(value(path, s), value(rate, s) / size)
+        return law.force(penetration.at(s), rate.at(s))
 
     width = 1.0 / (_PLACES - 1)
     near = max((k * width for k in range(_PLACES)), key=force)

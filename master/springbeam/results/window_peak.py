@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
+from ..motion.curves import EPS
 from ..motion.events import Event
-from ..motion.paths import EPS
 from .contact_times import kicks
 from .records import FORCE_COLUMNS, impulse
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..motion.paths import EPS
+from ..motion.curves import EPS
 from ..results.columns import ledger
 from ..results.spans import energy_of_force
 from .stepping import Pair

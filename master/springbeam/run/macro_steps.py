@@ -12,7 +12,7 @@ from math import ceil, inf, log2, sqrt
 
 from ..bodies import force
 from ..coupling.protocol import Step
-from ..motion.paths import Path
+from ..motion.curves import Curve
 from .outcome import RunStopped
 from .setup import SAME, SHORTEST_STEP, Setup
 from .stepping import Pair, State
@@ -172,8 +172,7 @@ class AdaptiveSteps:
         least = [max(abs(low), abs(high), bent) for low, high in self.state.ranges]
         ends = zip(step.start, step.end, self._ranges_with(step), least, strict=True)
         for start, end, (low, high), size in ends:
-            means = end.integral / step.size, end.integral_2 / step.size**2
-            beside = Path.through(start[:2], end[:2], step.size, means).moments_beside_cubic
+            beside = Curve.quintic(start, end, step.size).moments_beside_cubic
             moved = high - low
             rounding = _ROUNDING * size
             if bent > moved and self._relative * moved <= rounding:

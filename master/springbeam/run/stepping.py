@@ -274,12 +274,12 @@ class Pair:
             self._holding = self.lower.holding_force(self.interface.floor, 0.0)
         return Present(C, self._holding - load + C)
 
-    def mean_of(self, name: PushingForce, phase: Phase, step: Step) -> float:
-        """Return the mean of C or N over ``step`` [N] without what reverses a mismatch of velocities."""
-        tip, low = step.start
-        tip_after, low_after = step.end
-        turned = tip_after.velocity - low_after.velocity - tip.velocity + low.velocity
-        return force.mean(getattr(step, name), step.size) - self.tied_mass(phase) * turned / step.size
+    def impulse_of(self, name: PushingForce, phase: Phase, step: Step) -> float:
+        """Return the impulse of C or N over ``step`` [N·s] without what reverses a mismatch of velocities."""
+        (_, v, _, _), (_, z, _, _) = step.start
+        (_, v_after, _, _), (_, z_after, _, _) = step.end
+        applied = step.size * force.mean(getattr(step, name), step.size)
+        return applied - self.tied_mass(phase) * (v_after - z_after - v + z)
 
     def _multiplier(self, phase: Phase, time: float, macro_step: float, acting: float, *, changed: bool) -> float:
         """Return C = −μ (ü − ÿ) of joined ends [N], ü and ÿ without it; ``acting`` [N] where a body cannot tell.
