@@ -4,8 +4,7 @@
   the deflection is (1/3EI + 1/KAG)/(1 + KAG h²/12EI), h = L/10. Kelvin-Voigt damping makes the slowest motion decay
   by e^(−100) in one step of 200 s.
 * The undamped spring ÿ + k₁ y + k₂ y³ = 0 from rest at A, k₁ = 150, k₂ = 67, is back after the period 4K(μ)/ω, with
-  ω² = k₁ + k₂A², μ = k₂A²/2ω², and K the complete elliptic integral, π/2 over the arithmetic-geometric mean of 1 and
-  √(1 − μ).
+  ω² = k₁ + k₂A², μ = k₂A²/2ω², and K the complete elliptic integral.
 """
 
 from __future__ import annotations
@@ -15,6 +14,8 @@ from contextlib import closing
 from dataclasses import dataclass
 from math import pi, sqrt
 from sys import float_info
+
+from scipy.special import ellipk
 
 from ..bodies.archive import own_fmu
 from ..bodies.fmu import Fmu, Value
@@ -59,13 +60,7 @@ def _spring() -> Question:
     amplitude = 0.5
     tolerance = 1e-10
     square = linear + cubic * amplitude**2
-    larger = 1.0
-    smaller = sqrt(1.0 - cubic * amplitude**2 / (2.0 * square))
-    while larger - smaller > 4.0 * float_info.epsilon:
-        mean = 0.5 * (larger + smaller)
-        smaller = sqrt(larger * smaller)
-        larger = mean
-    period = 2.0 * pi / (larger * sqrt(square))
+    period = 4.0 * float(ellipk(cubic * amplitude**2 / (2.0 * square))) / sqrt(square)
     parameters: dict[str, Value] = {
         "mass": 1.0,
         "damping": 0.0,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from operator import attrgetter
 from typing import Any
 
@@ -46,51 +47,39 @@ class Metric:
         return f"the run has no column {', '.join(absent)}" if absent else without_peak(run, self.takes)
 
 
-def _end(column: str) -> Callable[[Trajectory], float | None]:
-    def of(run: Trajectory) -> float | None:
-        return float(run[column][-1]) if column in run.columns else None
-
-    return of
+def _end(column: str, run: Trajectory) -> Any:
+    return float(run[column][-1]) if column in run.columns else None
 
 
-def _extreme(column: str, pick: Callable[[Extremes], float]) -> Callable[[Trajectory], float | None]:
-    def of(run: Trajectory) -> float | None:
-        if column not in run.columns:
-            return None
-        if column in BODY_COLUMNS:
-            return pick(largest(run, column))
-        if run.steps is None or column not in MOTION:  # which is known at its rows only
-            return pick(Extremes.of_rows(run.time, run[column]))
-        return pick(inside(run.scene.contact.rigid, run.steps, column).extremes[column])
-
-    return of
+def _extreme(column: str, pick: Callable[[Extremes], float], run: Trajectory) -> Any:
+    if column not in run.columns:
+        return None
+    if column in BODY_COLUMNS:
+        return pick(largest(run, column))
+    if run.steps is None or column not in MOTION:  # which is known at its rows only
+        return pick(Extremes.of_rows(run.time, run[column]))
+    return pick(inside(run.scene.contact.rigid, run.steps, column).extremes[column])
 
 
 def _magnitude(found: Extremes) -> float:
     return max(found.highest, -found.lowest)
 
 
-def _first(kind: EventKind) -> Callable[[Trajectory], float | None]:
-    return lambda run: next((event.time for event in run.events if event.kind == kind), None)
+def _first(kind: EventKind, run: Trajectory) -> Any:
+    return next((event.time for event in run.events if event.kind == kind), None)
 
 
-def _number(kind: EventKind) -> Callable[[Trajectory], float | None]:
-    return lambda run: float(sum(event.kind == kind for event in run.events))
+def _number(kind: EventKind, run: Trajectory) -> Any:
+    return float(sum(event.kind == kind for event in run.events))
 
 
-def _total(name: str) -> Callable[[Trajectory], float | None]:
-    def of(run: Trajectory) -> float | None:
-        return float(run.summary[name]) if name in run.summary else None
-
-    return of
+def _total(name: str, run: Trajectory) -> Any:
+    return float(run.summary[name]) if name in run.summary else None
 
 
-def _settled(column: str) -> Callable[[Trajectory], float | None]:
-    def of(run: Trajectory) -> float | None:
-        tail = settled(run)
-        return None if tail is None or column not in run.columns else tail.amplitude(run, column)
-
-    return of
+def _settled(column: str, run: Trajectory) -> Any:
+    tail = settled(run)
+    return None if tail is None or column not in run.columns else tail.amplitude(run, column)
 
 
 def _stroboscopic(run: Trajectory) -> list[float] | None:
@@ -110,25 +99,27 @@ def _stroboscopic(run: Trajectory) -> list[float] | None:
 _UNITS = {name: column.unit for name, column in (COLUMNS | BODY_COLUMNS).items() if column.unit and name != "time"}
 
 METRICS: dict[str, Metric] = {
-    "u_tip_min": Metric("m", "lowest position of the tip", _extreme("u_tip", attrgetter("lowest"))),
-    "u_tip_max": Metric("m", "highest position of the tip", _extreme("u_tip", attrgetter("highest"))),
-    "u_tip_end": Metric("m", "the tip at the end", _end("u_tip")),
-    "y_min": Metric("m", "lowest position of the spring's top", _extreme("y", attrgetter("lowest"))),
-    "y_max": Metric("m", "highest position of the spring's top", _extreme("y", attrgetter("highest"))),
-    "y_end": Metric("m", "the spring's top at the end", _end("y")),
-    "z_max": Metric("m/s", "largest speed of the spring's top", _extreme("z", _magnitude)),
-    "gap_max": Metric("m", "largest gap", _extreme("gap", attrgetter("highest"))),
-    **{name: Metric(unit, words, _total(name)) for name, (words, unit) in TOTALS.items()},
-    **{name: Metric("J", f"energy lost by {words}", _total(name)) for name, words in LOSS_NAMES.items()},
-    "dissipated": Metric("J", "energy lost to damping", _end("e_dissipated")),
-    "impact_loss": Metric("J", "energy lost in impacts", _end("e_impact_loss")),
-    "energy_residual": Metric("", "largest change of the sum of all energies, relative", _total("max_energy_residual")),
-    "macro_steps": Metric("", "macro steps", _total("macro_steps")),
-    **{f"first_{kind}": Metric("s", f"first event {kind}", _first(kind)) for kind in EventKind},
-    **{f"number_of_{kind}": Metric("", f"events {kind}", _number(kind)) for kind in EventKind},
+    "u_tip_min": Metric("m", "lowest position of the tip", partial(_extreme, "u_tip", attrgetter("lowest"))),
+    "u_tip_max": Metric("m", "highest position of the tip", partial(_extreme, "u_tip", attrgetter("highest"))),
+    "u_tip_end": Metric("m", "the tip at the end", partial(_end, "u_tip")),
+    "y_min": Metric("m", "lowest position of the spring's top", partial(_extreme, "y", attrgetter("lowest"))),
+    "y_max": Metric("m", "highest position of the spring's top", partial(_extreme, "y", attrgetter("highest"))),
+    "y_end": Metric("m", "the spring's top at the end", partial(_end, "y")),
+    "z_max": Metric("m/s", "largest speed of the spring's top", partial(_extreme, "z", _magnitude)),
+    "gap_max": Metric("m", "largest gap", partial(_extreme, "gap", attrgetter("highest"))),
+    **{name: Metric(unit, words, partial(_total, name)) for name, (words, unit) in TOTALS.items()},
+    **{name: Metric("J", f"energy lost by {words}", partial(_total, name)) for name, words in LOSS_NAMES.items()},
+    "dissipated": Metric("J", "energy lost to damping", partial(_end, "e_dissipated")),
+    "impact_loss": Metric("J", "energy lost in impacts", partial(_end, "e_impact_loss")),
+    "energy_residual": Metric(
+        "", "largest change of the sum of all energies, relative", partial(_total, "max_energy_residual")
+    ),
+    "macro_steps": Metric("", "macro steps", partial(_total, "macro_steps")),
+    **{f"first_{kind}": Metric("s", f"first event {kind}", partial(_first, kind)) for kind in EventKind},
+    **{f"number_of_{kind}": Metric("", f"events {kind}", partial(_number, kind)) for kind in EventKind},
     **{
         f"max_{name}": Metric(
-            unit, f"largest magnitude of {name}", _extreme(name, _magnitude), asked=True, takes=(name,)
+            unit, f"largest magnitude of {name}", partial(_extreme, name, _magnitude), asked=True, takes=(name,)
         )
         for name, unit in _UNITS.items()
     },
@@ -136,7 +127,7 @@ METRICS: dict[str, Metric] = {
         f"settled_{name}": Metric(
             unit,
             f"half the range of {name} once the driven motion has settled",
-            _settled(name),
+            partial(_settled, name),
             asked=True,
             takes=(name,),
         )
