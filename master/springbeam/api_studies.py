@@ -153,5 +153,5 @@ def _carried_out(study: Study, workers: int, directory: str | Path | None, progr
 
     with nullcontext() if directory is None else Records(study, Path(directory)) as records:
         computed = study.computed(records, workers, report=report)
-    found = study.findings(computed)
-    return found.with_lines(study.remarks, troubles(computed))
+    findings = study.findings(computed)
+    return findings.with_lines(study.remarks, troubles(computed))

@@ -93,13 +93,13 @@ def _asked(name: str, version: str) -> dict[str, Any]:
 
     question = QUESTIONS[name]
     path = own_fmu(name, version)
-    found = {"path": path, "fmi": version, "answer": question.words, "exact": question.exact, "bound": question.bound}
+    answer = {"path": path, "fmi": version, "answer": question.words, "exact": question.exact, "bound": question.bound}
     try:
         error = question.ask(name, version)
     except (FmuError, StepRefused) as failure:
-        return {**found, "error": None, "passed": False, "state": str(failure)}
+        return {**answer, "error": None, "passed": False, "state": str(failure)}
     state = f"error {abs(error):.1e} of {question.exact:.6g} m (at most {question.bound:.1e}): {question.words}"
-    return {**found, "error": error, "passed": abs(error) <= question.bound, "state": state}
+    return {**answer, "error": error, "passed": abs(error) <= question.bound, "state": state}
 
 
 def _examine(scene: Scene) -> Findings:

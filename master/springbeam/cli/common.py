@@ -178,8 +178,8 @@ class Command(TyperCommand):
     def invoke(self, ctx: Any) -> None:
         with interruptible(), closed_output_reported():
             with bad_input_reported():
-                found: Findings = super().invoke(ctx)
-            say(found, quiet=ctx.params.get("quiet", False), as_json=ctx.params.get("as_json", False))
+                findings: Findings = super().invoke(ctx)
+            say(findings, quiet=ctx.params.get("quiet", False), as_json=ctx.params.get("as_json", False))
             sys.stdout.flush()
 
 
@@ -232,7 +232,7 @@ def progress(words: str, total: float | None, *, silent: bool) -> Iterator[Show]
         yield show
 
 
-def say(found: Findings, *, quiet: bool, as_json: bool) -> None:
+def say(findings: Findings, *, quiet: bool, as_json: bool) -> None:
     """Print findings of a command: one JSON document, or with ``quiet`` only the directory, or all in words.
 
     Pictures are drawn last. Ends the command with its code and error if it has any. In JSON, NaN and infinity become
@@ -241,26 +241,26 @@ def say(found: Findings, *, quiet: bool, as_json: bool) -> None:
     if as_json:
         from ..results.document import as_json as json_of
 
-        typer.echo(json_of(found.document).decode())
-    elif quiet and found.where is not None:
-        typer.echo(found.where)
+        typer.echo(json_of(findings.document).decode())
+    elif quiet and findings.where is not None:
+        typer.echo(findings.where)
     console = console_for(silent=quiet or as_json)
-    for part in found.shown:
+    for part in findings.shown:
         console.print(Text(part) if isinstance(part, str) else part)
-    _say_where(found, console)
-    if found.draw is not None:
+    _say_where(findings, console)
+    if findings.draw is not None:
         with bad_input_reported():
-            drawn = found.draw()
+            drawn = findings.draw()
         _say_where(drawn, console)
-        found = found if found.code else drawn
-    if found.error:
-        fail(found.code, found.error)
-    if found.code:
-        raise typer.Exit(found.code)
+        findings = findings if findings.code else drawn
+    if findings.error:
+        fail(findings.code, findings.error)
+    if findings.code:
+        raise typer.Exit(findings.code)
 
 
-def _say_where(found: Findings, console: Console) -> None:
-    for word, file in found.files:
+def _say_where(findings: Findings, console: Console) -> None:
+    for word, file in findings.files:
         console.print(Text(f"{word:<10}{file}" if word else str(file)), soft_wrap=True)
 
 

@@ -188,15 +188,17 @@ def compare(
         show(1, "compares")
         if measured:
             run = trajectories[0]
-            found = beside_measured(run, measured_as(runs[1], run.scene, names or (), scale or (), read or ()), shift)
+            findings = beside_measured(
+                run, measured_as(runs[1], run.scene, names or (), scale or (), read or ()), shift
+            )
         else:
-            found = beside_one_another([str(run) for run in runs], trajectories)
+            findings = beside_one_another([str(run) for run in runs], trajectories)
         if no_plots:
-            return replace(found, document={**found.document, "picture": None})
+            return replace(findings, document={**findings.document, "picture": None})
         show(2, "draws")
         out.parent.mkdir(parents=True, exist_ok=True)
-        found.pictures["comparison"]().savefig(out, dpi=_DPI)
-    return replace(found, document={**found.document, "picture": out}, files=[("picture", out)], where=out)
+        findings.pictures["comparison"]().savefig(out, dpi=_DPI)
+    return replace(findings, document={**findings.document, "picture": out}, files=[("picture", out)], where=out)
 
 
 def spectrum(
@@ -278,14 +280,14 @@ def spectrum(
         if recorded:
             show(1, "computes spectra")
             scales = by_column("scale", scale or (), "CH1=2.5 mm/V")
-            found = spectrum_of_record(
+            findings = spectrum_of_record(
                 run, of or (), low, high, quality, segments, reading_of(read or ()), scales, shocks, unit
             )
         else:
             trajectory = load_trajectory(run)
             show(1, "computes spectra")
-            found = spectra_of(trajectory, of or (), low, high, quality, since, segments, str(run), shocks)
+            findings = spectra_of(trajectory, of or (), low, high, quality, since, segments, str(run), shocks)
         show(2, "writes and draws")
         directory = out or run.with_name(f"{run.stem if recorded else run.resolve().name}-spectrum")
         directory.mkdir(parents=True, exist_ok=True)
-        return found.written(directory, pictures=not no_plots)
+        return findings.written(directory, pictures=not no_plots)

@@ -51,23 +51,23 @@ def paper(
     failed = ""
     try:
         with progress("Algorithm 1", scene.time.t_end, silent=quiet or as_json) as show:
-            made = (as_one_system if monolithic else co_simulation).algorithm_1(scene, progress=show)
+            run = (as_one_system if monolithic else co_simulation).algorithm_1(scene, progress=show)
     except AlgorithmFailure as failure:
         failed = f"the run stopped early: {failure}"
         if failure.trajectory is None:
             fail(STOPPED, failed)
-        made = failure.trajectory
-        made.summary |= {"status": "stopped", "cause": str(failure)}
+        run = failure.trajectory
+        run.summary |= {"status": "stopped", "cause": str(failure)}
     directory = _directory(Path("results") / f"paper-fig{figure}", out, force=force)
     recorder = FileRecorder(scene, directory)
-    found = carry_out(recorder, made=made, pictures=_PICTURES, no_plots=no_plots, silent=quiet or as_json)
-    solves = made.summary["iterations_per_solve"]
+    findings = carry_out(recorder, made=run, pictures=_PICTURES, no_plots=no_plots, silent=quiet or as_json)
+    solves = run.summary["iterations_per_solve"]
     printed = TABLE_2[int(figure)][0]
     line = f"Table 2   {solves:.3f} iterations per solve of (53), printed {printed:.3f}"
-    found = replace(found, shown=[*found.shown, line])
+    findings = replace(findings, shown=[*findings.shown, line])
     if failed:
-        return replace(found, code=STOPPED, error=f"{failed}; the results so far are in {directory.path}")
-    return found
+        return replace(findings, code=STOPPED, error=f"{failed}; the results so far are in {directory.path}")
+    return findings
 
 
 def _directory(default: Path, out: Path | None, *, force: bool) -> RunDirectory:

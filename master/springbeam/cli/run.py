@@ -106,8 +106,8 @@ def run(
     for line in () if quiet or as_json else implausible(what):
         typer.echo(f"warning: {line}", err=True)
     ask_if_long(what)
-    made = picked(what, silent=quiet or as_json)
-    what = what if made is None else made.scene
+    accurate = picked(what, silent=quiet or as_json)
+    what = what if accurate is None else accurate.scene
     default = Path("results") / Path(scene).stem
     if out is None and not force:
         directory = RunDirectory.create_numbered(default)
@@ -115,7 +115,7 @@ def run(
         directory = RunDirectory.create(out or default, replace=force)
     recorder = FileRecorder(what, directory, interval)
     silent = quiet or as_json
-    return carry_out(recorder, made=made, check=not no_check, no_plots=no_plots, silent=silent)
+    return carry_out(recorder, made=accurate, check=not no_check, no_plots=no_plots, silent=silent)
 
 
 def _refuse_options(scene: Scene, interval: float | None) -> None:
@@ -203,8 +203,8 @@ def carry_out(
             directory.discard()
     summary = load_summary(directory.path)
     events = load_events(directory.path)
-    found = contacts(recorder.scene, recorder.steps(), events, summary.get("contact_force_window"))
-    shown = list(_in_words(recorder.scene, summary, events, found))
+    touching = contacts(recorder.scene, recorder.steps(), events, summary.get("contact_force_window"))
+    shown = list(_in_words(recorder.scene, summary, events, touching))
     document = {"directory": directory.path, **summary}
     files = [("results", directory.path)]
     draw = None if no_plots else partial(_drawn, directory.path, pictures)
@@ -285,17 +285,17 @@ def _lines(summary: Mapping[str, Any], duration: float) -> Iterator[str]:
         interface = summary.get("max_interface_residual")
         beside = "" if interface is None else f", of the interface {float(interface):.1e}"
         yield f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}{beside}"
-    if (found := summary.get("accuracy")) is not None:
-        yield f"accuracy  {picked_in_words(found)}, after {found['pilot_runs']} runs in {found['pilot_time']:.2g} s"
-    if (said := judged_in_words(summary, duration)) is not None:
-        yield f"errors    {said}"
+    if (asked := summary.get("accuracy")) is not None:
+        yield f"accuracy  {picked_in_words(asked)}, after {asked['pilot_runs']} runs in {asked['pilot_time']:.2g} s"
+    if (errors := judged_in_words(summary, duration)) is not None:
+        yield f"errors    {errors}"
     yield from (f"warning   {warning}" for warning in summary.get("warnings", ()))
 
 
 def picked_in_words(accuracy: Mapping[str, Any]) -> str:
     """Return the accuracy and the settings found for it, from ``accuracy`` of a summary."""
-    found = accuracy["picked"]
-    return f"{accuracy['asked']:g} asked: {found['scheme']} {found['degree']}, H = {found['macro_step']:.3g} s"
+    settings = accuracy["picked"]
+    return f"{accuracy['asked']:g} asked: {settings['scheme']} {settings['degree']}, H = {settings['macro_step']:.3g} s"
 
 
 def _event_table(events: list[Event], scene: Scene) -> Table:

@@ -62,8 +62,8 @@ def keys(
     if schema:
         from ..results.document import as_json as json_of
 
-        found = messages.schema()
-        return Findings(found, files=[("", json_of(found).decode())])
+        document = messages.schema()
+        return Findings(document, files=[("", json_of(document).decode())])
     if metrics:
         from ..studies.metrics import METRICS, heading
 
@@ -134,8 +134,8 @@ def _lines(p: dict[str, Any]) -> Iterator[tuple[str, str]]:
     H = p["macro_step"]
     yield "mass", _listed(("beam {:.4g} kg", e["beam_mass"]), ("spring {:.4g} kg", e["spring_mass"]))
     if e["frequency"] is not None and p["frequencies"]:
-        found = ", ".join(f"{frequency:.4g}" for frequency in p["frequencies"])
-        yield "vibrates", f"at {found} Hz on this mesh; first without a mesh {e['frequency']:.4g} Hz"
+        frequencies = ", ".join(f"{frequency:.4g}" for frequency in p["frequencies"])
+        yield "vibrates", f"at {frequencies} Hz on this mesh; first without a mesh {e['frequency']:.4g} Hz"
     locks = e["locking"] if e["locking"] is not None and e["locking"] > _LOCKS else None
     yield (
         "stiffness",

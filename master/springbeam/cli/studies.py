@@ -98,10 +98,10 @@ def study_command(*of_workers: str) -> Callable[[Callable[..., Study | Once]], C
 
         def command(**given: Any) -> Findings:
             frame = Frame(**{name: given.pop(name) for name in shared})
-            made = make(**given)
-            if isinstance(made, Once):
-                return find(made, given["scene"], frame)
-            return carry_out(made, given.get("scene"), frame)
+            study = make(**given)
+            if isinstance(study, Once):
+                return find(study, given["scene"], frame)
+            return carry_out(study, given.get("scene"), frame)
 
         command.__name__ = make.__name__
         command.__doc__ = make.__doc__
@@ -124,11 +124,11 @@ def find(once: Once, scene: str, frame: Frame) -> Findings:
         number = count(1)
         try:
             with progress(once.announced, once.parts, silent=frame.silent) as show:
-                found = once.find(lambda: show(next(number)))
+                findings = once.find(lambda: show(next(number)))
             if frame.force:
                 for stale in directory.glob(f"{once.kind}.*"):
                     stale.unlink()
-            return found.written(directory, pictures=not frame.no_plots)
+            return findings.written(directory, pictures=not frame.no_plots)
         except (RunStopped, ReferenceFailure) as error:
             fail(STOPPED, cause_of(error, directory))
 
@@ -158,8 +158,8 @@ def carry_out(study: Study, scene: str | None, frame: Frame) -> Findings:
     records = _opened(study, study.kind if scene is None else f"{Path(scene).stem}-{study.kind}", frame)
     with _going_on(records, study):
         computed = _computed(study, records, frame)
-        found = study.findings(computed).written(records.path.parent, pictures=not frame.no_plots)
-    return found.with_lines(study.remarks, troubles(computed))
+        findings = study.findings(computed).written(records.path.parent, pictures=not frame.no_plots)
+    return findings.with_lines(study.remarks, troubles(computed))
 
 
 def _opened(study: Study, default: str, frame: Frame) -> Records:
@@ -392,14 +392,14 @@ def crosscheck(
     event_driven.refuse(what)
 
     def compare(done: Done) -> Findings:
-        made = picked(what, silent=True)
+        accurate = picked(what, silent=True)
         compared = what
-        if made is not None:
-            compared = made.scene
+        if accurate is not None:
+            compared = accurate.scene
             done()
-        found = study.crosscheck(compared, quick=quick, done=done)
-        if made is None:
-            return found
-        return replace(found, shown=[f"accuracy {picked_in_words(made.summary['accuracy'])}", *found.shown])
+        findings = study.crosscheck(compared, quick=quick, done=done)
+        if accurate is None:
+            return findings
+        return replace(findings, shown=[f"accuracy {picked_in_words(accurate.summary['accuracy'])}", *findings.shown])
 
     return Once("crosscheck", "2 runs and 2 references", PARTS + (what.accuracy is not None), compare)

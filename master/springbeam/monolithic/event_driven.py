@@ -169,12 +169,12 @@ class _Run:
                 raise ReferenceFailure(f"takes more than {self._limit:g} s; it is at t = {state.time:.6g} s")
             segment = propagator.advance(max(end - state.time, 1e-16 * self.t_end))
             self._counts["steps"] += 1
-            found = first_event(s, state.phase, watched, segment)
-            if found is None:
+            happens = first_event(s, state.phase, watched, segment)
+            if happens is None:
                 to = begin + propagator.elapsed
                 self._move(segment, end if abs(end - to) <= 1e-14 * self.t_end else to)  # but for rounding of the sum
                 continue
-            event, reach = found
+            event, reach = happens
             start = state.time
             for piece in segment.pieces(reach):
                 self._move(piece, state.time + piece.nodes[-1])
@@ -276,8 +276,8 @@ def _at_rest(s: HybridSystem) -> np.ndarray:
         def stiffness(y: float) -> float:
             return k1 + 3.0 * k2 * (y - y0) ** 2
 
-        y, found = newton(pull, p.equilibrium, stiffness, full_output=True, disp=False)
-        if found.converged and stiffness(y) > 0.0:
+        y, result = newton(pull, p.equilibrium, stiffness, full_output=True, disp=False)
+        if result.converged and stiffness(y) > 0.0:
             return max(float(y), s.stop.position) if s.scene.stop is not None else float(y)
         if s.scene.stop is not None and pull(s.stop.position) > 0.0:  # the stop pushes
             return s.stop.position
@@ -294,7 +294,8 @@ def _at_rest(s: HybridSystem) -> np.ndarray:
         while mismatch(far) * deep > 0.0:
             far *= 2.0
         C = brentq(mismatch, 0.0, far, xtol=1e-300, rtol=1e-15)
-    X[: s.r], X[s.r : s.n] = bent + b * C / k, s.root_mass * top(C)
+    X[: s.r] = bent + b * C / k
+    X[s.r : s.n] = s.root_mass * top(C)
     return X
 
 

@@ -95,7 +95,8 @@ class LinearForm:
     """
 
     def __init__(self, system: HybridSystem, phase: ReferencePhase) -> None:
-        self.system, self.phase = s, phase = system, phase
+        self.system = s = system
+        self.phase = phase
         self.unresolved = f"no step resolves the interface force in phase {phase.name}"
         (omega2, c, load) = s.oscillating(phase)
         held = s.held(phase)
@@ -131,21 +132,21 @@ class LinearForm:
 
     def ends_at(self, moved: np.ndarray) -> np.ndarray:
         """Return u and y, v and z at modes (2, k, p): (2, k, 2)."""
-        found = moved @ self.ends.T
-        found[0] += self.at
-        return np.asarray(found)
+        ends = moved @ self.ends.T
+        ends[0] += self.at
+        return np.asarray(ends)
 
     def forces(self, ends: np.ndarray) -> np.ndarray:
         """Return R: forces (k, inputs) of ends that move as `ends_at` says."""
         (u, y), (v, z) = ends.swapaxes(1, 2)
-        found = np.empty((len(u), len(self.inputs)))
+        forces = np.empty((len(u), len(self.inputs)))
         if self.of_spring:
             spring = self.system.spring
             stretched = y - spring.unloaded
-            found[:, 0] = -self.damping * z - spring.cubic_stiffness * (stretched * stretched * stretched)
+            forces[:, 0] = -self.damping * z - spring.cubic_stiffness * (stretched * stretched * stretched)
         if self.of_law:
-            found[:, -1] = self.system.law.force(y - u, z - v)
-        return found
+            forces[:, -1] = self.system.law.force(y - u, z - v)
+        return forces
 
     def _weights(self, size: float) -> tuple[StepWeights, np.ndarray, np.ndarray]:
         """Return the weights of a step, and what they make of r and of the constant.
@@ -191,7 +192,8 @@ class LinearForm:
         r = self._resolved(without, of_ends, self.forces(self.ends_at(np.array([[xi], [xi_dot]]))))
         moved += weights.forced(r, self.inputs)
         states = np.repeat(X[None], len(times), axis=0)
-        states[:, s.A], states[:, s.V] = moved[0] @ self.basis.T + self.offset, moved[1] @ self.basis.T
+        states[:, s.A] = moved[0] @ self.basis.T + self.offset
+        states[:, s.V] = moved[1] @ self.basis.T
         states[:, s.T] = times
         states[-1, s.D] += size * float(GAUSS.weights @ s.dissipation_rate(self.phase, states[:-1]))
         states[-1, s.W] += size * float(GAUSS.weights @ s.load_power(states[:-1]))

@@ -116,10 +116,10 @@ class HybridSystem:
         """Return what joins or holds the ends; the top, and the tip that is joined to it, at ``level`` [m] if given."""
         joined = self.joined(phase)
         if phase.seated or level is not None:
-            found = [self.tip] * joined + [self.top] * self.has_spring
+            constrained = [self.tip] * joined + [self.top] * self.has_spring
         else:
-            found = [self.between] * (joined and not self.alone)
-        rows = np.reshape(found, (len(found), self.n))
+            constrained = [self.between] * (joined and not self.alone)
+        rows = np.reshape(constrained, (len(constrained), self.n))
         levels = np.full(len(rows), self.stop.position * phase.seated if level is None else level)
         return Held(rows, rows / np.sum(rows**2, axis=1, keepdims=True), levels)
 
@@ -202,15 +202,17 @@ class HybridSystem:
         x = X[..., self.A]
         x_dot = X[..., self.V]
         u, _, y, _ = self.ends(phase, X)
-        kinetic, bent = 0.5 * self.inertia * x_dot**2, 0.5 * self.omega2[: self.r] * x[..., : self.r] ** 2
-        k1, k2, y0 = self.spring.linear_stiffness, self.spring.cubic_stiffness, self.spring.unloaded
-        square = (y - y0) ** 2
+        p = self.spring
+        kinetic = 0.5 * self.inertia * x_dot**2
+        bent = 0.5 * self.omega2[: self.r] * x[..., : self.r] ** 2
+        square = (y - p.unloaded) ** 2
+        spring = (0.5 * p.linear_stiffness + 0.25 * p.cubic_stiffness * square) * square
         return {
             "e_beam": np.sum(kinetic[..., : self.r] + bent, axis=-1) + self._hidden,
-            "e_spring": np.sum(kinetic[..., self.r :], axis=-1) + (0.5 * k1 + 0.25 * k2 * square) * square,
+            "e_spring": np.sum(kinetic[..., self.r :], axis=-1) + spring,
             "e_contact": self.law.potential(y - u) if self.pressed(phase) else np.zeros_like(y),
             "e_dissipated": X[..., self.D],
-            "e_load": k1 * y0 * y - x @ self.load - X[..., self.W] - 2.0 * self._hidden,
+            "e_load": p.linear_stiffness * p.unloaded * y - x @ self.load - X[..., self.W] - 2.0 * self._hidden,
         }
 
     def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
@@ -287,12 +289,12 @@ class QuasiStaticSystem(HybridSystem):
 
     def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
         """Return the noise of any pair; what the rounding of an event's time makes of a place changes the force."""
-        found = super().noise(unit, X)
+        of_pair = super().noise(unit, X)
         if unit != "N":
-            return found
+            return of_pair
         moved = NOISE * abs(float(X[self.T])) * float(np.abs(X[self.V]) @ (self.tip + self.top))
         force = NOISE * float(self.omega2[0] * abs(X[0]) + self.c[0] * abs(X[self.n]) + abs(self.load[0]))
-        return found + float(self.omega2[0]) * moved + force
+        return of_pair + float(self.omega2[0]) * moved + force
 
 
 def _statics(beam: Beam) -> tuple[float, float, float]:

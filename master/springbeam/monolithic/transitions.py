@@ -137,7 +137,9 @@ class HybridState:
         m = s.motion(self.phase, X)
         seats = e == 0.0 or 0.5 * float(m.z) ** 2 <= -float(m.z_dot) * self.seat_height()
         if seats:
-            X[s.V], e, self.phase = velocity, 0.0, ReferencePhase(contact, seated=True)
+            X[s.V] = velocity
+            e = 0.0
+            self.phase = ReferencePhase(contact, seated=True)
         s.synchronise(self.phase, X)
         on_tip = -(1.0 + e) * float(arriving.v) / s.tip_mobility if s.joined(self.phase) else 0.0
         self._emit(

@@ -115,8 +115,8 @@ class _Fmus(Bodies):
         raise AlgorithmFailure("no foundation force (line 24) found")
 
     def energies(self) -> tuple[float, float, float]:
-        found = self._beam.energies()
-        return found.kinetic + found.potential, found.dissipated, found.load_potential
+        energies = self._beam.energies()
+        return energies.kinetic + energies.potential, energies.dissipated, energies.load_potential
 
     def shape(self) -> np.ndarray:
         return self._beam.shape()

@@ -84,16 +84,16 @@ def result(
     columns |= {name: np.zeros(len(columns["time"])) for name in ("e_contact", "e_impact_loss")}
     unresolved = _not_resolved(scene)
     warnings = ["Algorithm 1 overwrites the tip's position, which changes the energy by energy_residual"]
-    found = finished(scene, columns, shapes, events, {}, EXTRA)
-    found.summary = {
+    run = finished(scene, columns, shapes, events, {}, EXTRA)
+    run.summary = {
         "status": "done",
-        "macro_steps": len(found) - 1,
+        "macro_steps": len(run) - 1,
         **summary,
-        "max_energy_residual": found.summary["largest_relative_energy_residual"],
+        "max_energy_residual": run.summary["largest_relative_energy_residual"],
         "injected_into_beam": float(columns["e_injected_beam"][-1]),
         "injected_into_spring": float(columns["e_injected_spring"][-1]),
         "resolved": unresolved is None,
         "warnings": [*warnings, *([] if unresolved is None else [unresolved])],
         "scene": scene.model_dump(exclude_none=True),
     }
-    return found
+    return run

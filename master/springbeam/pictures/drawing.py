@@ -186,7 +186,7 @@ class EventMark(NamedTuple):
 
 def event_marks(trajectory: Trajectory) -> list[EventMark]:
     """Return the events of a run by kind, thinned; kinds that did not happen are left out."""
-    found = []
+    marks = []
     for kind, look in EVENT_LOOKS.items():
         events = [event for event in trajectory.events if event.kind == kind]
         if events:
@@ -195,8 +195,8 @@ def event_marks(trajectory: Trajectory) -> list[EventMark]:
             losses = np.array([event.energy_loss for event in events])[rows]
             counted = look._replace(words=f"{look.words} ({len(events)})")
             assert look.marker is not None
-            found.append(EventMark(kind, counted, look.marker, times[rows], losses))
-    return found
+            marks.append(EventMark(kind, counted, look.marker, times[rows], losses))
+    return marks
 
 
 #: The mark of pictures of a run that is not resolved (`springbeam.run.companion`).
@@ -241,7 +241,7 @@ def shaded_phases(trajectory: Trajectory) -> list[tuple[Look, list[tuple[float, 
         words["tied"] = "tied (u = y)"
     if scene.spring is None:
         words = {name: text.replace("y", "φ") for name, text in words.items()}
-    return [(Look(PHASE_LOOKS[phase].colour, words[phase]), found) for phase, found in spans.items()]
+    return [(Look(PHASE_LOOKS[phase].colour, words[phase]), intervals) for phase, intervals in spans.items()]
 
 
 def drawable(trajectory: Trajectory) -> bool:

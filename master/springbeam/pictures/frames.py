@@ -106,10 +106,10 @@ class Sketch:
 
 def sketches(trajectory: Trajectory, frames: Frames) -> list[Sketch]:
     """Return beam and spring; once more, enlarged, a contact that is too small to be seen in that picture."""
-    found = [_sketch("motion", "Motion", trajectory, frames, (frames.low, frames.high))]
+    drawn = [_sketch("motion", "Motion", trajectory, frames, (frames.low, frames.high))]
     if contact := _contact_heights(trajectory, frames):
-        found.append(_sketch("motion-contact", "The contact, enlarged", trajectory, frames, contact, _NEAR_TIP))
-    return found
+        drawn.append(_sketch("motion-contact", "The contact, enlarged", trajectory, frames, contact, _NEAR_TIP))
+    return drawn
 
 
 def _contact_heights(trajectory: Trajectory, frames: Frames) -> tuple[float, float] | None:

@@ -98,7 +98,7 @@ def panels(trajectory: Trajectory) -> list[Panel]:
     if not drawable(trajectory):
         return []
     gap = Look(BLUE, "u(t, L) − y" if "y" in trajectory.columns else "u(t, L) − φ")
-    found = [
+    every = [
         positions(trajectory),
         enlarged(trajectory),
         Panel("velocities", "Velocities", "velocity", "m/s", _curves(trajectory, VELOCITIES)),
@@ -110,7 +110,7 @@ def panels(trajectory: Trajectory) -> list[Panel]:
         energies(trajectory),
         residual(trajectory),
     ]
-    return [panel for panel in found if panel.curves]
+    return [panel for panel in every if panel.curves]
 
 
 def positions(trajectory: Trajectory) -> Panel:
@@ -221,7 +221,7 @@ def compared(runs: Mapping[str, Trajectory]) -> list[Panel]:
 
     Impulses of impacts have panels of their own.
     """
-    found = []
+    panels = []
     for quantity, unit, columns in _COMPARED:
         panel = Panel(quantity, quantity, quantity, unit, [])
         for number, (name, run) in enumerate(runs.items()):
@@ -236,30 +236,30 @@ def compared(runs: Mapping[str, Trajectory]) -> list[Panel]:
                 else:
                     panel.curves += _curves(run, {column: look})
         if unit == "m" or _not_zero(panel.curves):
-            found.append(panel)
-    return found
+            panels.append(panel)
+    return panels
 
 
 def _curves(trajectory: Trajectory, looks: Mapping[str, Look], rows: np.ndarray | None = None) -> list[Curve]:
     """Return lines of those columns of ``looks`` that the run has, at ``rows`` or thinned."""
     time = trajectory["time"]
-    found = []
+    curves = []
     for column in present(trajectory, looks):
         values = trajectory[column]
         drawn = decimated(time, values) if rows is None else rows
-        found.append(Curve(column, looks[column], time[drawn], values[drawn]))
-    return found
+        curves.append(Curve(column, looks[column], time[drawn], values[drawn]))
+    return curves
 
 
 def _stems(trajectory: Trajectory, looks: Mapping[str, Look]) -> list[Curve]:
     """Return the impulses of events, fields of `Event`, for kinds that happened."""
-    found = []
+    stems = []
     for name, look in looks.items():
         if points := [(e.time, getattr(e, name)) for e in trajectory.events if getattr(e, name)]:
             time, values = np.array(points).T
             rows = decimated(time, values)
-            found.append(Curve(name, look, time[rows], values[rows]))
-    return found
+            stems.append(Curve(name, look, time[rows], values[rows]))
+    return stems
 
 
 def _not_zero(curves: list[Curve]) -> list[Curve]:

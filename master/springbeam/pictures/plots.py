@@ -147,9 +147,9 @@ def _later(trajectory: Trajectory, title: str, quantities: Mapping[str, tuple[st
     drawn = {what: (unit, times[some], values[since][some]) for what, (unit, values) in quantities.items()}
     figure, axes = _side_by_side(trajectory, title, drawn)
     for ax, (_, values) in zip(axes, quantities.values(), strict=True):
-        found = values[since]
-        ends = np.transpose([found.max(axis=0), found.min(axis=0)])
-        factor = readable_unit([found[some]], "").factor
+        late = values[since]
+        ends = np.transpose([late.max(axis=0), late.min(axis=0)])
+        factor = readable_unit([late[some]], "").factor
         x = length_along(trajectory.scene)[1] * SHAPE_POINTS
         ax.plot(x, factor * ends, color=BLACK, lw=0.8, ls=":")
         ax.set_title("dotted: envelope of all", **REMARK)

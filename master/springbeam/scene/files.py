@@ -23,8 +23,8 @@ def shipped_scenes() -> dict[str, Path]:
 
 def tables_of(path: Path) -> dict[str, Any]:
     """Return the content of a TOML file. Raises ValueError, RecursionError or OSError if it cannot be read."""
-    found: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    return found
+    content: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    return content
 
 
 def parse_value(text: str) -> Any:

@@ -191,8 +191,8 @@ class Contact(Table):
     def __new__(cls, *args: Any, **keys: Any) -> Self:
         """Make the table of the law that the key ``law`` names."""
         kind: type[Any] = LAWS.get(keys.get("law", LAW.default), cls) if cls is Contact else cls
-        made: Self = super().__new__(kind)
-        return made
+        contact: Self = super().__new__(kind)
+        return contact
 
     law: str
     force_window: float | None = key(

@@ -76,8 +76,8 @@ def schema() -> dict[str, Any]:
 
     It has meaning, type and range of each key alone; conditions on several keys are in `springbeam.scene.rules`.
     """
-    found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scene.model_json_schema()}
-    for described in (found, *found["$defs"].values()):
+    whole = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scene.model_json_schema()}
+    for described in (whole, *whole["$defs"].values()):
         described.pop("required", None)
         for key in described["properties"].values():
             # Left out: null, which TOML does not have, and titles, which repeat the names.
@@ -87,8 +87,8 @@ def schema() -> dict[str, Any]:
                     del key[name]
     for choice in VARIANTS.values():
         for kind in set(choice.named) - {choice.default}:  # a table without the key is the default
-            found["$defs"][choice.tables[kind].__name__]["required"] = [choice.name]
-    return found
+            whole["$defs"][choice.tables[kind].__name__]["required"] = [choice.name]
+    return whole
 
 
 def models_of(table: str) -> dict[str, type[Table]]:
@@ -103,10 +103,10 @@ def models_of(table: str) -> dict[str, type[Table]]:
 
 def keys_of(*models: type[Table]) -> dict[str, dict[str, Any]]:
     """Return the JSON Schema of each key of tables; of a key that several have, that of the first."""
-    found: dict[str, dict[str, Any]] = {}
+    keys: dict[str, dict[str, Any]] = {}
     for model in models:
-        found = {**schema()["$defs"].get(model.__name__, schema())["properties"], **found}
-    return found
+        keys = {**schema()["$defs"].get(model.__name__, schema())["properties"], **keys}
+    return keys
 
 
 def allowed(key: Mapping[str, Any]) -> str:
@@ -127,17 +127,24 @@ def _keys(table: str) -> Iterator[Key]:
     """Yield the keys of one of `MODELS`; a key that several of its tables share once."""
     model = MODELS[table]
     choice = model if isinstance(model, OneOf) else OneOf(model, "", "", {"": model}, "")
-    found: dict[Key, list[str]] = {}
+    kinds_of: dict[Key, list[str]] = {}
     for kind, one in choice.tables.items():
-        for name, said in keys_of(one).items():
+        for name, described in keys_of(one).items():
             if not table and name in MODELS:  # a table, not a key
                 continue
             if name == choice.name:
                 key = Key(table, name, "–", either(choice.named), choice.default or "needed", choice.meaning)
             else:
-                key = Key(table, name, said["unit"], allowed(said), _default(one, name, said), said["description"])
-            found.setdefault(key, []).append(kind)
-    for key, kinds in found.items():
+                key = Key(
+                    table,
+                    name,
+                    described["unit"],
+                    allowed(described),
+                    _default(one, name, described),
+                    described["description"],
+                )
+            kinds_of.setdefault(key, []).append(kind)
+    for key, kinds in kinds_of.items():
         yield key if len(kinds) == len(choice.tables) else key._replace(of=f"{choice.name} = {either(kinds)}")
 
 
@@ -219,8 +226,8 @@ def key_kind(table: str, key: str) -> type:
 
 def key_bounds(table: str, key: str) -> tuple[float, float]:
     """Return the lowest and the highest value that ``[table] key`` takes, infinite where there is no bound."""
-    said = keys_of(*models_of(table).values()).get(key, {})
-    parts = [said, *said.get("anyOf", ())]
+    described = keys_of(*models_of(table).values()).get(key, {})
+    parts = [described, *described.get("anyOf", ())]
     low = (part[name] for part in parts for name in ("minimum", "exclusiveMinimum") if name in part)
     high = (part[name] for part in parts for name in ("maximum", "exclusiveMaximum") if name in part)
     return max(low, default=-inf), min(high, default=inf)
@@ -239,17 +246,17 @@ def explain(error: Any) -> str:
         return f"[{table}] {error['msg'].removeprefix('Value error, ')}"
     there = keys_of(models_of(table)[variant]) if keys else keys_of(Scene)
     name = keys[0] if keys else table
-    said = there.get(name, {"type": "table"})
+    described = there.get(name, {"type": "table"})
     meant = ""
     if kind == "union_tag_invalid" and choice is not None:
         keys = [choice.name]
         value = value[choice.name]
-        said = {"enum": choice.named}
+        described = {"enum": choice.named}
         known = choice.elsewhere.get(re.sub(r"[\W_]", "", str(value).lower()))
         meant = f'{one_line(str(value))} is "{known}" here; ' if known else nearest(str(value).lower(), choice.named)
     if name == "parameters" and len(keys) > 1:
         keys = keys[:2]
-        said = {"type": "parameter"}
+        described = {"type": "parameter"}
     place = one_line(f"[{table}] {'.'.join(keys)}" if keys else table)
     given = f"{place} = {toml_of(value)}"
     chosen = f'{choice.name} = "{variant}"' if choice is not None and variant in choice.named else ""
@@ -259,15 +266,15 @@ def explain(error: Any) -> str:
         return _unknown(place, name, there)
     if kind == "missing":
         needed = f"{chosen} needs it; " if chosen else ""
-        otherwise = f" ({said['otherwise']})" if "otherwise" in said else ""
-        what = f"the {said['description']} [{said['unit']}]{otherwise}: " if keys else ""
-        return f"{place}: missing; {needed}give {what}{allowed(said)}"
-    return f"{given}: {GONE.get(given) or meant + 'must be ' + allowed(said)}"
+        otherwise = f" ({described['otherwise']})" if "otherwise" in described else ""
+        what = f"the {described['description']} [{described['unit']}]{otherwise}: " if keys else ""
+        return f"{place}: missing; {needed}give {what}{allowed(described)}"
+    return f"{given}: {GONE.get(given) or meant + 'must be ' + allowed(described)}"
 
 
 def _unknown(place: str, name: str, there: Iterable[str]) -> str:
-    said = GONE.get(place) or f"unknown key; {nearest(name, there)}allowed: {', '.join(there)}"
-    return f"{place}: {said}"
+    remedy = GONE.get(place) or f"unknown key; {nearest(name, there)}allowed: {', '.join(there)}"
+    return f"{place}: {remedy}"
 
 
 def nearest(name: str, candidates: Iterable[str]) -> str:

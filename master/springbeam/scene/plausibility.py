@@ -38,11 +38,11 @@ _MATERIALS = (
 
 def warnings_of(scene: Scene) -> list[str]:
     """Return warnings about values that can be run but are probably mistakes, or have no effect."""
-    found = [*implausible(scene)]
-    found += [filled(scene, text) for subject in (_spring, _beam, _without_effect) for text in subject(scene)]
+    warnings = [*implausible(scene)]
+    warnings += [filled(scene, text) for subject in (_spring, _beam, _without_effect) for text in subject(scene)]
     for number, load in enumerate(scene.loads):
-        found += [filled(scene, text, number) for text in _load(scene, load)]
-    return found
+        warnings += [filled(scene, text, number) for text in _load(scene, load)]
+    return warnings
 
 
 def implausible(scene: Scene) -> Iterator[str]:
@@ -67,8 +67,8 @@ def _improbable(beam: Beam, spring: Spring | None, end: float) -> Iterator[str]:
     for key, unit, bounds, known, other, factor in _MATERIALS:
         if _beyond(getattr(beam, key), bounds):
             meant = factor * getattr(beam, key)
-            said = "" if _beyond(meant, bounds) else f"; in {other} it would be {meant:.3g} {unit}"
-            yield f"[beam.{key}]: in {unit}, no solid has it ({known}){said}"
+            rather = "" if _beyond(meant, bounds) else f"; in {other} it would be {meant:.3g} {unit}"
+            yield f"[beam.{key}]: in {unit}, no solid has it ({known}){rather}"
     ratio = beam.young_modulus / beam.shear_modulus
     if beam.poisson_ratio is None and _beyond(ratio, _YOUNG_OVER_SHEAR):
         yield (

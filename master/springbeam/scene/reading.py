@@ -119,13 +119,13 @@ def with_changes(scene: Scene, changes: Mapping[str, Any] | None = None, /, **ta
 
 def by_table(changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return values with dotted names, as ``"spring.mass"``, in dictionaries of their tables."""
-    found: dict[str, Any] = {}
+    tables: dict[str, Any] = {}
     for name, value in changes.items():
         split = None if isinstance(value, Mapping) else split_key(name)
         table, content = (name, value) if split is None else (split[0], {split[1]: value})
-        there = found.get(table)
-        found[table] = {**there, **content} if isinstance(there, dict) and isinstance(content, Mapping) else content
-    return found
+        there = tables.get(table)
+        tables[table] = {**there, **content} if isinstance(there, dict) and isinstance(content, Mapping) else content
+    return tables
 
 
 def _apply(data: dict[str, Any], changes: Mapping[str, Any]) -> None:
@@ -149,10 +149,10 @@ def scene_from_dict(data: dict[str, Any], source: str = "scene") -> Scene:
         scene = Scene.model_validate(data)
         lines = impossible(scene)
     except ValidationError as error:
-        found = error.errors()
+        errors = error.errors()
         # A list with a bad item is too short without it: only the item is to be mended.
-        within = {one["loc"][:depth] for one in found for depth in range(len(one["loc"]))}
-        lines = list(dict.fromkeys(explain(one) for one in found if one["loc"] not in within))
+        within = {one["loc"][:depth] for one in errors for depth in range(len(one["loc"]))}
+        lines = list(dict.fromkeys(explain(one) for one in errors if one["loc"] not in within))
     if lines:
         raise SceneError("\n".join(f"{source}: {line}" for line in lines))
     return scene

@@ -95,11 +95,11 @@ class Recorded:
             head = [self._cells(lines[self._numbers[0] - 2].lstrip("# "))]
             if len(head[0]) != width or not all(map(self._is_text, head[0])):
                 head = []
-        found = [_NAME_AND_UNIT.fullmatch(cell) for cell in head[0]] if head else []
+        headings = [_NAME_AND_UNIT.fullmatch(cell) for cell in head[0]] if head else []
         #: Names of the columns, none where the file has none.
-        self.names = [name[1] for name in found if name]
+        self.names = [name[1] for name in headings if name]
         #: Their units, "" where the file has none.
-        self.units = [name[2] or name[3] or "" for name in found if name] or [""] * width
+        self.units = [name[2] or name[3] or "" for name in headings if name] or [""] * width
         if len(head) > 1:
             self.units = [cell.strip("[]()") for cell in head[1]]
         #: Names of the columns, or their numbers.
@@ -232,7 +232,7 @@ class Recorded:
 
         trouble = ""
         try:
-            found = arrow_csv.read_csv(
+            table = arrow_csv.read_csv(
                 BytesIO("\n".join(around.sub(mark, line) for line in self._table).encode()),
                 arrow_csv.ReadOptions(use_threads=False, column_names=columns),
                 arrow_csv.ParseOptions(delimiter=mark, invalid_row_handler=skip),
@@ -252,7 +252,7 @@ class Recorded:
             )
         if trouble:
             raise ValueError(self._in_words(trouble))
-        values = np.array([column.to_numpy() for column in found.columns])
+        values = np.array([column.to_numpy() for column in table.columns])
         for k, row in np.argwhere(~np.isfinite(values)).tolist():
             place = self._place(row, wanted[k])
             if np.isinf(values[k, row]):
@@ -270,14 +270,14 @@ class Recorded:
 
     def _in_words(self, trouble: str) -> str:
         """Return an error of pyarrow, which is about a cell that is no number, with its place and a remedy."""
-        found = _NO_NUMBER.search(trouble)
-        if found is None:
+        match = _NO_NUMBER.search(trouble)
+        if match is None:
             return trouble
-        place = self._place(int(found[2]) - 1, int(found[1]))
+        place = self._place(int(match[2]) - 1, int(match[1]))
         remedy = "leave the line out, or begin it with #"
-        if "," in found[3] or (self._mark == "," and " " in found[3]):
+        if "," in match[3] or (self._mark == "," and " " in match[3]):
             remedy = 'decimals have a point, or give decimal = ","'
-        return f"{place}: {found[3][:40]!r} is not a finite number; {remedy}"
+        return f"{place}: {match[3][:40]!r} is not a finite number; {remedy}"
 
     def _present(self, values: "np.ndarray") -> "np.ndarray":
         """Return ``values`` without the lines in which one is missing, if these are to be dropped."""

@@ -27,15 +27,15 @@ MOST_MACRO_STEPS = 1e12
 def impossible(scene: Scene) -> list[str]:
     """Return why ``scene`` cannot be run, as lines ``[table] key = value: reason and remedy``; empty if it can."""
     try:
-        found = [filled(scene, text) for subject in SUBJECTS for text in subject(scene)]
+        lines = [filled(scene, text) for subject in SUBJECTS for text in subject(scene)]
         for number, load in enumerate(scene.loads):
-            found += [filled(scene, text, number) for text in _load(scene, load)]
-        if not found and (scene.beam is None or _is_finite(scene.beam)):
+            lines += [filled(scene, text, number) for text in _load(scene, load)]
+        if not lines and (scene.beam is None or _is_finite(scene.beam)):
             warnings_of(scene)  # what is certain to overflow once the scene runs overflows here
             return []
     except ArithmeticError:
-        found = []
-    return found or [f"too large or too small to compute with; check the units: {_most_extreme(scene)}"]
+        lines = []
+    return lines or [f"too large or too small to compute with; check the units: {_most_extreme(scene)}"]
 
 
 def _is_finite(beam: Beam) -> bool:

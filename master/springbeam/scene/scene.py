@@ -229,5 +229,5 @@ TABLES: dict[str, type[Table]] = {
 
 def split_key(text: str) -> tuple[str, str] | None:
     """Return table and key of ``"table.key"`` or ``"loads.0.key"``; ``None`` if it is neither."""
-    found = re.fullmatch(r"\s*(loads\.\d+|[^.\s]+)\.(\S.*?)\s*", text, re.DOTALL)
-    return None if found is None else (found[1], found[2])
+    match = re.fullmatch(r"\s*(loads\.\d+|[^.\s]+)\.(\S.*?)\s*", text, re.DOTALL)
+    return None if match is None else (match[1], match[2])

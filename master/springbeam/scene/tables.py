@@ -292,23 +292,23 @@ class Beam(Table):
 
     @classmethod
     def following(cls, given: set[str], keys: Mapping[str, float]) -> dict[str, float]:
-        found = {}
+        follows = {}
         if "area" not in given:  # what is missing is the section
-            found["shear_coefficient"] = 1.0
+            follows["shear_coefficient"] = 1.0
         if {"width", "height"} <= given:
-            found["area"] = keys["width"] * keys["height"]
-            found["second_moment_of_area"] = found["area"] * keys["height"] * keys["height"] / 12.0
-            found["shear_coefficient"] = 5.0 / 6.0
+            follows["area"] = keys["width"] * keys["height"]
+            follows["second_moment_of_area"] = follows["area"] * keys["height"] * keys["height"] / 12.0
+            follows["shear_coefficient"] = 5.0 / 6.0
         if "diameter" in given:
             square = keys["diameter"] * keys["diameter"]
-            found["area"] = pi * square / 4.0
-            found["second_moment_of_area"] = pi * square * square / 64.0
-            found["shear_coefficient"] = 9.0 / 10.0
+            follows["area"] = pi * square / 4.0
+            follows["second_moment_of_area"] = pi * square * square / 64.0
+            follows["shear_coefficient"] = 9.0 / 10.0
         if "poisson_ratio" in given:
-            found["shear_modulus"] = keys["young_modulus"] / (2.0 * (abs(1.0 + keys["poisson_ratio"]) or 1.0))
+            follows["shear_modulus"] = keys["young_modulus"] / (2.0 * (abs(1.0 + keys["poisson_ratio"]) or 1.0))
         if "approach_speed" in given:
-            found["initial_velocity_slope"] = 0.0 - keys["approach_speed"] / (keys["length"] or 1.0)
-        return found
+            follows["initial_velocity_slope"] = 0.0 - keys["approach_speed"] / (keys["length"] or 1.0)
+        return follows
 
     @property
     def section_height(self) -> float:

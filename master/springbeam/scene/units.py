@@ -43,7 +43,7 @@ def _for_pint(unit: str) -> str:
     """Return ``unit`` in the syntax of pint, as a product of powers of names."""
     text = unit.translate(_RAISED)
     factors = _FACTOR.findall(text)
-    if not factors or "".join(found[0] for found in _FACTOR.finditer(text)) != text:
+    if not factors or "".join(match[0] for match in _FACTOR.finditer(text)) != text:
         raise ValueError(f"[{unit}] is no unit; write one as in [m/s^2]")
     parts = (f"{'/' if sign == '/' else '*'}{_MEANT.get(name, name)}**{power or 1}" for sign, name, power in factors)
     return "1" + "".join(parts)

@@ -46,8 +46,8 @@ def signal(run: Trajectory, text: str) -> np.ndarray:
     """
     check(text, run.columns)
     function = function_of(text)
-    found = run[text] if function is None else function(run)
-    values = np.asarray(found, dtype=float) if np.isrealobj(found) else np.empty(0)
+    given = run[text] if function is None else function(run)
+    values = np.asarray(given, dtype=float) if np.isrealobj(given) else np.empty(0)
     if values.shape != (len(run),):
         raise SceneError(f"{text}: gives no number for each of the {len(run)} rows")
     if not np.isfinite(values).all():
@@ -87,16 +87,16 @@ def function_of(text: str) -> Callable[[Trajectory], Any] | None:
     if (here := os.getcwd()) not in sys.path:
         sys.path.append(here)
     try:
-        found: Any = resolve_name(text)
+        function: Any = resolve_name(text)
     except Exception as error:
         raise SceneError(f"{text}: {_in_words(error)}") from error
-    if not callable(found):
-        raise SceneError(f"{text}: is a {type(found).__name__}, not a function of a run")
+    if not callable(function):
+        raise SceneError(f"{text}: is a {type(function).__name__}, not a function of a run")
 
-    @wraps(found)
+    @wraps(function)
     def guarded(run: Trajectory) -> Any:
         try:
-            return found(run)
+            return function(run)
         except Exception as error:
             raise SceneError(f"{text}: {_in_words(error)}") from error
 

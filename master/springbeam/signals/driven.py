@@ -46,8 +46,8 @@ class Settled(NamedTuple):
         begin = float(run.time[-1]) - _PERIODS * self.period
         if column in MOTION and run.steps is not None:
             late = run.steps[run.steps["time"] >= begin]
-            found = inside(run.scene.contact.rigid, late, column).extremes[column]
-            return 0.5 * (found.highest - found.lowest)
+            extremes = inside(run.scene.contact.rigid, late, column).extremes[column]
+            return 0.5 * (extremes.highest - extremes.lowest)
         return 0.5 * float(np.ptp(run[column][run.time >= begin]))
 
 
@@ -61,8 +61,8 @@ def poincare(run: Trajectory, period: float, start: float = 0.0) -> tuple[np.nda
 
     The point is the tip, or the spring's top where there is no beam.
     """
-    found = at_multiples(run, period, start)
-    return found.time, np.column_stack([found[name] for name in _point(run)])
+    rows = at_multiples(run, period, start)
+    return rows.time, np.column_stack([rows[name] for name in _point(run)])
 
 
 def strobe(run: Trajectory, drive: HarmonicLoad) -> float:
@@ -110,8 +110,8 @@ def settled(run: Trajectory) -> Settled | None:
     times, points = poincare(run, 1.0 / drive.frequency, strobe(run, drive))
     late = run.time >= 0.5 * (run.time[0] + run.time[-1])
     scale = np.array([float(np.ptp(run[name][late])) for name in _point(run)])
-    found = repeating(points / scale) if (scale > 0.0).all() else None
-    return None if found is None else Settled(float(times[found[0]]), 1.0 / drive.frequency, found[1])
+    repeats = repeating(points / scale) if (scale > 0.0).all() else None
+    return None if repeats is None else Settled(float(times[repeats[0]]), 1.0 / drive.frequency, repeats[1])
 
 
 def repeating(points: np.ndarray) -> tuple[int, int] | None:

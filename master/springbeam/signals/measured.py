@@ -170,8 +170,8 @@ def scale_of(name: str, text: str) -> tuple[float, str]:
     """Return number and unit of a scale, ``2.5 mm/V``. Raises SceneError if it is none."""
     number, _, unit = text.strip().partition(" ")
     with suppress(ValueError):
-        if math.isfinite(found := float(number)) and found != 0.0:
-            return found, unit.strip(" []")
+        if math.isfinite(factor := float(number)) and factor != 0.0:
+            return factor, unit.strip(" []")
     raise ArgumentError(f"--scale {name}={text}: must be a number, or one and a unit, as in CH1=2.5 mm/V")
 
 
@@ -190,13 +190,13 @@ def reading_of(texts: Sequence[str]) -> Reading:
 
 def by_column(option: str, texts: Sequence[str], example: str) -> dict[str, str]:
     """Return what ``NAME=VALUE`` texts of an option say of columns of a file. Raises SceneError for anything else."""
-    found = {}
+    values = {}
     for text in texts:
         name, _, value = (part.strip() for part in text.rpartition("="))
         if not name or not value:
             raise ArgumentError(f"--{option} {text}: must be as in {example}")
-        found[name] = value
-    return found
+        values[name] = value
+    return values
 
 
 class Aligned(NamedTuple):
@@ -287,10 +287,10 @@ def at_shift(run: Trajectory, measured: Measured, shift: float) -> Aligned:
     for what, values in measured.values.items():
         off[what] = np.full_like(values, np.nan)
         slope[what] = np.zeros_like(values)
-        found = signal(here, what)
-        off[what][covered] = found - values[covered]
+        curve = signal(here, what)
+        off[what][covered] = curve - values[covered]
         slope[what][covered] = np.divide(
-            signal(after, what) - found, width, where=width != 0.0, out=np.zeros_like(width)
+            signal(after, what) - curve, width, where=width != 0.0, out=np.zeros_like(width)
         )
     return Aligned(shift, off, slope)
 
@@ -310,8 +310,8 @@ def shifts(run: Trajectory, measured: Measured) -> list[tuple[float, float]]:
     finest = (end - begin + last - first) / _MOST
     step = max(min(float(np.median(np.diff(measured.time))), (end - begin) / _FEWEST), finest)
     times = begin + step * np.arange(int((end - begin) / step) + 1)
-    found = rows_at(run, times)
-    curves = {what: signal(found, what) for what in measured.values}
+    rows = rows_at(run, times)
+    curves = {what: signal(rows, what) for what in measured.values}
     # Each point of the measurement stands at the nearest step.
     cells = np.rint((measured.time - first) / step).astype(int)
     one = np.ones(len(times))
@@ -360,8 +360,8 @@ def correlated(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return Σ one[k + j] other[k] at all lags j from 1 − len(other) to len(one) − 1."""
     size = len(one) + len(other) - 1
     length = 1 << size.bit_length()
-    found = np.fft.irfft(np.fft.rfft(one, length) * np.conj(np.fft.rfft(other, length)), length)
-    return np.roll(found, len(other) - 1)[:size]
+    sums = np.fft.irfft(np.fft.rfft(one, length) * np.conj(np.fft.rfft(other, length)), length)
+    return np.roll(sums, len(other) - 1)[:size]
 
 
 def model(run: Trajectory, measured: Measured, shift: float = 0.0) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -370,8 +370,8 @@ def model(run: Trajectory, measured: Measured, shift: float = 0.0) -> tuple[np.n
     covered = measured.covered(run, shift)
     if covered.sum() < 2:
         raise ArgumentError(_apart(run, measured, f"with its clock moved by {shift:g} s" if shift else ""))
-    found = rows_at(run, times[covered])
-    return covered, {what: signal(found, what) for what in measured.values}
+    rows = rows_at(run, times[covered])
+    return covered, {what: signal(rows, what) for what in measured.values}
 
 
 def _apart(run: Trajectory, measured: Measured, moved: str) -> str:
@@ -387,11 +387,11 @@ def residuals(run: Trajectory, measured: Measured, shift: float = 0.0) -> list[R
     """Return the difference of the run to each measured curve, with the clock of the measurement shifted [s]."""
     covered, curves = model(run, measured, shift)
     times = measured.time[covered] + shift
-    found = []
+    rows = []
     for what, curve in curves.items():
         off = curve - measured.values[what][covered]
         left = rms(off)
         at = int(np.argmax(np.abs(off)))
         scale = float(np.std(measured.values[what][covered])) or 1.0
-        found.append(Residual(what, len(off), left, left / scale, float(abs(off[at])), float(times[at])))
-    return found
+        rows.append(Residual(what, len(off), left, left / scale, float(abs(off[at])), float(times[at])))
+    return rows

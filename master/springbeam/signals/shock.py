@@ -99,9 +99,8 @@ def _spectrum(
     if not ((frequencies > 0.0) & (frequencies * step < 0.5)).all():
         raise SceneError(f"frequencies: must lie between 0 and half the sampling rate, {0.5 / step:g} Hz")
     ends = [_extremes(begin, end, step, frequency, quality) for frequency in frequencies]
-    lowest, highest = np.transpose(ends)
-    highest, lowest = np.maximum(highest, 0.0), np.maximum(-lowest, 0.0)
-    return ShockSpectrum(frequencies, np.maximum(highest, lowest), highest, lowest)
+    negative, positive = np.maximum(np.transpose(ends) * [[-1.0], [1.0]], 0.0)
+    return ShockSpectrum(frequencies, np.maximum(positive, negative), positive, negative)
 
 
 def _extremes(begin: np.ndarray, end: np.ndarray, step: float, frequency: float, quality: float) -> tuple[float, float]:
@@ -123,16 +122,16 @@ def _extremes(begin: np.ndarray, end: np.ndarray, step: float, frequency: float,
     after = lfilter([1.0], [1.0, -decay], of_begin * begin + of_rise * rise)
     before = np.append(0.0, after[:-1])
     places = int(np.ceil(_PER_PERIOD * frequency * step))
-    found = [0.0]
+    answers = [0.0]
     for place in range(1, places + 1):
         decay, of_begin, of_rise = moved(place / places)
         answer = 2.0 * (residue * (decay * before + of_begin * begin + of_rise * rise)).real
-        found += [float(answer.min()), float(answer.max())]
+        answers += [float(answer.min()), float(answer.max())]
     # Then it swings freely, ẍ = Re(z e^{pt}), with extremes where Re(p z e^{pt}) = 0: two of each period count.
     z = 2.0 * residue * complex(after[-1])
     first = (0.5 * np.pi - np.angle(pole * z)) % np.pi / pole.imag
-    found += [(z * np.exp(pole * time)).real for time in (first, first + np.pi / pole.imag)]
-    return min(found), max(found)
+    answers += [(z * np.exp(pole * time)).real for time in (first, first + np.pi / pole.imag)]
+    return min(answers), max(answers)
 
 
 def _phi_2(x: complex) -> complex:

@@ -114,9 +114,9 @@ class Spectra:
 
     def in_words(self, unit: str = "m/s²", size: float = 1.0) -> Iterator[tuple[str, str]]:
         """Yield what is found, and how much; accelerations in a ``unit`` of a ``size`` [m/s²]."""
-        for end, found in self.shock.items():
-            at = int(np.argmax(found.maximax))
-            peak = f"{found.maximax[at] / size:.4g} {unit} at {found.frequency[at]:.4g} Hz, Q = {self.quality:g}"
+        for end, spectrum in self.shock.items():
+            at = int(np.argmax(spectrum.maximax))
+            peak = f"{spectrum.maximax[at] / size:.4g} {unit} at {spectrum.frequency[at]:.4g} Hz, Q = {self.quality:g}"
             if end in self.recorded:
                 yield f"shock of {end}", f"{peak} (record: {self.recorded[end] / size:.4g})"
             else:
@@ -182,7 +182,7 @@ def spectra(
         jumps={end: largest_jump(run, column) for end, column in ends_of(run).items()},
         power={what: power_spectrum(run, what, begin, segments) for what in wanted},
         without_peak={what: why for what in wanted if (why := without_peak(run, [what]))},
-        responses={what: found for what in wanted if (found := responses(run, what))},
+        responses={what: several for what in wanted if (several := responses(run, what))},
         points=poincare(run, 1.0 / drive.frequency, strobe(run, drive)) if drive else None,
         settled=tail,
         quality=quality,

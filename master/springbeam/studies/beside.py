@@ -48,7 +48,7 @@ def beside_one_another(names: list[str], runs: list[Trajectory]) -> Findings:
 def beside_measured(run: Trajectory, measured: Measured, shift: float | None) -> Findings:
     """Compare a run with measured curves."""
     moved = time_shift(run, measured) if shift is None else shift
-    found = residuals(run, measured, moved)
+    rows = residuals(run, measured, moved)
 
     covered, curves = model(run, measured, moved)
     time = measured.time[covered] + moved
@@ -62,12 +62,12 @@ def beside_measured(run: Trajectory, measured: Measured, shift: float | None) ->
     columns = ("curve", "points:", "rms:.4g", "of its spread:.2%", "largest:.4g", "at t [s]:.6g")
     by_what = ", found by correlation" * (shift is None)
     shown = [
-        table(columns, found),
+        table(columns, rows),
         f"shift     {moved:.6g} s{by_what}",
         *(f"{'read':<10}{note}" for note in measured.notes),
         *filter(None, [without_peak(run, measured.values)]),
     ]
-    document = {"shift": moved, "residuals": [row._asdict() for row in found], "read": measured.notes}
+    document = {"shift": moved, "residuals": [row._asdict() for row in rows], "read": measured.notes}
     draw = partial(draw_diagrams, diagrams, "", (8.2, 2.2), wide=1)
     return Findings(document, shown, pictures={"comparison": draw})
 
@@ -77,27 +77,27 @@ def differing_keys(scenes: list[Scene]) -> dict[str, list[Any]]:
     flat = [scene.flat() for scene in scenes]
     names = dict.fromkeys(name for keys in flat for name in keys)
     values = {name: [keys.get(name) for keys in flat] for name in names}
-    return {name: found for name, found in values.items() if any(value != found[0] for value in found)}
+    return {name: several for name, several in values.items() if any(value != several[0] for value in several)}
 
 
 def results_of(runs: list[Trajectory]) -> dict[str, list[Any]]:
     """Return the numbers of `springbeam.results.totals` that any of the runs has, with their units, by run."""
     units = {name: unit for name, (_, unit) in TOTALS.items()} | dict.fromkeys(LOSS_NAMES, "J")
     summaries = _over_one_window(runs)
-    found = {f"{name} [{unit}]" if unit else name: [s.get(name) for s in summaries] for name, unit in units.items()}
-    found = {name: values for name, values in found.items() if any(values)}
-    return {**found, "warnings": [len(run.summary.get("warnings", ())) for run in runs]}
+    results = {f"{name} [{unit}]" if unit else name: [s.get(name) for s in summaries] for name, unit in units.items()}
+    results = {name: values for name, values in results.items() if any(values)}
+    return {**results, "warnings": [len(run.summary.get("warnings", ())) for run in runs]}
 
 
 def errors_of(runs: list[Trajectory]) -> dict[str, list[Any]]:
     """Return the errors of `results_of` that companion runs have shown, by run; relative ones under their own names."""
     judged = [run.summary.get("errors", {}) for run in runs]
     units = {name: unit for name, (_, unit) in TOTALS.items()} | dict.fromkeys(LOSS_NAMES, "J")
-    found = {
+    bounds = {
         f"{name} [{unit}]" if unit else name: [errors.get("quantities", {}).get(name) for errors in judged]
         for name, unit in units.items()
     }
-    return found | {name: [errors.get(name) for errors in judged] for name in WORDS}
+    return bounds | {name: [errors.get(name) for errors in judged] for name in WORDS}
 
 
 def _over_one_window(runs: list[Trajectory]) -> list[dict[str, Any]]:

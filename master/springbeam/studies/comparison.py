@@ -81,17 +81,17 @@ def compare(scene: Scene, done: Done = unseen) -> Row:
     RunStopped, ReferenceFailure
         If either stops early.
     """
-    found: Row = {"verdict": "differs", "from": scene.contact_time or 0.0, "t_end": scene.time.t_end, "growth": 1.0}
-    found |= {"quantities": [], "events": [], "notes": [], "scene": scene.model_dump(exclude_none=True)}
-    runs = _beside_event_driven(scene, found, done)
-    found["runs"] = {
+    record: Row = {"verdict": "differs", "from": scene.contact_time or 0.0, "t_end": scene.time.t_end, "growth": 1.0}
+    record |= {"quantities": [], "events": [], "notes": [], "scene": scene.model_dump(exclude_none=True)}
+    runs = _beside_event_driven(scene, record, done)
+    record["runs"] = {
         name: Trajectory(scene, {column: run[column] for column in present(run, _DRAWN)}, run.events)
         for name, run in zip(("co-simulation", "reference"), runs, strict=False)
     }
-    if all(row["passed"] for row in (*found["quantities"], *found["events"])):
-        whole = found["horizon"] >= scene.time.t_end * (1.0 - 1e-12)
-        found["verdict"] = "agrees" if found["quantities"] and whole else "not comparable"
-    return found
+    if all(row["passed"] for row in (*record["quantities"], *record["events"])):
+        whole = record["horizon"] >= scene.time.t_end * (1.0 - 1e-12)
+        record["verdict"] = "agrees" if record["quantities"] and whole else "not comparable"
+    return record
 
 
 def errors_judged(name: str, times: np.ndarray, error: np.ndarray, changed: np.ndarray, floor: np.ndarray) -> Row:
@@ -105,7 +105,7 @@ def errors_judged(name: str, times: np.ndarray, error: np.ndarray, changed: np.n
     }  # fmt: skip
 
 
-def _beside_event_driven(scene: Scene, found: Row, done: Done) -> tuple[Trajectory, ...]:
+def _beside_event_driven(scene: Scene, record: Row, done: Done) -> tuple[Trajectory, ...]:
     """Compare a run with the event-driven reference, by bounds from its companion."""
     event_driven.refuse(scene)
     run = run_in_memory(scene)
@@ -114,29 +114,29 @@ def _beside_event_driven(scene: Scene, found: Row, done: Done) -> tuple[Trajecto
     run = checked.judged_run()
     companion = checked.companion
     done()
-    found["horizon"] = found["from"]
+    record["horizon"] = record["from"]
     if companion is not None and checked.resolved:
-        found["horizon"] = _same_story_until(run, companion)
-    if companion is None or found["horizon"] <= found["from"]:
-        said = [warning for warning in run.summary["warnings"] if warning.startswith(NOT_RESOLVED)]
-        found["notes"] += said or [f"{NOT_RESOLVED}: longer steps change the motion from the first contact on"]
+        record["horizon"] = _same_story_until(run, companion)
+    if companion is None or record["horizon"] <= record["from"]:
+        unresolved = [warning for warning in run.summary["warnings"] if warning.startswith(NOT_RESOLVED)]
+        record["notes"] += unresolved or [f"{NOT_RESOLVED}: longer steps change the motion from the first contact on"]
         return ()
     times = macro_points(scene)
     reference, moved = reference_and_perturbed(scene, times, done)
-    _judge(found, [run, companion], reference, moved)
-    if not all(row["passed"] for row in (*found["quantities"], *found["events"])):
+    _judge(record, [run, companion], reference, moved)
+    if not all(row["passed"] for row in (*record["quantities"], *record["events"])):
         finer = run_in_memory(with_changes(scene, coupling={"macro_step": 0.25 * scene.coupling.H}))
-        found["horizon"] = min(found["horizon"], _same_story_until(run, finer))
-        _judge(found, [run, companion, finer], reference, moved)
-    if not found["quantities"]:
-        found["notes"].append(
-            f"Nothing could be compared: another change of contact comes first, from t = {found['horizon']:.9g} s on, "
+        record["horizon"] = min(record["horizon"], _same_story_until(run, finer))
+        _judge(record, [run, companion, finer], reference, moved)
+    if not record["quantities"]:
+        record["notes"].append(
+            f"Nothing could be compared: another change of contact comes first, from t = {record['horizon']:.9g} s on, "
             "if the initial velocity changes a little; begin with another velocity, or at a distance"
         )
     return run, reference
 
 
-def _judge(found: Row, runs: list[Trajectory], reference: Trajectory, moved: Trajectory) -> None:
+def _judge(record: Row, runs: list[Trajectory], reference: Trajectory, moved: Trajectory) -> None:
     """Judge the first of ``runs`` against ``reference``, by its largest difference from the others.
 
     ``moved`` is the perturbed reference. The results replace those in ``found``, up to whose horizon they are.
@@ -146,10 +146,10 @@ def _judge(found: Row, runs: list[Trajectory], reference: Trajectory, moved: Tra
     size = scene.coupling.H
     times = macro_points(scene)
     of_reference, of_moved, *of_runs = (contact_changes(run, SHORT * size) for run in (reference, moved, *runs))
-    stable = _agree_until(of_reference, of_moved, found["from"], float(judged_run.time[-1]))
-    found["horizon"] = min(found["horizon"], stable)
-    found |= {"growth": 1.0, "quantities": [], "events": []}
-    before = times <= found["horizon"]
+    stable = _agree_until(of_reference, of_moved, record["from"], float(judged_run.time[-1]))
+    record["horizon"] = min(record["horizon"], stable)
+    record |= {"growth": 1.0, "quantities": [], "events": []}
+    before = times <= record["horizon"]
     # A jump at slightly different times is an event error, judged there.
     jumps = [event.time for run in (*runs, reference) for event in run.events]
     away = away_from(
@@ -166,12 +166,12 @@ def _judge(found: Row, runs: list[Trajectory], reference: Trajectory, moved: Tra
         values = values[:, good]
         exact = reference[name][good]
         growth = np.maximum(1.0, np.maximum.accumulate(np.abs(moved[name][good] - exact) / (PERTURBATION * scale)))
-        found["growth"] = max(found["growth"], float(growth[-1]))
+        record["growth"] = max(record["growth"], float(growth[-1]))
         floor = _step_error(scene) * (np.flatnonzero(good) + 1.0) + _SAFETY * _rounding(scene, name)
         changed = (_FACTORS[: len(runs) - 1] * _known_next(np.abs(values[1:] - values[0]))).max(axis=0)
         judged = errors_judged(name, times[good], np.abs(values[0] - exact), changed, floor * growth * scale)
-        found["quantities"].append(judged)
-    _compare_events(scene, found, of_runs, of_reference)
+        record["quantities"].append(judged)
+    _compare_events(scene, record, of_runs, of_reference)
 
 
 def _known_next(values: np.ndarray) -> np.ndarray:
@@ -216,15 +216,15 @@ def _agree_until(first: list[ContactChange], second: list[ContactChange], start:
 
 
 def _compare_events(
-    scene: Scene, found: Row, of_runs: list[list[ContactChange]], reference: list[ContactChange]
+    scene: Scene, record: Row, of_runs: list[list[ContactChange]], reference: list[ContactChange]
 ) -> None:
     size = scene.coupling.H
-    start = found["from"]
+    start = record["from"]
     found_changes = of_runs[0]
     moved = 0.0
-    for i, (kind, time) in enumerate(change for change in reference if change.time <= found["horizon"]):
+    for i, (kind, time) in enumerate(change for change in reference if change.time <= record["horizon"]):
         row: dict[str, Any] = {"kind": kind, "time": None, "reference": time, "bound": 0.0, "passed": False}
-        found["events"].append(row)
+        record["events"].append(row)
         if i >= len(found_changes) or found_changes[i].kind != kind:
             return
         ours = found_changes[i].time
@@ -232,7 +232,7 @@ def _compare_events(
         moved = max([moved, *(_FACTORS[: len(known) - 1, 0] * np.abs(np.subtract(known[1:], known[0]))).tolist()])
         steps = (time - start) / size + 1.0
         # The unit of time in which the state changes as a whole is what the events so far have taken.
-        bound = _SAFETY * moved + _step_error(scene) * steps * found["growth"] * max(time - start, size)
+        bound = _SAFETY * moved + _step_error(scene) * steps * record["growth"] * max(time - start, size)
         row |= {"time": ours, "bound": bound, "passed": abs(ours - time) <= bound}
 
 
@@ -298,9 +298,9 @@ def sample(run: Trajectory, times: np.ndarray, *, rows: bool = False) -> dict[st
     nearest = there[np.searchsorted(there, times - 1e-9 * H).clip(max=len(there) - 1)]  # what is known at rows alone
     on_row = np.abs(nearest - times) <= 1e-9 * H
     wanted = np.where(on_row, nearest, times)
-    found = rows_at(run, np.minimum(wanted, there[-1]))
+    columns = rows_at(run, np.minimum(wanted, there[-1]))
     known = wanted <= there[-1]
     return {
-        name: np.where(known & (on_row | (not rows) | (name in _CURVES)), found[name], np.nan)
+        name: np.where(known & (on_row | (not rows) | (name in _CURVES)), columns[name], np.nan)
         for name in quantities(run.scene)
     }

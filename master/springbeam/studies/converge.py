@@ -110,8 +110,8 @@ def converge(scene: Scene, *, levels: int = 4, metric: Sequence[str] = (), done:
         record = measured(partial(with_keys, scene, mesh), metrics, judge=not rows)
         rows[name] = {**mesh, **record, "cost_wall_time": perf_counter() - began}
         done()
-    found = judged(scene, list(rows.values()), metric)
-    return replace(found, shown=[*found.shown, *troubles(rows)])
+    findings = judged(scene, list(rows.values()), metric)
+    return replace(findings, shown=[*findings.shown, *troubles(rows)])
 
 
 def meshes(scene: Scene, levels: int) -> dict[str, Row]:
@@ -124,12 +124,12 @@ def meshes(scene: Scene, levels: int) -> dict[str, Row]:
     if beam is None or scene.massless:
         raise SceneError("[beam]: the scene has no mesh to refine")
     more = [_RATIO**k for k in range(levels)]
-    found = [("elements", beam.n_elements * k, beam.n_modes) for k in more]
+    refinements = [("elements", beam.n_elements * k, beam.n_modes) for k in more]
     if beam.integrator == "modal" and beam.modes_kept >= more[-1]:
         fewer = [beam.modes_kept // k for k in more[:0:-1]]
-        found += [("modes", beam.n_elements, n_modes) for n_modes in (*fewer, beam.n_modes)]
+        refinements += [("modes", beam.n_elements, n_modes) for n_modes in (*fewer, beam.n_modes)]
     cases = {}
-    for refined, elements, modes in found:
+    for refined, elements, modes in refinements:
         keys = {"beam.n_elements": elements, "beam.n_modes": modes}
         mesh = with_keys(scene, keys).beam
         assert mesh is not None
@@ -146,7 +146,7 @@ def judged(scene: Scene, rows: Sequence[Row], metric: Sequence[str] = ()) -> Fin
     """
     beam = scene.beam
     document = dict[str, Any]()
-    made = list[Row]()
+    table_rows = list[Row]()
     diagrams = list[Diagram]()
     shown: list[Any] = [Text(scene.title or "(untitled scene)", style="bold")]
     given = rows[0]
@@ -155,10 +155,10 @@ def judged(scene: Scene, rows: Sequence[Row], metric: Sequence[str] = ()) -> Fin
         mine = list(several)
         sizes = [row["beam.n_elements" if refined == "elements" else "unknowns"] for row in mine]
         complete = refined == "modes" and beam is not None and beam.modes_kept == beam.unknowns
-        found = {name: extrapolated([row[name] for row in mine], sizes, complete=complete) for name in names}
-        document[refined] = {"levels": mine, "settled": {name: s._asdict() for name, s in found.items()}}
+        settled = {name: extrapolated([row[name] for row in mine], sizes, complete=complete) for name in names}
+        document[refined] = {"levels": mine, "settled": {name: s._asdict() for name, s in settled.items()}}
         columns = ("", "as given:.6g", "extrapolated:.6g", "error:.1e", "order:.1f")
-        cells = [(heading(name), given[name], s.limit, _error(given[name], s), s.order) for name, s in found.items()]
+        cells = [(heading(name), given[name], s.limit, _error(given[name], s), s.order) for name, s in settled.items()]
         shown.append(table(columns, cells, f"more {refined}"))
         meshes = (f"{row['beam.n_elements']} el. {row['unknowns']} modes {row['cost_wall_time']:.2g} s" for row in mine)
         shown.append(f"runs      {', '.join(meshes)}")
@@ -166,15 +166,15 @@ def judged(scene: Scene, rows: Sequence[Row], metric: Sequence[str] = ()) -> Fin
         labels = "unknowns of the beam", "distance from the limit, relative"
         diagrams.append(Diagram(*labels, curves, f"more {refined}"))
         for row in mine:
-            errors = {name: difference(row[name], s.limit) for name, s in found.items()}
-            made.append(row | {f"error_{name}": error for name, error in errors.items()})
+            errors = {name: difference(row[name], s.limit) for name, s in settled.items()}
+            table_rows.append(row | {f"error_{name}": error for name, error in errors.items()})
             for name, error in errors.items():
-                share = abs((error or 0.0) / (found[name].limit or 1.0))
+                share = abs((error or 0.0) / (settled[name].limit or 1.0))
                 if share > _ROUNDING:
                     curves[heading(name)].append((row["unknowns"], share))
     shown.append("error: of the run as given; in brackets the last change, where the values show no limit")
     draw = partial(draw_diagrams, diagrams, f"{scene.title}: convergence with the mesh")
-    return Findings(document, shown, tables={"converge": made}, pictures={"converge": draw})
+    return Findings(document, shown, tables={"converge": table_rows}, pictures={"converge": draw})
 
 
 def _error(given: float | None, found: Extrapolated) -> float | str | None:

@@ -52,7 +52,7 @@ def crosscheck(scene: Scene, *, quick: bool = False, done: Done = unseen) -> Fin
     over = " over the whole run" * (verdict == "not comparable")
     looks = {"agrees": "bold green", "differs": "bold red", "not comparable": "bold"}
     shown.append(Text(f"{verdict}{over}", style=looks[verdict]))
-    summary = {name: found for name, found in record.items() if name != "runs"}
+    summary = {name: value for name, value in record.items() if name != "runs"}
     pictures = {"crosscheck": partial(_drawn, record["runs"])} if record["runs"] else {}
     tables = {"crosscheck": record["quantities"]}
     return Findings(summary, shown, code=CODES[verdict], tables=tables, pictures=pictures)

@@ -76,17 +76,17 @@ def record_all(
     FmuError
         If an FMU cannot be loaded.
     """
-    found = dict(known or {})
-    todo = {name: case for name, case in cases.items() if name not in found}
+    records = dict(known or {})
+    todo = {name: case for name, case in cases.items() if name not in records}
     with closing(_computed(todo, measure, workers, cluster)) as computed:
         for name, made in computed:
             if made is None:
-                found[name] = lost("its worker process died: an FMU has crashed, or memory ran out")
+                records[name] = lost("its worker process died: an FMU has crashed, or memory ran out")
             else:
-                found[name] = from_json(to_json(made, inf_nan_mode="null", fallback=lambda value: value.tolist()))
-                keep(name, found[name])
-            report(found[name])
-    return {name: found[name] for name in cases}
+                records[name] = from_json(to_json(made, inf_nan_mode="null", fallback=lambda value: value.tolist()))
+                keep(name, records[name])
+            report(records[name])
+    return {name: records[name] for name in cases}
 
 
 def _computed(

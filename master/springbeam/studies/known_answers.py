@@ -39,8 +39,8 @@ class Question:
         """Return the error [m] of our FMU ``name``. Raises FmuError, or StepRefused."""
         with closing(Fmu(name, own_fmu(name, version), self.parameters, 0.0)) as fmu:
             port = Port(fmu, (self.input,), (), (self.output,), repeats=False)
-            (found,) = port.step((0.0, self.size, self.given, 0.0, 0.0))
-        return found - self.exact
+            (answer,) = port.step((0.0, self.size, self.given, 0.0, 0.0))
+        return answer - self.exact
 
 
 def _beam() -> Question:

@@ -91,8 +91,8 @@ def _stroboscopic(run: Trajectory) -> list[float] | None:
     tail = settled(run)
     late = max(begin + _TRANSIENT * (end - begin), begin if tail is None else tail.since)
     times, points = poincare(run, 1.0 / load.frequency, load.start)
-    found: list[float] = points[times >= late, 0].tolist()
-    return found
+    places: list[float] = points[times >= late, 0].tolist()
+    return places
 
 
 #: Columns with a unit, whose largest magnitudes are metrics.
@@ -158,10 +158,10 @@ def metrics_of(texts: Sequence[str], *, several: bool = False) -> dict[str, Metr
 
     Raises SceneError if one is unknown, is named twice, or is ``several`` numbers where it may not be.
     """
-    found: dict[str, Metric] = {}
+    metrics: dict[str, Metric] = {}
     for text in texts:
         name, separator, what = (part.strip() for part in text.partition("="))
-        if name in found:
+        if name in metrics:
             raise ArgumentError(f"--metric {name}: given twice")
         if separator and name in METRICS:
             raise ArgumentError(f"--metric {text}: {name} is a metric already; give yours another name")
@@ -170,10 +170,10 @@ def metrics_of(texts: Sequence[str], *, several: bool = False) -> dict[str, Metr
                 f"--metric {text}: unknown; {nearest(text, METRICS)}allowed: {', '.join(METRICS)}, and your own, as in "
                 "shock=module:function"
             )
-        found[name] = METRICS[name] if name in METRICS else _own(name, what)
-        if found[name].several and not several:
+        metrics[name] = METRICS[name] if name in METRICS else _own(name, what)
+        if metrics[name].several and not several:
             raise ArgumentError(f"--metric {name}: is several numbers of a run; springbeam sweep keeps and draws them")
-    return found
+    return metrics
 
 
 def _own(name: str, what: str) -> Metric:
@@ -187,12 +187,12 @@ def _own(name: str, what: str) -> Metric:
         )
 
     def of(run: Trajectory) -> float | None:
-        found = function(run)
-        if found is None:
+        number = function(run)
+        if number is None:
             return None
-        if np.size(found) != 1 or not np.isrealobj(found):
-            raise ArgumentError(f"--metric {name}={what}: gives {np.size(found)} values; a metric is one real number")
-        return float(np.asarray(found, dtype=float).item())
+        if np.size(number) != 1 or not np.isrealobj(number):
+            raise ArgumentError(f"--metric {name}={what}: gives {np.size(number)} values; a metric is one real number")
+        return float(np.asarray(number, dtype=float).item())
 
     return Metric("", what, of)
 

@@ -73,10 +73,10 @@ def readable(rows: Rows, units: Mapping[str, str]) -> tuple[Rows, dict[str, str]
     for name, unit in units.items():
         values = [row[name] for row in singly(rows, name)]
         numbers = [value for value in values if isinstance(value, (int, float)) and np.isfinite(value)]
-        found = readable_unit([np.array(numbers)], unit) if numbers and unit in _PREFIXED else Unit(1.0, unit)
-        headings[name] = f"{name} [{found.name}]" if unit not in ("", "–") else name
-        if found.factor != 1.0:
-            factors[name] = found.factor
+        prefixed = readable_unit([np.array(numbers)], unit) if numbers and unit in _PREFIXED else Unit(1.0, unit)
+        headings[name] = f"{name} [{prefixed.name}]" if unit not in ("", "–") else name
+        if prefixed.factor != 1.0:
+            factors[name] = prefixed.factor
 
     def scaled(value: Any, factor: float) -> Any:
         if isinstance(value, list):
@@ -144,11 +144,11 @@ def _panel(
 def cells(ax: Axes, rows: Rows, x: Scale, y: Scale, values: np.ndarray, **look: Any) -> ScalarMappable:
     """Draw the values of a full grid over two axes as cells."""
     (across, columns), (up, lines) = (scale.places([row[scale.name] for row in rows]) for scale in (x, y))
-    found = values[np.lexsort((across, up))].reshape(len(lines), len(columns))
+    grid = values[np.lexsort((across, up))].reshape(len(lines), len(columns))
     borders = (_borders(np.unique(places), scale.log) for places, scale in ((across, x), (up, y)))
     x.mark(ax.xaxis, columns)
     y.mark(ax.yaxis, lines)
-    return ax.pcolormesh(*borders, found, **look)
+    return ax.pcolormesh(*borders, grid, **look)
 
 
 def _borders(values: np.ndarray, log: bool) -> np.ndarray:

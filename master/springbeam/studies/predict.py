@@ -76,7 +76,7 @@ def predict(scene: Scene) -> dict[str, Any]:
     modal = None
     pair = None
     names = ("omega_1", "omega_max", "tip_mass", "slow_modes", "modes", "static_shapes", "contact_frequency")
-    found: dict[str, Any] = {
+    prediction: dict[str, Any] = {
         "estimates": _estimates(scene),
         "frequencies": [],
         "macro_step": H,
@@ -99,8 +99,8 @@ def predict(scene: Scene) -> dict[str, Any]:
         slow = int(np.sum(modal.omega[:kept] * H <= _SLOW))
         frequencies = modal.omega / (2.0 * math.pi)
         ends = (float(modal.omega[0]), float(modal.omega[-1]), 1.0 / modal.inverse_tip_mass)
-        found |= dict(zip(names, (*ends, slow, kept, len(modal.omega) - kept), strict=False))
-        found["frequencies"] = frequencies[:3].tolist()
+        prediction |= dict(zip(names, (*ends, slow, kept, len(modal.omega) - kept), strict=False))
+        prediction["frequencies"] = frequencies[:3].tolist()
         if reduced is not beam:
             notes.append(f"predicted with the lowest {MOST_MODES} modes of the beam")
         if beam.integrator == "midpoint":
@@ -108,12 +108,12 @@ def predict(scene: Scene) -> dict[str, Any]:
     if modal is not None:
         pair = linear_pair(scene, modal)
     if pair is not None:
-        found["contact_frequency"] = pair.contact_frequency if pair.soft else None
+        prediction["contact_frequency"] = pair.contact_frequency if pair.soft else None
         scheme = scene.coupling.scheme
         degree = scene.degree
         # The scheme energy is stable at any H.
         if scene.coupling.exchanges:
-            found["exchange"] = {
+            prediction["exchange"] = {
                 "scheme": scheme,
                 "degree": degree,
                 "spectral_radius": spectral_radius(pair, scheme, degree, H),
@@ -122,7 +122,7 @@ def predict(scene: Scene) -> dict[str, Any]:
             }
     elif not notes:
         notes.append("nothing to couple: a scene with one body and no stop under its tip")
-    return found | {"notes": notes}
+    return prediction | {"notes": notes}
 
 
 def cost_of(scene: Scene) -> dict[str, float | None]:

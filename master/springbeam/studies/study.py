@@ -199,12 +199,12 @@ def measured(at: Callable[[], Scene], metrics: Mapping[str, Metric], *, judge: b
     """
     row: Row = {"status": "done", "error": "", "warnings": "", **dict.fromkeys(metrics)}
     try:
-        found = checked(at()) if judge else None
-        run = simulate(at(), check=False) if found is None else found.judged_run()
+        judged = checked(at()) if judge else None
+        run = simulate(at(), check=False) if judged is None else judged.judged_run()
         numbers = {name: metric(run) for name, metric in metrics.items()}
-        if found is not None and found.companion is not None:
+        if judged is not None and judged.companion is not None:
             for name, metric in metrics.items():
-                numbers |= _error(name, metric, found)
+                numbers |= _error(name, metric, judged)
         lacking = dict.fromkeys(metric.lacking(run) for metric in metrics.values())
     except SceneError as refused:
         row |= {"status": "refused", "error": str(refused)}
@@ -226,13 +226,13 @@ def _error(name: str, metric: Metric, found: Check) -> Row:
 
 def troubles(records: Mapping[str, Row]) -> list[str]:
     """Return in how many cases there were errors, and warnings, with the first of each."""
-    found = []
+    lines = []
     for kind in ("error", "warnings"):
-        said = [(name, record[kind]) for name, record in records.items() if record.get(kind)]
-        if said:
-            name, text = said[0]
-            found.append(f"{kind:<10}in {len(said)} cases, first in {name}: {text.splitlines()[0]}")
-    return found
+        troubled = [(name, record[kind]) for name, record in records.items() if record.get(kind)]
+        if troubled:
+            name, text = troubled[0]
+            lines.append(f"{kind:<10}in {len(troubled)} cases, first in {name}: {text.splitlines()[0]}")
+    return lines
 
 
 def _fingerprints(scene: Scene) -> dict[str, str]:
@@ -240,11 +240,11 @@ def _fingerprints(scene: Scene) -> dict[str, str]:
     files = {path.name: path for path in map(own_fmu, scene.fmus)}
     files |= {spec.fmu: Path(spec.fmu) for spec in scene.foreign.values()}
     files |= {load.file: Path(load.file) for load in scene.loads if isinstance(load, TableLoad)}
-    found = {}
+    digests = {}
     for name, path in files.items():
         try:
-            found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
+            digests[name] = hashlib.sha256(path.read_bytes()).hexdigest()
         except OSError as error:
             remedy = "; ./build.sh fmus builds it" if path.parent == fmu_directory() else ""
             raise FmuError(f"{path}: {error.strerror}{remedy}") from error
-    return found
+    return digests

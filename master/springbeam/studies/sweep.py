@@ -119,5 +119,5 @@ class Sweep(Study):
 
 
 def _varies(values: np.ndarray) -> bool:
-    found = values[np.isfinite(values)]
-    return found.size > 1 and bool(np.ptp(found) > _ROUNDING * np.abs(found).max())
+    finite = values[np.isfinite(values)]
+    return finite.size > 1 and bool(np.ptp(finite) > _ROUNDING * np.abs(finite).max())

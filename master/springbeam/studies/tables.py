@@ -103,7 +103,7 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = ""
 
     What stands behind the colon is the format of floating-point numbers, as in ``error [m]:.1e``.
     """
-    made = Table(box=None, pad_edge=False, header_style="bold", title=title or None, title_justify="left")
+    shown = Table(box=None, pad_edge=False, header_style="bold", title=title or None, title_justify="left")
     forms = []
     rows = list(rows)
     for number, column in enumerate(columns):
@@ -111,11 +111,11 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = ""
         # Names are not cut: other columns wrap.
         name = not colon and all(len(str(row[number])) <= _NAME and " " not in str(row[number]) for row in rows)
         justify: Literal["left", "right"] = "right" if colon else "left"
-        made.add_column(Text(heading if colon else column), justify=justify, overflow="fold", no_wrap=name)
+        shown.add_column(Text(heading if colon else column), justify=justify, overflow="fold", no_wrap=name)
         forms.append(form)
     for row in rows:
-        made.add_row(*(Text(in_words(value, form)) for value, form in zip(row, forms, strict=True)))
-    return made
+        shown.add_row(*(Text(in_words(value, form)) for value, form in zip(row, forms, strict=True)))
+    return shown
 
 
 def in_words(value: Any, form: str) -> str:
@@ -152,7 +152,7 @@ def write_parquet(path: Path, rows: Sequence[Row]) -> Path:
     import pyarrow.parquet
     from pydantic_core import to_json
 
-    found = pa.table({})
+    content = pa.table({})
     if rows:
         lines = [to_json(row, inf_nan_mode="constants", fallback=lambda value: value.tolist()) for row in rows]
         names = _names(rows)
@@ -160,8 +160,8 @@ def write_parquet(path: Path, rows: Sequence[Row]) -> Path:
         texts = [(name, pa.string()) for name in names if any(isinstance(value, str) for value in given[name])]
         empty = [(name, pa.float64()) for name in names if not given[name]]
         as_given = pa.json.ParseOptions(explicit_schema=pa.schema([*texts, *empty]))
-        found = pa.json.read_json(BytesIO(b"\n".join(lines)), parse_options=as_given).select(names)
-    pa.parquet.write_table(found, path)
+        content = pa.json.read_json(BytesIO(b"\n".join(lines)), parse_options=as_given).select(names)
+    pa.parquet.write_table(content, path)
     return path
 
 

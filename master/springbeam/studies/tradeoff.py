@@ -111,14 +111,14 @@ class Tradeoff(Study):
         """Run, time and judge a configuration: ``cost_wall_time`` [s] is the median of ``times``, without set-up."""
         began = perf_counter()
         times = list[float]()
-        found = Row()
+        measures = Row()
         try:
             while not times or (len(times) < self.repeats and not self.quick and times[-1] <= _TIMED_ONCE):
-                found = self._measured(case)
-                times.append(found["cost_wall_time"])
+                measures = self._measured(case)
+                times.append(measures["cost_wall_time"])
         except (event_driven.ReferenceFailure, RunStopped) as failed:
             return {"status": "stopped", "error": str(failed), "cost_wall_time": perf_counter() - began}
-        return {"status": "done", "error": "", **found, "cost_wall_time": statistics.median(times), "times": times}
+        return {"status": "done", "error": "", **measures, "cost_wall_time": statistics.median(times), "times": times}
 
     def _measured(self, case: Row) -> Row:
         limit = _LIMIT
@@ -195,11 +195,11 @@ class Tradeoff(Study):
 def errors(run: Trajectory, exact: Trajectory) -> Row:
     """Return the `distance` of a run from the exact one, that of the times in seconds, and the energy residual."""
     span = float(np.ptp(exact.time))
-    found = distance(run, exact, SHORT_SHARE * span)
+    apart = distance(run, exact, SHORT_SHARE * span)
     return {
-        "error_motion": found.motion,
-        "error_event_time": found.times * span,
-        "error_impulse": found.impulses,
+        "error_motion": apart.motion,
+        "error_event_time": apart.times * span,
+        "error_impulse": apart.impulses,
         "error_energy": float(run.summary["max_energy_residual"]),
     }
 
@@ -220,11 +220,11 @@ def cheapest(rows: Sequence[Row]) -> list[Row | None]:
 
     A configuration counts if all finer ones of its family keep the error too: not by luck.
     """
-    found: list[Row | None] = []
+    best: list[Row | None] = []
     for target in TARGETS:
         kept = [row for k, row in enumerate(rows) if row["status"] == "done" and _kept(rows[k:], row["family"], target)]
-        found.append(min(kept, key=lambda row: row["cost_wall_time"], default=None))
-    return found
+        best.append(min(kept, key=lambda row: row["cost_wall_time"], default=None))
+    return best
 
 
 def _kept(rows: Iterable[Row], family: str, target: float) -> bool:

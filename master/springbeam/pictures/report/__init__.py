@@ -108,15 +108,15 @@ def page(trajectory: Trajectory) -> str:
 def _warnings(trajectory: Trajectory) -> list[str]:
     """Return warnings for the reader, the most severe first."""
     summary = trajectory.summary
-    found = []
+    warnings = []
     status = summary.get("status", "done")
     if status == "running":
-        found.append("The run is not finished: it was still running when this page was made, or it was killed.")
+        warnings.append("The run is not finished: it was still running when this page was made, or it was killed.")
     elif status != "done":
         when = f" at t = {summary['time']:.9g} s" if isinstance(summary.get("time"), float) else ""
-        found.append(f"The run was {status}{when}: {summary.get('cause', 'cause unknown')}")
-    found += [str(warning) for warning in summary.get("warnings", ())]
-    return found
+        warnings.append(f"The run was {status}{when}: {summary.get('cause', 'cause unknown')}")
+    warnings += [str(warning) for warning in summary.get("warnings", ())]
+    return warnings
 
 
 def _glossary(trajectory: Trajectory) -> Iterator[tuple[str, str]]:

@@ -234,8 +234,8 @@ class Search:
             before = np.inf
             for _ in range(_TRIALS):
                 row = self._run(self.at + step, self.row["shift"] + float(moved @ step))
-                found = self._residual(self.at + step)
-                size = float(np.linalg.norm(found))
+                residual = self._residual(self.at + step)
+                size = float(np.linalg.norm(residual))
                 if size < np.linalg.norm(left):
                     self.at = self.at + step
                     self.row = row
@@ -244,7 +244,7 @@ class Search:
                 if row["error"] or size > 0.5 * before:
                     break
                 before = size
-                step = self._step(slopes, found - foreseen - slopes @ step)
+                step = self._step(slopes, residual - foreseen - slopes @ step)
             self._reach = 0.25 * min(length, self._reach)
         return False
 

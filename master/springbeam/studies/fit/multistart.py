@@ -100,7 +100,7 @@ class MultiStart:
         begun = list[Search]()
         looked = list[Search]()
         chosen = list[Search]()
-        found: Found | None = None
+        best: Found | None = None
         done = 0
         for until, looks in zip(STARTS, _LOOKS, strict=True):
             begun += [search for at in starts[done:until] if (search := self._begun(at)) is not None]
@@ -114,10 +114,10 @@ class MultiStart:
             chosen += first + second
             done = until
             if looked:
-                found = self._judged(looked)
-                if found.ended and not any(map(no_noise, found.left.values())):
+                best = self._judged(looked)
+                if best.ended and not any(map(no_noise, best.left.values())):
                     break
-        return found and found._replace(ended=found.ended and len(self._made) <= most(len(self._names)))
+        return best and best._replace(ended=best.ended and len(self._made) <= most(len(self._names)))
 
     def _trial(self, case: Row) -> Row:
         if not case.keys() & _JUDGES:
@@ -160,17 +160,17 @@ class MultiStart:
 
         def starts(searches: Sequence[Search]) -> list[tuple[float, float, Search]]:
             """Return mean squares, shifts away from those taken, and searches, the best first."""
-            found = [(square, shift, search) for search in searches for shift, square in search.row["ranked"]]
-            return sorted((one for one in found if _far(one[1], taken, away)), key=lambda one: one[0])
+            others = [(square, shift, search) for search in searches for shift, square in search.row["ranked"]]
+            return sorted((one for one in others if _far(one[1], taken, away)), key=lambda one: one[0])
 
         promising = [one for one in starts(begun) if one[0] <= _PROMISING * best.cost]
-        found = list[Search]()
+        others = list[Search]()
         for _, shift, search in [*starts([last])[:1], *promising]:
-            if len(found) < _SHIFTS and _far(shift, taken, away):
+            if len(others) < _SHIFTS and _far(shift, taken, away):
                 taken.append(shift)
                 other = self._begun(search.at, {"near": shift, "step": search.row["step"]})
-                found += [other] if other is not None else []
-        return found
+                others += [other] if other is not None else []
+        return others
 
     def _judged(self, looked: Sequence[Search]) -> Found:
         """Go on with the best of searches and with those that may end as well; return the evidence for the best.
@@ -242,14 +242,14 @@ class MultiStart:
         """Return the values at a minimum, with intervals of a half width unless that is infinite."""
         width = np.nan_to_num(half[: len(self._names)], posinf=0.0)
         values, *ends = (self._ranges.values(best.at + side * width) for side in (0.0, -1.0, 1.0))
-        found = [(value, *sorted(end[name] for end in ends)) for name, value in values.items()]
+        intervals = [(value, *sorted(end[name] for end in ends)) for name, value in values.items()]
         names = [*self._names]
         if self._free:
             names.append(SHIFT)
-            found.append((best.shift, best.shift - half[-1], best.shift + half[-1]))
+            intervals.append((best.shift, best.shift - half[-1], best.shift + half[-1]))
         return [
             {"key": name, "value": value, "low": low if known else None, "high": high if known else None}
-            for name, (value, low, high), known in zip(names, found, np.isfinite(half), strict=True)
+            for name, (value, low, high), known in zip(names, intervals, np.isfinite(half), strict=True)
         ]
 
     def _beside_noise(self, best: Minimum, name: str, left: Left) -> Left:

@@ -30,13 +30,13 @@ class Ranges:
     @classmethod
     def parse(cls, texts: Sequence[str]) -> Ranges:
         """Read ``KEY=GUESS`` or ``KEY=LOW:HIGH`` each. Raises SceneError if they cannot be fitted."""
-        found = dict[str, tuple[float, float]]()
+        ranges = dict[str, tuple[float, float]]()
         for text in texts:
             axis = parse_axis(text)
             key = split_key(axis.name)
             if key is None or key_kind(*key) is not float:
                 raise ArgumentError(f"--vary {axis.name}: takes no real numbers, and cannot be fitted")
-            if axis.name in found:
+            if axis.name in ranges:
                 raise ArgumentError(f"--vary {axis.name}: given twice")
             low, high = (axis.low, axis.high) if not axis.values else (min(axis.values), max(axis.values))
             if len(axis.values) > 1 or low * high <= 0.0:
@@ -49,10 +49,10 @@ class Ranges:
                 ends = sorted((low / _RANGE, low * _RANGE))
                 # A guess that is not allowed itself is refused with the scene.
                 low, high = (max(ends[0], least), min(ends[1], most)) if least <= low <= most else ends
-            found[axis.name] = (min(low, high), max(low, high))
-        if not found:
+            ranges[axis.name] = (min(low, high), max(low, high))
+        if not ranges:
             raise ArgumentError("--vary: nothing varies; give at least one KEY=GUESS")
-        return cls(found)
+        return cls(ranges)
 
     @property
     def limits(self) -> tuple[np.ndarray, np.ndarray]:

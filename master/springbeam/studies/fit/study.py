@@ -148,13 +148,13 @@ class Fit(Study):
         begins: Row = {}
         if "clock" in case:
             here = at_shift(run, data, near)
-            found = settled(run, data, here, slice(*case["points"]), (lowest, highest))
+            aligned = settled(run, data, here, slice(*case["points"]), (lowest, highest))
         else:
-            found, begins = self._begun(run, data, case)
-        left = {f"left_{name}": rms(off) for name, off in found.off.items()}
+            aligned, begins = self._begun(run, data, case)
+        left = {f"left_{name}": rms(off) for name, off in aligned.off.items()}
         step = None if self.scene.accuracy is None else run.scene.coupling.H
-        curves = {"off": found.off, "slope": found.slope}
-        return {**keys, SHIFT: found.shift, **left, "error": "", "step": step, **curves, **begins}
+        curves = {"off": aligned.off, "slope": aligned.slope}
+        return {**keys, SHIFT: aligned.shift, **left, "error": "", "step": step, **curves, **begins}
 
     def _begun(self, run: Trajectory, data: Measured, case: Row) -> tuple[Aligned, Row]:
         """Return both at the best shift of the clock, and what a search from there takes.
@@ -172,8 +172,8 @@ class Fit(Study):
             room = (float(run.time[0] - data.time[first]), float(run.time[-1] - data.time[last - 1]))
         quarter = 0.25 * period(here.slope, data)
         limits = (max(room[0], here.shift - quarter), min(room[1], here.shift + quarter))
-        found = settled(run, data, here, slice(first, last), limits)
-        return found, {"points": (first, last), "room": room, "ranked": ranked}
+        aligned = settled(run, data, here, slice(first, last), limits)
+        return aligned, {"points": (first, last), "room": room, "ranked": ranked}
 
     def _run(self, case: Row, last: float) -> Trajectory:
         """Return the run of a case, at least up to the time ``last`` [s] if that is in it.

@@ -124,5 +124,5 @@ def remembered(off: np.ndarray) -> float:
 
 def _autocorrelation(off: np.ndarray) -> np.ndarray:
     centred = off - off.mean()
-    found = correlated(centred, centred)[len(off) - 1 :]
-    return np.asarray(found / max(float(found[0]), 1e-300))
+    sums = correlated(centred, centred)[len(off) - 1 :]
+    return np.asarray(sums / max(float(sums[0]), 1e-300))
