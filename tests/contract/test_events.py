@@ -126,15 +126,3 @@ def test_event_mode_takes_inputs_and_no_parameters(spring):
     assert k.get("acceleration") == -1.5
     assert k.access("SetFloat64", spring.references("mass"), 1, (ct.c_double * 1)(4.0)) != OK
     assert "'mass' can only be set before the end of initialization mode" in k.message
-
-
-def test_a_top_that_starts_at_rest_rests_before_its_first_step(spring):
-    """No event follows: it was in free fall until the first step, which set it down without one."""
-    k = spring.instance(events=True, early=True).start(**{**FALLING, "displacement": -0.1, "velocity": 0.0})
-    flags = [ct.byref(ct.c_bool(True)) for _ in range(5)]
-    assert k.call("UpdateDiscreteStates", *flags, ct.byref(ct.c_double())) == OK
-    assert k.get("seated", "acceleration") == [1.0, 0.0]
-    assert k.call("EnterStepMode") == OK
-    k.step(0.0, 0.2)
-    assert told(k) == (False, False, False)
-    assert k.get("seated", "displacement") == [1.0, -0.1]

@@ -102,23 +102,6 @@ def test_contact_force_is_ignored_by_the_law_inside(spring):
     assert plain.outputs() == pressed.outputs()
 
 
-DAMPED_LAW = {"contact_law": 2, "compliance_stiffness": 100.0, "compliance_exponent": 1.0, "compliance_damping": 0.5}
-
-
-def test_derivatives_of_inputs_are_seen_as_soon_as_they_are_set(spring):
-    """C = k δ (1 + χ δ̇) with k = 100 N/m, χ = 0.5 s/m, δ = 0.05 m; the tip of velocity 1 and acceleration −3."""
-    k = spring.running(**DAMPED_LAW, displacement=0.1, tip_displacement=0.05)
-    assert k.get("reaction") == pytest.approx(5.0)
-    k.derive("tip_displacement", 1, 1.0)
-    force = k.get("reaction")
-    assert force == pytest.approx(5.0 * (1.0 - 0.5))
-    k.derive("tip_displacement", 2, -3.0)
-    rise = -1.0  # of the depth
-    acceleration = -(0.1 + force) + 3.0
-    rate = 100.0 * rise * (1.0 + 0.5 * rise) + 5.0 * 0.5 * acceleration
-    assert k.derivative("reaction") == pytest.approx(rate)
-
-
 @pytest.mark.parametrize("arrives", ["tip_displacement", "tip_velocity", "tip_velocity_forecast", "tip_response"])
 def test_a_tip_that_arrives_where_there_is_no_law_is_told(spring, arrives):
     k = spring.running(**{arrives: 0.1})

@@ -124,6 +124,7 @@ def test_pair_that_looks_ahead_conserves_energy(beam, spring, body, stiffness):
         _, y, energy = pair.run(0.2)
         energy += -body.get("external_force", 0.0) * y
         assert energy == pytest.approx(before, abs=2e-12)  # IDA's 1e-12, of 1/6 J
+        assert warnings(pair) == []
 
 
 @pytest.mark.parametrize(
@@ -302,20 +303,6 @@ def test_start_values_replace_a_first_exchange(beam, spring):
     assert warnings(other) == []
 
 
-@pytest.mark.parametrize("version", ["2.0"])
-@pytest.mark.parametrize("slope", [-1.0, 0.0])
-@pytest.mark.parametrize(
-    "load", [lambda t: 0.0, lambda t: -300.0 * (t > 0.05), lambda t: -3.0 * np.sin(40 * t)], ids=["none", "jump", "sin"]
-)
-def test_a_right_pair_is_not_warned_of_its_loads(beam, spring, load, slope):
-    pair = Pair(beam, spring, 1e-3).start(initial_velocity_slope=slope)
-    for i in range(100):
-        pair.beam.set("distributed_load", load(i * pair.size))
-        pair.run(pair.time + pair.size)
-    assert warnings(pair) == []
-    assert [k.get("warnings") for k in (pair.beam, pair.spring)] == [0, 0]
-
-
 #: A light top on a coarse beam, in steps that are long beside the waves in it.
 LIGHT = {"mass": 0.01, "linear_stiffness": 1.0, "compliance_stiffness": 100.0, "compliance_exponent": 1.0}
 
@@ -346,7 +333,7 @@ def test_the_system_file_says_what_the_scene_and_the_fmus_say(fmu_folder, beam, 
     assert float(parameters["spring.stop_position"]) == scene.stop.position
     assert {tuple(c.attrib.values()) for c in structure.iter("{*}Connection")} == CONNECTIONS
     # OMSimulator imports no file without it.
-    assert beam.version == "3.0" or any(structure.iter("{*}FixedStepMaster"))
+    assert beam.version == "3.0" or structure.find(".//{*}FixedStepMaster") is not None
 
 
 @pytest.mark.parametrize("version", ["3.0"])

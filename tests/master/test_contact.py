@@ -6,7 +6,6 @@ import pytest
 from bodies import interface_of
 
 from springbeam import Motion, load_scene, with_changes
-from springbeam.contact.impacts import foundation_impact, meeting
 from springbeam.contact.phases import Automaton, Instant, Joint, Phase
 from springbeam.motion.events import EventKind
 from springbeam.scene.laws import Compliance, KelvinVoigt, Link, depth
@@ -20,28 +19,6 @@ def automaton_of(scene="soft", tip_mass=0.01, mass=1.0, equilibrium=0.0, **table
 def instant(phase, ends, contact=0.0, tolerance=1e-17, start=None, elapsed=0.0):
     """Where an event happens in a run whose largest speed so far is 3 m/s."""
     return Instant(phase, ends, start or ends, elapsed, contact, tolerance, tolerance, 3.0)
-
-
-@pytest.mark.parametrize(("kind", "v"), [(EventKind.RELEASE, 3.0), (EventKind.SEPARATION, -3.0)])
-def test_ends_that_part_have_one_velocity(kind, v):
-    """That of their momentum."""
-    z = 0.5
-    tip_mass = 0.01
-    mass = 1.0
-    ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, z, 0.0, 0.0)
-    _, phase, impact = automaton_of().after(kind, instant(Phase(Joint.TIED), ends))
-    assert phase.joint is Joint.FREE
-    v_after = v + impact.on_beam / tip_mass
-    z_after = z + impact.on_spring / mass
-    assert v_after == pytest.approx(z_after, rel=1e-14)
-    assert tip_mass * v_after + mass * z_after == pytest.approx(tip_mass * v + mass * z, rel=1e-14)
-
-
-@pytest.mark.parametrize("impact", [meeting(-1.0, 0.4, 0.3, 1.2), foundation_impact(-1.0, 0.4, 0.3, 1.2, 0.3)])
-def test_an_impact_loses_the_kinetic_energy_that_it_takes(impact):
-    after = -1.0 + impact.on_beam / 0.3, 0.4 + impact.on_spring / 1.2
-    taken = 0.15 * (1.0 - after[0] ** 2) + 0.6 * (0.16 - after[1] ** 2)
-    assert impact.energy_loss == pytest.approx(taken, rel=1e-14)
 
 
 @pytest.mark.parametrize(("kind", "mass"), [("separation", inf), ("separation", 1.0), ("unseated", 1.0)])

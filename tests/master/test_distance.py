@@ -10,21 +10,9 @@ from springbeam import load_scene, simulate, with_changes
 from springbeam.motion.events import Event, EventKind
 from springbeam.results.contact_changes import contact_changes
 from springbeam.results.distance import apart, distance, motion
-from springbeam.results.records import joined
-from springbeam.results.spans import FLOOR, ROUNDING, rounding_of, span
+from springbeam.results.spans import FLOOR, ROUNDING, span
 
 TIMES = np.linspace(0.0, 1.0, 11)
-
-
-@pytest.mark.parametrize(("y_off", "u_off", "found"), [(0.02, 0.0, 0.01), (0.0, 0.02, 0.02), (0.02, 0.02, 0.02)])
-def test_the_motion_is_that_of_the_worse_end_over_its_largest_change(y_off, u_off, found):
-    """The ends begin at 5 m; the top moves 2 m, the tip 1 m."""
-    exact = {"y": 5.0 + 2.0 * TIMES, "u_tip": 5.0 - TIMES}
-    bump = np.eye(11)[5]
-    run = {"y": exact["y"] + y_off * bump, "u_tip": exact["u_tip"] - u_off * bump}
-    assert motion(run, exact) == pytest.approx(found)
-    assert motion({"y": run["y"]}, exact) == pytest.approx(0.5 * y_off)  # what is not in both is not compared
-    assert motion({}, exact) == np.inf
 
 
 def test_a_range_has_a_floor_and_differences_within_rounding_are_none():
@@ -75,45 +63,6 @@ def test_curves_are_compared_between_the_rows_too_and_the_peaks_of_a_soft_force(
     times = np.linspace(0.0, 0.05, 2001)
     assert found.motion == pytest.approx(motion(coarse.at(times).columns, fine.at(times).columns), rel=0.05)
     assert found.motion > 1.2 * motion(coarse.at(coarse.time).columns, fine.at(coarse.time).columns)
-
-
-def test_a_tip_that_loads_hold_is_judged_by_the_deflection_of_its_beam():
-    """Its row is made 0: 1e-13 m is the whole of what it moves, and next to nothing of what the beam does."""
-    run = simulate(load_scene("soft", ["time.t_end=0.02", "beam.n_elements=4"]))
-    rounding = rounding_of(run)
-    assert rounding >= ROUNDING * np.abs(run.shapes[1]).max()
-    columns = {"time": run.time, "phase": run.phase, "u_tip": np.zeros(len(run))}
-    still = replace(run, columns=columns, steps=None)
-    columns["u_tip"][-1] = -1e-13
-    off = np.abs(run.u_tip - columns["u_tip"]).max()
-    assert distance(run, still, 0.0).motion == pytest.approx((off - rounding) / (FLOOR * rounding))
-
-
-def test_a_top_stays_on_the_foundation_when_the_tip_leaves_it():
-    """A spring that 50 N press onto the foundation, until the end of the run, and a beam that bounces on it.
-
-    When the tip first parted, the rest on the foundation ended with it, and the last opening was lost.
-    """
-    run = simulate(
-        with_changes(
-            load_scene("soft"),
-            beam={"n_elements": 4},
-            spring={"external_force": -50.0, "damping": 20.0},
-            stop={"position": -0.002, "restitution": 0.0},
-            contact={"law": "compliance", "stiffness": 1e3, "exponent": 1.0},
-            coupling={"macro_step": 1e-3, "degree": 2},
-            time={"t_end": 0.6},
-        )
-    )
-    seated = run.time[run.phase == "seated"]
-    assert (run.phase[-1], joined(run.steps[-1:])[0]) == ("seated", False)
-    changes = contact_changes(run, 1e-3)
-    without_steps = replace(run, steps=None)  # as of a reference
-    assert contact_changes(without_steps, 1e-3) == changes
-    on_foundation = [change for change in changes if change.kind in ("strikes", "leaves")]
-    assert [(change.kind, change.time) for change in on_foundation[-1:]] == [("strikes", seated[0])]
-    opened = [event.time for event in run.events if event.kind in ("separation", "release")]
-    assert [change.time for change in changes if change.kind == "opens"][-1] == opened[-1]
 
 
 def test_a_rest_on_the_foundation_begins_and_ends():

@@ -8,7 +8,6 @@ import pytest
 from scipy.optimize import brentq
 
 from springbeam import simulate
-from springbeam.bodies.elements import MovingWall
 from springbeam.scene import scene_from_dict
 from springbeam.scene.loads import SIGNALS
 
@@ -120,18 +119,3 @@ def test_the_change_of_a_signal_is_its_derivative(signal):
     h = 1e-5
     by_difference = (load.value(t + h) - load.value(t - h)) / (2.0 * h)
     assert load.change(t) == pytest.approx(by_difference, rel=1e-6, abs=1e-4)
-
-
-def test_its_motion_over_a_step_is_that_of_the_signal():
-    """y = A sin ωt about 0.5 m: end, speed and both integrals over [t, t + h]; the force on it does work, not more."""
-    wall = MovingWall(
-        0.5, [SIGNALS["harmonic"](on="wall", amplitude=A, frequency=OMEGA / (2.0 * pi), signal="harmonic")]
-    )
-    t, h = 0.0, 0.07
-    w, v, once, twice = wall.advance(t, h, (3.0, 0.0, 0.0))
-    end = OMEGA * h
-    assert w == pytest.approx(0.5 + A * sin(end), rel=1e-14)
-    assert v == pytest.approx(A * OMEGA * cos(end), rel=1e-9)
-    assert once == pytest.approx(0.5 * h + A * (1.0 - cos(end)) / OMEGA, rel=1e-13)
-    assert twice == pytest.approx(0.25 * h**2 + A * (h - sin(end) / OMEGA) / OMEGA, rel=1e-13)
-    assert wall.energies().load_potential == pytest.approx(3.0 * A * sin(end), rel=1e-12)

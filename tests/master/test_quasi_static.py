@@ -44,26 +44,6 @@ def test_statics_are_those_of_a_mesh_that_holds_them():
     assert statics.tip_inertia(BEAM) == pytest.approx(shape @ d.M @ shape, rel=1e-12)
 
 
-@pytest.mark.parametrize("alpha", [1e-3, 4.0])
-def test_let_go_it_relaxes_exponentially(alpha):
-    rest = statics.tip_load_deflection(BEAM)
-    size = 0.5
-    beam = QuasiStaticBeam(BEAM.model_copy(update={"alpha_b": alpha}), 0, 0.1, 0.0)
-    arm = BEAM.length * (1.0 - SHAPE_POINTS)
-    shear, moment = statics.load_forces(BEAM, arm)
-    held = (0.1 - rest) / statics.tip_compliance(BEAM)
-    assert beam.shape()[21:] == pytest.approx([*(moment + held * arm), *(shear + held)], rel=1e-12)
-    beam.release()
-    w0, w = (0.1 - rest) * np.exp([0.0, -size / alpha])
-    once = alpha * (w0 - w)
-    expected = (rest + w, -w / alpha, rest * size + once, 0.5 * rest * size**2 + alpha * (w0 * size - once))
-    end = beam.advance_alone(0.0, size)
-    assert end == pytest.approx(expected, rel=1e-12)
-    # Nothing holds it, and what it feels are its loads.
-    assert beam.holding_force(*end[:2]) == pytest.approx(0.0, abs=1e-12)
-    assert beam.shape()[21:] == pytest.approx([*moment, *shear], abs=1e-12)
-
-
 # -- the pair -------------------------------------------------------------------------------------------------------
 
 

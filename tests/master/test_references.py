@@ -8,7 +8,7 @@ from exact.alone import clamped_free_frequencies
 from scenes import kinds, soft
 
 from springbeam.monolithic import event_driven
-from springbeam.monolithic.semi_discrete import assemble, modal_beam
+from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam, with_changes
 
 
@@ -88,21 +88,6 @@ def test_the_order_of_the_frequencies_is_twice_the_degree(degree, n, reduced):
     # Of higher degrees the errors of the lowest modes are rounding, those of the highest not small yet.
     judged = orders if degree == 1 else orders[2:4]
     assert np.all(np.abs(judged - 2 * degree) < 0.08 * degree)
-
-
-@pytest.mark.parametrize("n_modes", [1, 8])
-def test_a_beam_of_few_modes_starts_and_answers_static_forces_as_that_of_all(n_modes):
-    """Three shapes beside the modes: those of a tip force and of a uniform load, and the start u = x."""
-    given = beam(4.0, 9.0, n_elements=30, n_modes=n_modes, distributed_load=-2.0)
-    few = modal_beam(given)
-    every = modal_beam(given.model_copy(update={"n_modes": 0}))
-    assert len(few.omega) == n_modes + 3
-    shears = beam(1e14, 9.0, n_elements=30, n_modes=n_modes)  # u = x is what a tip force makes of it
-    assert len(modal_beam(shears).omega) == n_modes + 2
-    for force in ("tip", "load"):
-        expected, found = (m.basis @ (getattr(m, force) / m.omega**2) for m in (every, few))
-        np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
-    np.testing.assert_allclose(few.basis @ few.slope_shape, assemble(given).slope_shape, atol=1e-12)
 
 
 @pytest.mark.parametrize(("metre", "second"), [(1e-9, 1.0), (1.0, 1e-9), (1e3, 1.0)])

@@ -154,20 +154,6 @@ def test_a_simulation_gives_its_fmus_back_once_and_steps_no_more():
 # -- in a notebook --------------------------------------------------------------------------------------------------
 
 
-def test_keys_have_dotted_names_wherever_a_scene_is_changed(here):
-    changes = {"spring.mass": 2.0, "time.t_end": 0.01}
-    loaded = load_scene("soft", changes)
-    assert loaded == with_changes(load_scene("soft"), changes) == with_changes(load_scene("soft"), **changes)
-    assert loaded == load_scene("soft", ["spring.mass=2.0", "time.t_end=0.01"])
-    assert (loaded.spring.mass, loaded.time.t_end) == (2.0, 0.01)
-    again = with_changes(loaded, {"spring.damping": 0.5}, spring={"mass": 3.0}, stop=None)
-    assert (again.spring.mass, again.spring.damping, again.stop) == (3.0, 0.5, None)
-    shaken = with_changes(load_scene("vibro-impact"), {"loads.0.frequency": 7.0})
-    assert shaken.loads[0].frequency == 7.0
-    flat = {"time.t_end": 0.01, "spring.mass": 1.0, "spring.linear_stiffness": 3.0, "spring.equilibrium": 0.1}
-    assert simulate(flat).scene.spring.equilibrium == 0.1
-
-
 def test_a_dataset_has_each_time_once_and_both_sides_of_an_impact():
     run = simulate(with_changes(SOFT, {"time.t_end": 0.16}))
     dataset = run.to_xarray()

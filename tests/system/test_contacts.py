@@ -53,22 +53,6 @@ def test_the_peak_of_a_link_is_that_of_its_law():
     assert run.contacts == []
 
 
-def test_a_damped_peak_that_is_not_at_the_deepest_place():
-    """λ p (1 + χ ṗ), χ v = 1880: m v̇ = −λ χ p v, so that the force has its largest value (2/3)^1.5 v √(m λ χ v)."""
-    v = 12.53
-    law = {"law": "compliance", "stiffness": 1e6, "exponent": 1.0, "damping": 150.0}
-    run = simulate(
-        {"time": {"t_end": 1e-3}, "spring": {"element": "rigid_wall"}}
-        | {"beam": {"element": "point_mass", "mass": MASS, "velocity": -v}}
-        | {"contact": law, "coupling": {"macro_step": 5e-7}}
-    )
-    peak = (2.0 / 3.0) ** 1.5 * v * np.sqrt(MASS * law["stiffness"] * law["damping"] * v)
-    # Beside the damping force the elastic one is 1/1880.
-    assert run.summary["contact_force_max"] == pytest.approx(peak, rel=2e-3)
-    (said,) = run.summary["warnings"]
-    assert "the damping force is 1.88e+03 times the elastic one" in said
-
-
 def test_an_impact_on_a_stop_has_no_length():
     """The impulse (1 + e) m v, a mean over the window; ½ m v² (1 − e²) is lost."""
     run = simulate({

@@ -5,7 +5,7 @@ import pytest
 import scenes
 from references import reference
 
-from springbeam import load_scene, simulate, with_changes
+from springbeam import simulate, with_changes
 from springbeam.studies.metrics import METRICS
 
 #: The rounding of forces that follow from accelerations: ε (ω_max/ω₁)² is 2e-12 of the beam.
@@ -53,30 +53,6 @@ def test_the_clamp_bears_what_loads_a_beam_at_rest(name, simulated):
     run = simulated(scenes.named(f"clamped/{name}"))
     for row in (0, -1):
         assert (run.clamp_force[row], run.clamp_moment[row]) == pytest.approx((-force, -moment), rel=1e-10)
-
-
-#: No contact.
-ALONE = {"spring": None, "stop": None}
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"contact": {"law": "link", "stiffness": 1e4, "damping": 300.0}},
-        {"loads": [{"on": "beam", "at": 0.4, "amplitude": -3.0}, {"on": "base", "amplitude": 2.0}]} | ALONE,
-        {"loads": [{"on": "tip", "signal": "harmonic", "frequency": 9.0, "phase": 2.0}]} | ALONE,
-    ],
-)
-@pytest.mark.parametrize("integrator", ["modal", "midpoint"])
-def test_what_acts_at_the_start_is_in_the_first_row(changes, integrator):
-    """Tip and clamp were those of a beam without it. The damper of the link acts since the spring does not move yet."""
-    beam = {"n_elements": 5, "integrator": integrator}
-    scene = with_changes(load_scene("soft"), beam=beam, time={"t_end": 1e-3}, coupling={"macro_step": 1e-3})
-    scene = with_changes(scene, **changes)
-    run = simulate(scene)
-    exact = reference(scene, sample_times=[0.0, 1e-3])
-    for name in ("a_tip", "clamp_force", "clamp_moment"):
-        assert run[name][0] == pytest.approx(exact[name][0], abs=ROUNDING * np.abs(exact[name]).max())
 
 
 @pytest.mark.parametrize(("steps", "most", "rows_miss"), [(60, 4e-3, 0.015), (40, 0.025, 0.04)])

@@ -1,6 +1,5 @@
 """An accuracy asked for is kept: judged by the monolithic reference, on scenes that are not shipped."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,7 @@ from judge import ERRORS, Reference, judge
 from references import reference
 from scenes import scene_from_dict
 
-from springbeam import RunStopped, SceneError, load_scene, with_changes
+from springbeam import SceneError, load_scene, with_changes
 from springbeam.results.distance import distance
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run import accuracy as search
@@ -44,27 +43,6 @@ def test_the_promise_is_kept_on_the_whole_curve(name):
     wrong = errors(found, reference(found.scene, sample_times=times))
     assert max(wrong.values()) <= asked, wrong
     assert all(found.summary["errors"][name] <= asked for name in search.KEPT if name in found.summary["errors"])
-
-
-def test_a_pilot_that_stopped_early_is_not_returned_however_near_it_is(monkeypatch):
-    """Up to its end it agrees with the finer runs, of which two are needed after it, and one more before these."""
-    scene = scene_from_dict({**SCENES["hard spring"], "accuracy": 1e-3})
-    whole = simulate(with_changes(scene, accuracy=None, coupling={"macro_step": 0.01}), check=False)
-    sizes = []
-
-    def made(prepared, progress):
-        sizes.append(prepared.coupling.macro_step)
-        if len(sizes) != 2:
-            return replace(whole, scene=prepared)
-        error = RunStopped("made up", 0.0)
-        error.run = replace(whole, scene=prepared, summary={**whole.summary, "status": "stopped"})
-        raise error
-
-    monkeypatch.setattr(search, "run_in_memory", made)
-    found = search.pick(scene).run
-    assert found.summary["status"] == "done"
-    assert found.scene.coupling.macro_step == sizes[-1]
-    np.testing.assert_allclose(sizes, sizes[0] / 2.3 ** np.arange(5), rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", FOUND["alone"])
