@@ -12,10 +12,7 @@ from .alone import duffing, static_deflection
 from .coupled import bar_impact, energy_scheme, resonance, slow_ramp
 from .laws import compliant_impact, hunt_crossley, kelvin_voigt, link, tie, unilateral
 
-#: In the order of the table. Each raises FmuError if an FMU cannot be found, loaded or initialised.
 SECTIONS = (
-    *(static_deflection, duffing),
-    *(bar_impact, energy_scheme),
-    *(resonance, slow_ramp),
+    *(static_deflection, duffing, bar_impact, energy_scheme, resonance, slow_ramp),
     *(compliant_impact, hunt_crossley, kelvin_voigt, link, tie, unilateral),
 )
