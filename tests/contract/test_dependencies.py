@@ -1,13 +1,11 @@
 """ModelStructure says what outputs depend on, no more and no less: found out by changing one thing at a time."""
 
 import ctypes as ct
-from pathlib import Path
 
 import pytest
+from scenes import table
 
-from springbeam.scene.files import tomllib
-
-VALUES = tomllib.loads(Path(__file__).with_name("values.toml").read_text(encoding="utf-8"))
+VALUES = table("contract/values.toml")
 BASES = VALUES["bases"]
 COMMON = VALUES["common"]
 CHANGES = VALUES["changes"]

@@ -1,11 +1,8 @@
 """Inputs over a step, and the inner forces of the beam: derivatives hold for one step, impulses act once."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-from springbeam.scene.files import tomllib
+from scenes import table
 
 # -- inputs over a step: derivatives hold for one step, impulses act once; output derivatives -------------------------
 
@@ -53,7 +50,7 @@ def test_an_impulse_acts_once_at_the_start_of_the_next_step(case):
         assert sum(k.get(*stored)) - before == pytest.approx(J * (2 * velocity + J / mass) / 2, rel=1e-9)
 
 
-VALUES = tomllib.loads(Path(__file__).with_name("values.toml").read_text(encoding="utf-8"))
+VALUES = table("contract/values.toml")
 LOADED = VALUES["loaded"]
 
 

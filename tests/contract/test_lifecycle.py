@@ -4,13 +4,11 @@ import ctypes as ct
 import gc
 import re
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-
-from springbeam.scene.files import tomllib
+from scenes import table
 
 # -- which call is allowed when (FMI 2.0.4, section 4.2.4), and what importers get wrong or do differently ------------
 
@@ -19,7 +17,7 @@ OK = 0
 DISCARD = 2
 ERROR = 3
 #: Parameters of the law that looks ahead.
-CALLS = tomllib.loads(Path(__file__).parents[1].joinpath("bad_inputs.toml").read_text(encoding="utf-8"))["calls"]
+CALLS = table("bad_inputs.toml")["calls"]
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,7 @@ from fmpy import simulate_fmu
 from fmpy.util import read_csv
 from fmpy.validation import validate_fmu
 from lxml import etree
-
-from springbeam.scene.files import tomllib
+from scenes import table
 
 # -- what is in the .fmu files, and what their binaries need and show -------------------------------------------------
 
@@ -146,7 +145,7 @@ def test_c_host(case, linux_host):
     assert repeated[:4] == repeated[4:]
 
 
-SPECIAL = tomllib.loads(HERE.joinpath("values.toml").read_text(encoding="utf-8"))["special"]
+SPECIAL = table("contract/values.toml")["special"]
 
 
 @pytest.mark.parametrize("version", ["2.0"])

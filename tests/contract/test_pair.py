@@ -12,9 +12,9 @@ import pytest
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssv
 from lxml import etree
+from scenes import table
 
 import springbeam
-from springbeam.scene.files import tomllib
 
 LAW = {"compliance_stiffness": 1e6, "compliance_exponent": 1.5}
 E0 = 1 / 6  # ρAs²/6 + ρIs²/6·0: kinetic energy of u_t = −x, the rotation being at rest
@@ -24,7 +24,7 @@ SPRING |= {"stop_position": -0.015, **LAW}
 #: Connected by name; `reaction` goes to `tip_force`. Without the last two the spring does not predict the tip.
 BY_NAME = ["tip_displacement", "tip_velocity", "tip_velocity_forecast", "tip_response", "tip_response_2"]
 
-WRONG = tomllib.loads(Path(__file__).with_name("values.toml").read_text(encoding="utf-8"))["wrong"]
+WRONG = table("contract/values.toml")["wrong"]
 STORED = ["kinetic_energy", "potential_energy", "contact_energy"]
 
 

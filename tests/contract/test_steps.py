@@ -1,12 +1,10 @@
 """Steps and states: which steps are refused, and a step repeated from its state, here or in another instance."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-from springbeam.scene.files import tomllib
+from scenes import table
 
 # -- fmi2DoStep: which steps are refused, and what a refused step leaves behind ---------------------------------------
 
@@ -29,7 +27,7 @@ def test_no_step_past_the_stop_time_nor_from_another_time(case):
     assert "past the stop time 0.3" in k.message
 
 
-VALUES = tomllib.loads(Path(__file__).with_name("values.toml").read_text(encoding="utf-8"))
+VALUES = table("contract/values.toml")
 
 
 @pytest.mark.parametrize("step", VALUES["refused"], ids=lambda step: step["said"])

@@ -1,13 +1,11 @@
 """Files of measured columns: what is read of them, what is refused, and what is said of it."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
-from scenes import load_of
+from scenes import load_of, table
 
-from springbeam.scene.files import tomllib
 from springbeam.scene.recorded import Reading, Recorded
 from springbeam.scene.units import factor
 
@@ -25,7 +23,7 @@ def file(tmp_path):
     return tmp_path / "record.csv"
 
 
-TABLE = tomllib.loads(Path(__file__).with_name("recorded.toml").read_text(encoding="utf-8"))
+TABLE = table("master/recorded.toml")
 #: Python's name of an encoding, and what has to be said of it.
 ENCODINGS = {"utf-8": None, "utf-8-sig": None, "utf-16": None, "utf-16-le": "utf-16-le", "latin-1": "latin-1"}
 

@@ -12,13 +12,13 @@ import pytest
 import tomli_w
 from commands import HANGS, command, written
 from faulty import Fault, installed
+from scenes import table
 
 from springbeam.results.files import load_trajectory
-from springbeam.scene.files import tomllib
 
 PATH = Path(__file__).with_name("faults.toml")
-SCENE = tomllib.loads(PATH.read_text(encoding="utf-8"))
-TABLE = tomllib.loads(PATH.with_name("faults_of_fmus.toml").read_text(encoding="utf-8"))
+SCENE = table("system/faults.toml")
+TABLE = table("system/faults_of_fmus.toml")
 LAWS = TABLE["laws"]
 
 

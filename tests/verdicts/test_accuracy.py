@@ -1,12 +1,10 @@
 """An accuracy asked for is kept: judged by the monolithic reference, on scenes that are not shipped."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from judge import ERRORS, Reference, judge
 from references import reference
-from scenes import scene_from_dict
+from scenes import scene_from_dict, table
 
 from springbeam import SceneError, load_scene, with_changes
 from springbeam.results.distance import distance
@@ -14,12 +12,9 @@ from springbeam.results.recording import MemoryRecorder
 from springbeam.run import accuracy as search
 from springbeam.run.runner import run
 from springbeam.run.simulate import simulate
-from springbeam.scene.files import tomllib
 
-SCENES, FOUND = (
-    tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
-    for name in ("accuracy.toml", "found.toml")
-)
+SCENES = table("verdicts/accuracy.toml")
+FOUND = table("verdicts/found.toml")
 
 
 def errors(found, reference):

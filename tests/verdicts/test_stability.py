@@ -1,13 +1,13 @@
 """Parts of the grid of extreme scenes, a beam that is given another force, and critical macro steps as predicted."""
 
 import pickle
-from pathlib import Path
 
 import judge
 import pytest
 from bodies import couple
 from draw import AT_REST
 from grid import Grid
+from scenes import table
 from worked import Part
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
@@ -18,7 +18,6 @@ from springbeam.coupling import coupling_of
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.run.ledger import EXACT
 from springbeam.scene import Beam, scene_from_dict
-from springbeam.scene.files import tomllib
 from springbeam.scene.laws import LAW
 from springbeam.scene.statics import tip_reach
 from springbeam.studies.predict import THRESHOLD, critical_step, linear_pair
@@ -31,7 +30,7 @@ def judge_cell(cell):
 # -- classes --------------------------------------------------------------------------------------------------------
 
 
-TABLE = tomllib.loads(Path(__file__).with_name("judged.toml").read_text(encoding="utf-8"))
+TABLE = table("verdicts/judged.toml")
 
 
 @pytest.mark.parametrize("name", TABLE["found"])
