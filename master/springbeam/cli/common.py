@@ -271,6 +271,13 @@ def results_directory(path: Path) -> Path:
     return path
 
 
+def run_directory(default: Path, out: Path | None, *, force: bool) -> RunDirectory:
+    """Make the directory of a new run: ``out``, else the ``default``, or with -2, -3, … behind it if not by force."""
+    if out is None and not force:
+        return RunDirectory.create_numbered(default)
+    return RunDirectory.create(out or default, replace=force)
+
+
 @contextmanager
 def closed_output_reported() -> Iterator[None]:
     """End the command with exit code 3 if its standard output is closed, as by ``| head``."""

@@ -8,9 +8,18 @@ from typing import Annotated, Literal
 
 import typer
 
-from ..results.directory import RunDirectory
 from ..studies.tables import Findings
-from .common import STOPPED, ForceOption, JsonOption, NoPlotsOption, QuietOption, SettingsOption, fail, progress
+from .common import (
+    STOPPED,
+    ForceOption,
+    JsonOption,
+    NoPlotsOption,
+    QuietOption,
+    SettingsOption,
+    fail,
+    progress,
+    run_directory,
+)
 from .run import carry_out
 
 #: (A) to (E) of the paper's figures.
@@ -58,7 +67,7 @@ def paper(
             fail(STOPPED, failed)
         run = failure.trajectory
         run.summary |= {"status": "stopped", "cause": str(failure)}
-    directory = _directory(Path("results") / f"paper-fig{figure}", out, force=force)
+    directory = run_directory(Path("results") / f"paper-fig{figure}", out, force=force)
     recorder = FileRecorder(scene, directory)
     findings = carry_out(recorder, made=run, pictures=_PICTURES, no_plots=no_plots, silent=quiet or as_json)
     solves = run.summary["iterations_per_solve"]
@@ -68,9 +77,3 @@ def paper(
     if failed:
         return replace(findings, code=STOPPED, error=f"{failed}; the results so far are in {directory.path}")
     return findings
-
-
-def _directory(default: Path, out: Path | None, *, force: bool) -> RunDirectory:
-    if out is None and not force:
-        return RunDirectory.create_numbered(default)
-    return RunDirectory.create(out or default, replace=force)

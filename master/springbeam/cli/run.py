@@ -16,7 +16,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from ..results.directory import OVERVIEW, RunDirectory
+from ..results.directory import OVERVIEW
 from ..studies.tables import Findings, table
 from .common import (
     BAD_INPUT,
@@ -32,6 +32,7 @@ from .common import (
     fail,
     in_time,
     progress,
+    run_directory,
 )
 
 if TYPE_CHECKING:
@@ -108,11 +109,7 @@ def run(
     ask_if_long(what)
     accurate = picked(what, silent=quiet or as_json)
     what = what if accurate is None else accurate.scene
-    default = Path("results") / Path(scene).stem
-    if out is None and not force:
-        directory = RunDirectory.create_numbered(default)
-    else:
-        directory = RunDirectory.create(out or default, replace=force)
+    directory = run_directory(Path("results") / Path(scene).stem, out, force=force)
     recorder = FileRecorder(what, directory, interval)
     silent = quiet or as_json
     return carry_out(recorder, made=accurate, check=not no_check, no_plots=no_plots, silent=silent)

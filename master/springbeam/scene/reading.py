@@ -83,17 +83,13 @@ def _scene_file(path_or_name: str | Path) -> Path:
 
 def _settings(overrides: Iterable[str]) -> dict[str, Any]:
     """Return values by table and key, and those outside of tables; the last of two for one key counts."""
-    settings: dict[str, Any] = {}
+    changes: dict[str, Any] = {}
     for override in overrides:
-        target, separator, value = override.partition("=")
-        if separator and target.strip() in _OUTSIDE:
-            settings[target.strip()] = parse_value(value.strip())
-            continue
-        split = split_key(target)
-        if not separator or split is None:
+        target, separator, value = (part.strip() for part in override.partition("="))
+        if not separator or (split_key(target) is None and target not in _OUTSIDE):
             raise ArgumentError(f"--set {override}: must be TABLE.KEY=VALUE, as in coupling.macro_step=1e-3")
-        settings.setdefault(split[0], {})[split[1]] = parse_value(value.strip())
-    return settings
+        changes[target] = parse_value(value)
+    return by_table(changes)
 
 
 def with_changes(scene: Scene, changes: Mapping[str, Any] | None = None, /, **tables: Any) -> Scene:

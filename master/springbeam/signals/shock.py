@@ -14,12 +14,10 @@ without limit.
 
 from __future__ import annotations
 
-from math import factorial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
-from numpy.polynomial.polynomial import polyval
 
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError
@@ -38,8 +36,8 @@ _NODES = 8
 _RADIANS = 2.0
 #: Times between which loads are integrated at once.
 _TOGETHER = 100_000
-#: Below this |x|, φ₂(x) = (eˣ − 1 − x)/x² is its series.
-_SMALL = 0.5
+#: Nodes of a quadrature that is exact to rounding for eˣˢ, |x| < π.
+_OF_EXPONENTIAL = 12
 
 
 class ShockSpectrum(NamedTuple):
@@ -135,10 +133,9 @@ def _extremes(begin: np.ndarray, end: np.ndarray, step: float, frequency: float,
 
 
 def _phi_2(x: complex) -> complex:
-    """Return (eˣ − 1 − x)/x²."""
-    if abs(x) < _SMALL:
-        return complex(polyval(x, [1.0 / factorial(k + 2) for k in range(16)]))
-    return complex((np.expm1(x) - x) / x**2)
+    """Return (eˣ − 1 − x)/x² = ∫₀¹ (1 − s) eˣˢ ds, to rounding for the |x| < π of an oscillator between two samples."""
+    nodes, weights = leggauss(_OF_EXPONENTIAL)
+    return complex(weights @ ((1.0 - nodes) * np.exp(0.5 * x * (1.0 + nodes)))) / 4.0
 
 
 def shock_of_run(run: Trajectory, end: str, frequencies: np.ndarray, quality: float = 10.0) -> ShockSpectrum:

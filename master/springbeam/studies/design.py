@@ -59,11 +59,7 @@ def with_keys(scene: Scene, case: Mapping[str, Any]) -> Scene:
 
     Raises SceneError if it cannot be run.
     """
-    tables: dict[str, Any] = {"accuracy": case["accuracy"]} if "accuracy" in case else {}
-    for name, value in case.items():
-        if (key := split_key(name)) is not None:
-            tables.setdefault(key[0], {})[key[1]] = value
-    return with_changes(scene, **tables)
+    return with_changes(scene, {name: case[name] for name in case if name == "accuracy" or split_key(name)})
 
 
 def parse_axis(text: str) -> Axis:
