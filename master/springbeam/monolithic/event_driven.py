@@ -360,4 +360,4 @@ def _crossing(
 def _zeros(series: np.ndarray, size: float) -> np.ndarray:
     """Return where a series of Legendre polynomials is zero inside a segment of ``size`` [s]."""
     x = legendre.legroots(series)
-    return np.asarray(0.5 * size * (1.0 + x.real[(x.imag == 0.0) & (np.abs(x.real) < 1.0)]))
+    return 0.5 * size * (1.0 + x.real[(x.imag == 0.0) & (np.abs(x.real) < 1.0)])

@@ -70,7 +70,7 @@ class Segment:
     def _through(self, times: np.ndarray) -> np.ndarray:
         away = times[..., None] / self.nodes[-1] - _NODES
         shares = _BARYCENTRIC / np.where(away == 0.0, _ON_NODE, away)
-        return np.asarray(shares / np.sum(shares, axis=-1, keepdims=True) @ self.states)
+        return shares / np.sum(shares, axis=-1, keepdims=True) @ self.states
 
     def pieces(self, tau: float) -> Iterator[Segment]:
         """Step anew up to τ [s]: the forces of the whole segment may hold a kink that lies after τ."""
@@ -134,7 +134,7 @@ class LinearForm:
         """Return u and y, v and z at modes (2, k, p): (2, k, 2)."""
         ends = moved @ self.ends.T
         ends[0] += self.at
-        return np.asarray(ends)
+        return ends
 
     def forces(self, ends: np.ndarray) -> np.ndarray:
         """Return R: forces (k, inputs) of ends that move as `ends_at` says."""

@@ -126,7 +126,7 @@ class HybridSystem:
     def space(self, phase: ReferencePhase) -> np.ndarray:
         """Return the directions in which x can move, orthonormal, (n, p)."""
         rows = self.held(phase).rows
-        return np.asarray(np.linalg.svd(rows)[2][len(rows) :].T)
+        return np.linalg.svd(rows)[2][len(rows) :].T
 
     def oscillating(self, phase: ReferencePhase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return ω² and c [1/s², 1/s] and the constant loads of the coordinates in a phase."""
@@ -167,7 +167,7 @@ class HybridSystem:
         """Return the power of the loads that vary [W] on states of shape (..., 2n + 3)."""
         if not len(self.loads):
             return np.zeros(X.shape[:-1])
-        return np.asarray(np.sum(self.loads.values(X[..., self.T]) * (X[..., self.V] @ self.patterns.T), axis=-1))
+        return np.sum(self.loads.values(X[..., self.T]) * (X[..., self.V] @ self.patterns.T), axis=-1)
 
     def dissipation_rate(self, phase: ReferencePhase, X: np.ndarray) -> np.ndarray:
         """Return ẋᵀ c ẋ, and what the law takes [W]."""

@@ -121,7 +121,7 @@ class Transmission(Law):
 
     def inside(self, C: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return λ_nc (Ψ − u)₊^q [N]."""
-        return np.asarray(self.stiffness * np.maximum(self.equilibrium - u, 0.0) ** self.exponent)
+        return self.stiffness * np.maximum(self.equilibrium - u, 0.0) ** self.exponent
 
     def watched(self, phase: ReferencePhase) -> list[Watch]:
         psi = self.equilibrium
@@ -173,13 +173,13 @@ class Link(Law):
     start = "tied"
 
     def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        return np.asarray(self.stiffness * p + self.damping * rate)
+        return self.stiffness * p + self.damping * rate
 
     def potential(self, p: np.ndarray) -> np.ndarray:
-        return np.asarray(0.5 * self.stiffness * p**2)
+        return 0.5 * self.stiffness * p**2
 
     def dissipation(self, contact: ContactState, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        return np.asarray(self.damping * rate**2)
+        return self.damping * rate**2
 
 
 class _Pressing(Law):
@@ -190,14 +190,14 @@ class _Pressing(Law):
 
     def _elastic(self, p: np.ndarray) -> np.ndarray:
         """Return F [N]."""
-        return np.asarray(self.stiffness * np.maximum(p, 0.0) ** self.exponent)
+        return self.stiffness * np.maximum(p, 0.0) ** self.exponent
 
     def potential(self, p: np.ndarray) -> np.ndarray:
-        return np.asarray(self._elastic(p) * np.maximum(p, 0.0) / (self.exponent + 1.0))
+        return self._elastic(p) * np.maximum(p, 0.0) / (self.exponent + 1.0)
 
     def dissipation(self, contact: ContactState, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
         elastic = self._elastic(p)
-        return np.asarray(((0.0 if contact == "slack" else self.force(p, rate)) - elastic) * rate)
+        return ((0.0 if contact == "slack" else self.force(p, rate)) - elastic) * rate
 
 
 class Compliance(_Pressing):

@@ -35,7 +35,7 @@ class GaussRule:
 
     def lagrange(self, x: np.ndarray) -> np.ndarray:
         """Return ℓ_k, which is 1 at node k and 0 at the others, at ``x`` in [0, 1]: (..., stages)."""
-        return np.asarray(np.polynomial.legendre.legvander(2.0 * x - 1.0, len(self.nodes) - 1) @ self.transform)
+        return np.polynomial.legendre.legvander(2.0 * x - 1.0, len(self.nodes) - 1) @ self.transform
 
 
 GAUSS = GaussRule(STAGES)
@@ -54,7 +54,7 @@ def _convolutions() -> np.ndarray:
     exact = GaussRule((STAGES + _KERNEL_POINTS) // 2)  # for a product of these
     inside = TARGETS[:, None] * exact.nodes
     forces = GAUSS.lagrange(inside) * (TARGETS[:, None] * exact.weights)[..., None]
-    return np.asarray(np.swapaxes(forces, 1, 2) @ _KERNEL.lagrange(TARGETS[:, None] - inside))
+    return np.swapaxes(forces, 1, 2) @ _KERNEL.lagrange(TARGETS[:, None] - inside)
 
 
 _CONVOLUTIONS = _convolutions()
@@ -69,11 +69,11 @@ class StepWeights:
 
     def free(self, xi: np.ndarray, xi_dot: np.ndarray) -> np.ndarray:
         """Return ξ and ξ̇ at the targets, (2, targets, p), from those at the start without forces."""
-        return np.asarray(self.start[:, 0] * xi + self.start[:, 1] * xi_dot)
+        return self.start[:, 0] * xi + self.start[:, 1] * xi_dot
 
     def forced(self, forces: np.ndarray, patterns: np.ndarray) -> np.ndarray:
         """Return ξ and ξ̇ at the targets, (2, targets, p), from rest under k ``forces``, (stages, k), (k, p)."""
-        return np.asarray(np.sum((forces.T @ self.force) * patterns, axis=2))
+        return np.sum((forces.T @ self.force) * patterns, axis=2)
 
 
 class Oscillators:
@@ -147,7 +147,7 @@ class Oscillators:
         """Return the amplitudes at ``rates`` of the free motion about equilibrium under ``forces``, (k, p): (k, 2p)."""
         off = xi - forces * self._compliance
         both = np.concatenate([xi_dot - self.fast * off, self.slow * off - xi_dot], axis=1)
-        return np.asarray(np.abs(both * self._between))
+        return np.abs(both * self._between)
 
 
 def _convolve(s: np.ndarray, size: float, at: slice) -> np.ndarray:

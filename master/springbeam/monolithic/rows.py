@@ -115,4 +115,4 @@ class Clamp:
             The loads of the scene, each in its unit, shape (k, n).
         """
         on_beam = np.array([contact, contact * self._length]) + self._constant[:, None] + self._varying @ loads.T
-        return np.asarray(self._inertia @ acceleration.T - on_beam)
+        return self._inertia @ acceleration.T - on_beam

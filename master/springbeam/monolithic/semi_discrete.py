@@ -69,7 +69,7 @@ class SemiDiscreteBeam:
     @property
     def tip_vector(self) -> np.ndarray:
         """e, with eᵀq = u(L)."""
-        return np.asarray(np.eye(1, self.size, self.tip)[0])
+        return np.eye(1, self.size, self.tip)[0]
 
     def interpolated(
         self, fractions: np.ndarray = SHAPE_POINTS, of_u: int = 1, *, slopes: bool = False
@@ -88,7 +88,7 @@ class SemiDiscreteBeam:
 
     def nodal(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Return the load vector, (2N,), of ``forces`` [N] at the places ``x`` [m] of the beam, both (k,)."""
-        return np.asarray(self.interpolated(x / self.length).T @ forces)
+        return self.interpolated(x / self.length).T @ forces
 
 
 def inner_forces(beam: Beam, mesh: SemiDiscreteBeam, q: np.ndarray) -> np.ndarray:

@@ -101,8 +101,7 @@ class Meshed(Bodies):
     def known(self) -> np.ndarray:
         """Return the right-hand side of (62) without a force on the tip."""
         q, v = self._before
-        right: np.ndarray = self._old @ q + 4.0 * self.h * (self.discrete.M @ v) + 2.0 * self.h**2 * self.load
-        return right
+        return self._old @ q + 4.0 * self.h * (self.discrete.M @ v) + 2.0 * self.h**2 * self.load
 
     def advance_free(self, time: float) -> float:
         self._before = self._now

@@ -71,7 +71,7 @@ class Frames:
     def heights(self, part: Part, frame: int) -> np.ndarray:
         """Return the heights [m] of the corners of a part."""
         if part == "beam" and self.deflection is not None:
-            return np.asarray(self.deflection[frame])
+            return self.deflection[frame]
         assert self.y is not None
         return np.full(2, self.y[frame]) if part == "top" else self.foot + (self.y[frame] - self.foot) * COIL_HEIGHTS
 

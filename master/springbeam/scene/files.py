@@ -23,8 +23,7 @@ def shipped_scenes() -> dict[str, Path]:
 
 def tables_of(path: Path) -> dict[str, Any]:
     """Return the content of a TOML file. Raises ValueError, RecursionError or OSError if it cannot be read."""
-    content: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    return content
+    return tomllib.loads(path.read_text(encoding="utf-8-sig"))
 
 
 def parse_value(text: str) -> Any:

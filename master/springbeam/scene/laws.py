@@ -191,8 +191,7 @@ class Contact(Table):
     def __new__(cls, *args: Any, **keys: Any) -> Self:
         """Make the table of the law that the key ``law`` names."""
         kind: type[Any] = LAWS.get(keys.get("law", LAW.default), cls) if cls is Contact else cls
-        contact: Self = super().__new__(kind)
-        return contact
+        return super().__new__(kind)
 
     law: str
     force_window: float | None = key(
@@ -276,7 +275,7 @@ class TransmissionContact(Contact):
 
     def compliance(self, p: "np.ndarray") -> "np.ndarray":
         with np.errstate(over="ignore"):
-            return np.asarray(self.stiffness * np.maximum(p, 0.0) ** self.exponent)
+            return self.stiffness * np.maximum(p, 0.0) ** self.exponent
 
 
 class UnilateralContact(Contact):

@@ -360,8 +360,7 @@ class TableLoad(Reading, _Started):
 
     @property
     def edges(self) -> list[float]:
-        lines: list[float] = (self.start + self.record.x).tolist()
-        return lines
+        return (self.start + self.record.x).tolist()
 
     def is_finer_than(self, macro_step: float | None) -> bool:
         if self.interpolation == "cubic" or macro_step is None:

@@ -68,8 +68,7 @@ class Scene(Table):
 
     def under(self, table: str) -> Table | None:
         """Return the content of ``[table]``, whatever body that is."""
-        content: Table | None = getattr(self, {"beam": "upper", "spring": "lower"}.get(table, table))
-        return content
+        return getattr(self, {"beam": "upper", "spring": "lower"}.get(table, table))
 
     def flat(self) -> dict[str, Any]:
         """Return the values of all keys that follow from no others, by ``"table.key"`` or ``"loads.0.key"``.

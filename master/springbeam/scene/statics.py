@@ -45,7 +45,7 @@ def tip_compliance(beam: Beam) -> float:
 def tip_force_shape(beam: Beam, fractions: np.ndarray) -> np.ndarray:
     """Return the deflection [m/N] at x = ``fractions``·L under a tip force, x/KAG + x²(3L − x)/6EI."""
     x = fractions * beam.length
-    return np.asarray(x / shear_stiffness(beam) + x**2 * (3.0 * beam.length - x) / (6.0 * bending_stiffness(beam)))
+    return x / shear_stiffness(beam) + x**2 * (3.0 * beam.length - x) / (6.0 * bending_stiffness(beam))
 
 
 def tip_inertia(beam: Beam) -> float:

@@ -52,7 +52,7 @@ class Measured(NamedTuple):
         end = float(run.time[-1])
         off = margin * (end - begin)
         times = self.time + shift
-        return np.asarray((times >= begin + off) & (times <= end - off))
+        return (times >= begin + off) & (times <= end - off)
 
     def spread(self, what: str) -> float:
         """Return the standard deviation of a curve, 1 of one that is constant."""

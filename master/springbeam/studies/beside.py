@@ -16,7 +16,11 @@ from ..scene import Scene
 from ..signals.curves import unit_of
 from ..signals.measured import Measured, model, residuals, time_shift
 from ..signals.spectra import without_peak
+from .metrics import heading
 from .tables import Findings, table
+
+#: Results of a run with their units, by their names in a summary.
+_HEADINGS = {name: heading(name) for name in (*TOTALS, *LOSS_NAMES)}
 
 
 def beside_one_another(names: list[str], runs: list[Trajectory]) -> Findings:
@@ -82,22 +86,19 @@ def differing_keys(scenes: list[Scene]) -> dict[str, list[Any]]:
 
 def results_of(runs: list[Trajectory]) -> dict[str, list[Any]]:
     """Return the numbers of `springbeam.results.totals` that any of the runs has, with their units, by run."""
-    units = {name: unit for name, (_, unit) in TOTALS.items()} | dict.fromkeys(LOSS_NAMES, "J")
     summaries = _over_one_window(runs)
-    results = {f"{name} [{unit}]" if unit else name: [s.get(name) for s in summaries] for name, unit in units.items()}
-    results = {name: values for name, values in results.items() if any(values)}
+    results = {heading: [s.get(name) for s in summaries] for name, heading in _HEADINGS.items()}
+    results = {heading: values for heading, values in results.items() if any(values)}
     return {**results, "warnings": [len(run.summary.get("warnings", ())) for run in runs]}
 
 
 def errors_of(runs: list[Trajectory]) -> dict[str, list[Any]]:
     """Return the errors of `results_of` that companion runs have shown, by run; relative ones under their own names."""
     judged = [run.summary.get("errors", {}) for run in runs]
-    units = {name: unit for name, (_, unit) in TOTALS.items()} | dict.fromkeys(LOSS_NAMES, "J")
-    bounds = {
-        f"{name} [{unit}]" if unit else name: [errors.get("quantities", {}).get(name) for errors in judged]
-        for name, unit in units.items()
+    of_results = {
+        heading: [errors.get("quantities", {}).get(name) for errors in judged] for name, heading in _HEADINGS.items()
     }
-    return bounds | {name: [errors.get(name) for errors in judged] for name in WORDS}
+    return of_results | {name: [errors.get(name) for errors in judged] for name in WORDS}
 
 
 def _over_one_window(runs: list[Trajectory]) -> list[dict[str, Any]]:

@@ -278,7 +278,7 @@ def macro_points(scene: Scene) -> np.ndarray:
 def away_from(times: np.ndarray, events: Iterable[float], size: float) -> np.ndarray:
     """Return which of ``times`` are more than `SHORT` and a half macro steps of ``size`` [s] away from all events."""
     apart = np.abs(times[:, None] - np.array([*events, np.inf]))
-    return np.asarray(np.all(apart > (SHORT + 0.5) * size, axis=1))
+    return np.all(apart > (SHORT + 0.5) * size, axis=1)
 
 
 def quantities(scene: Scene) -> list[str]:

@@ -91,8 +91,7 @@ def _stroboscopic(run: Trajectory) -> list[float] | None:
     tail = settled(run)
     late = max(begin + _TRANSIENT * (end - begin), begin if tail is None else tail.since)
     times, points = poincare(run, 1.0 / load.frequency, load.start)
-    places: list[float] = points[times >= late, 0].tolist()
-    return places
+    return points[times >= late, 0].tolist()
 
 
 #: Columns with a unit, whose largest magnitudes are metrics.

@@ -158,4 +158,4 @@ def _borders(values: np.ndarray, log: bool) -> np.ndarray:
     """
     around = np.pad(np.log(values) if log else values, 1, "reflect", reflect_type="odd")
     borders = 0.5 * (around[1:] + around[:-1])
-    return np.asarray(np.exp(borders) if log else borders)
+    return np.exp(borders) if log else borders

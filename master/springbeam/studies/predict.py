@@ -330,7 +330,7 @@ def amplification(pair: LinearPair, scheme: str, degree: int, h: float) -> np.nd
         expected = ends[2] + degree * h * ends[3]
         at_end = pair.stiffness * (expected - tip[0]) + pair.damping * (ends[3] - tip[1])
         other = np.array([C[0], (at_end - C[0]) / h, 0.0 * p] if degree else [at_end, 0.0 * p, 0.0 * p])
-    return np.asarray(block_diag(A, B) + np.vstack([of_C @ C, -of_force @ other]))
+    return block_diag(A, B) + np.vstack([of_C @ C, -of_force @ other])
 
 
 def spectral_radius(pair: LinearPair, scheme: str, degree: int, h: float) -> float:

@@ -178,7 +178,7 @@ def _judged(shocks: Mapping[str, ShockSpectrum], how: Shocks) -> Iterator[str]:
 
 def _on_lines(at: np.ndarray, frequency: np.ndarray, level: np.ndarray) -> np.ndarray:
     """Return levels between those at frequencies, on straight lines in a diagram with logarithmic axes."""
-    return np.asarray(np.exp(np.interp(np.log(at), np.log(frequency), np.log(level))))
+    return np.exp(np.interp(np.log(at), np.log(frequency), np.log(level)))
 
 
 def required(path: Path, unit: str) -> tuple[np.ndarray, np.ndarray]:

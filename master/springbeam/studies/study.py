@@ -29,7 +29,6 @@ from pydantic_core import from_json, to_json
 from ..bodies.archive import fmu_directory, own_fmu
 from ..bodies.protocol import FmuError
 from ..results.directory import ResultsExist, ResultsUnreadable, RunDirectory, lock
-from ..run.companion import Check
 from ..run.outcome import RunStopped
 from ..run.simulate import checked, simulate
 from ..scene import Scene, SceneError, load_scene
@@ -203,8 +202,9 @@ def measured(at: Callable[[], Scene], metrics: Mapping[str, Metric], *, judge: b
         run = simulate(at(), check=False) if judged is None else judged.judged_run()
         numbers = {name: metric(run) for name, metric in metrics.items()}
         if judged is not None and judged.companion is not None:
-            for name, metric in metrics.items():
-                numbers |= _error(name, metric, judged)
+            for name in (name for name, metric in metrics.items() if not metric.several and numbers[name] is not None):
+                if metrics[name](judged.companion) is not None:
+                    numbers[f"error_{name}"] = float(judged.error_of(metrics[name]))
         lacking = dict.fromkeys(metric.lacking(run) for metric in metrics.values())
     except SceneError as refused:
         row |= {"status": "refused", "error": str(refused)}
@@ -214,14 +214,6 @@ def measured(at: Callable[[], Scene], metrics: Mapping[str, Metric], *, judge: b
         row["warnings"] = "\n".join([*run.summary["warnings"], *filter(None, lacking)])
         row |= numbers | costs(run)
     return row
-
-
-def _error(name: str, metric: Metric, found: Check) -> Row:
-    """Return a bound of the error of a ``metric`` of one number, under its ``name``; nothing where it is unknown."""
-    assert found.companion is not None
-    if metric.several or metric(found.run) is None or metric(found.companion) is None:
-        return {}
-    return {f"error_{name}": float(found.error_of(metric))}
 
 
 def troubles(records: Mapping[str, Row]) -> list[str]:

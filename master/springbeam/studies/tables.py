@@ -71,8 +71,7 @@ class Findings:
     def plot(self) -> Figure:
         """Return the first of `pictures` as a matplotlib Figure. Raises ValueError if there is none."""
         for draw in self.pictures.values():
-            figure: Figure = draw()
-            return figure
+            return draw()
         raise ValueError("there is nothing to draw")
 
     def __repr__(self) -> str:

@@ -74,7 +74,7 @@ class Minimum(NamedTuple):
         _, sizes, directions = np.linalg.svd(self.derivatives / lengths, full_matrices=False)
         inverse = directions.T / np.maximum(sizes, 1e-300)
         variance = float(self.residual @ self.residual) / self.freedom
-        return np.asarray(np.sqrt(variance * (inverse**2).sum(axis=1)) / lengths)
+        return np.sqrt(variance * (inverse**2).sum(axis=1)) / lengths
 
     @property
     def left(self) -> dict[str, np.ndarray]:
@@ -85,7 +85,7 @@ class Minimum(NamedTuple):
     def moved_by(self, curves: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return how far the unknowns and the shift move if the measurement changes by ``curves``, shapes (n,)."""
         change = np.concatenate([self.weights[what] * curve for what, curve in curves.items()])
-        return np.asarray(np.linalg.lstsq(self.derivatives, np.nan_to_num(change))[0])
+        return np.linalg.lstsq(self.derivatives, np.nan_to_num(change))[0]
 
     def alike(self, names: Sequence[str], duration: float) -> list[str]:
         """Return which unknowns change nothing, or the curves in the same way; a shift counts over a ``duration``."""
@@ -167,7 +167,7 @@ class Search:
     def _curves(self, row: Row, name: str) -> np.ndarray:
         """Return ``off`` or ``slope`` of a record where points take part, weighed."""
         parts = [self._weights[what] * np.array(curve, float)[self.part] for what, curve in row[name].items()]
-        return np.asarray(np.nan_to_num(np.concatenate(parts)))
+        return np.nan_to_num(np.concatenate(parts))
 
     def _eliminated(self, row: Row) -> tuple[np.ndarray, float]:
         """Return what is left at the best shift, and that shift [s]."""
@@ -258,7 +258,7 @@ class Search:
         turned, sizes, directions = np.linalg.svd(slopes, full_matrices=False)
         known = sizes >= _UNDETERMINED * sizes.max(initial=0.0)
         of_known = sizes[known, None] * directions[known]
-        return np.asarray(lsq_linear(of_known, -(turned.T @ left)[known], (low, high), "bvls").x)
+        return lsq_linear(of_known, -(turned.T @ left)[known], (low, high), "bvls").x
 
     def minimum(self) -> Minimum:
         """Return what is left and the derivatives where the search has ended."""

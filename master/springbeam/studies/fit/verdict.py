@@ -125,4 +125,4 @@ def remembered(off: np.ndarray) -> float:
 def _autocorrelation(off: np.ndarray) -> np.ndarray:
     centred = off - off.mean()
     sums = correlated(centred, centred)[len(off) - 1 :]
-    return np.asarray(sums / max(float(sums[0]), 1e-300))
+    return sums / max(float(sums[0]), 1e-300)
