@@ -1,7 +1,6 @@
 """The master with bodies of one's own: impacts that die out, refused steps, the ledger."""
 
 import pytest
-from scenes import scene_from_dict
 
 from springbeam import RunStopped, SpringDamper, simulate
 from springbeam.bodies.protocol import Abilities, StepRefused
@@ -14,28 +13,6 @@ def soft(n=6, **tables):
     tables.setdefault("time", {"t_end": 0.3})
     coupling = {"degree": 2, "macro_step": 1e-3}
     return with_changes(load_scene("soft"), **{**tables, "coupling": {**coupling, **tables.get("coupling", {})}})
-
-
-@pytest.mark.parametrize(("e", "size"), [(0.5, 1e-3), (0.97, 10.0)])
-def test_a_bouncing_mass_comes_to_rest_after_its_geometric_series(e, size):
-    """Constant load g, from height d: rest after t₁ + 2 v₁ (e + e² + …)/g, where e ≥ 0.97 bounces hundreds of times at
-    once. Cut off are rebounds below 1e-8 v₁ or over within 1e-9 H; the impacts lose all of the energy."""
-    g = 10.0
-    d = 0.05
-    v = (2.0 * g * d) ** 0.5
-    t1 = (2.0 * d / g) ** 0.5
-    rest = t1 + 2.0 * v / g * e / (1.0 - e)
-    scene = scene_from_dict({
-        "time": {"t_end": rest + 5.0 * size},
-        "spring": {"linear_stiffness": 0.0, "external_force": -g, "equilibrium": d},
-        "stop": {"position": 0.0, "restitution": e},
-        "coupling": {"macro_step": size},
-    })  # fmt: skip
-    trajectory = simulate(scene)
-    assert [event.kind for event in trajectory.events].count("seated") == 1
-    assert trajectory.events[-1].time == pytest.approx(rest, abs=(2e-8 * v / g + 1e-9 * size) / (1.0 - e))
-    assert trajectory.e_impact_loss[-1] == pytest.approx(g * d, rel=1e-12)
-    assert trajectory.z[-1] == 0.0
 
 
 # -- steps that fail ------------------------------------------------------------------------------------------------

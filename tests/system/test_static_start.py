@@ -109,20 +109,6 @@ def test_a_spring_that_would_rest_below_its_stop_rests_on_it(lower, law):
         assert {event.kind for event in beside.events} <= {EventKind.IMPACT}
 
 
-@pytest.mark.parametrize("gap", [0.0, 1e-3])
-def test_elements_start_at_rest_under_their_loads(gap):
-    """Two masses on springs k, pressed together by f on the upper one; apart where the gap is larger than f/k."""
-    upper = {**ELEMENT, "external_force": -1.0}
-    f = 1.0
-    what = scene(beam=upper, spring=ELEMENT, contact={"gap": gap})
-    run = run_in_memory(what)
-    C = max(f - K1 * gap, 0.0) / 2.0
-    np.testing.assert_allclose(run.u_tip, (-MASS * G - f + C) / K1, rtol=1e-12)
-    np.testing.assert_allclose(run.y, -gap + (-MASS * G - C) / K1, rtol=1e-12)
-    np.testing.assert_allclose(run.contact_force, C, atol=1e-6)
-    assert np.abs(run.energy_residual).max() < 1e-15
-
-
 def test_a_beam_without_inertia_starts_where_it_rests():
     beam = {**BEAM, "fidelity": "quasi_static", "distributed_load": -5.0, "alpha_b": 0.01}
     what = scene(beam=beam, spring=SPRING, loads=None)
@@ -137,16 +123,3 @@ def test_a_beam_without_inertia_starts_where_it_rests():
     arm = 0.8 * (1.0 - np.linspace(0.0, 1.0, 21))
     np.testing.assert_allclose(run.bending_moment[0], C * arm - 5.0 * arm**2 / 2.0, atol=1e-10)
     np.testing.assert_allclose(run.shear_force[0], C - 5.0 * arm, atol=1e-10)
-
-
-@pytest.mark.parametrize("force", [0.0, -20.0])
-def test_a_cubic_spring_rests_where_its_force_vanishes(force):
-    """At 0, where it has no stiffness, and at the cube root of 20/6e9."""
-    run = run_in_memory(
-        scene_from_dict({
-            "time": {"t_end": 0.01, "initial_state": "static"},
-            "spring": {"mass": 1.0, "linear_stiffness": 0.0, "cubic_stiffness": 6e9, "external_force": force},
-        })
-    )  # fmt: skip
-    assert run.y[0] == pytest.approx(np.cbrt(force / 6e9), rel=1e-14)
-    assert np.ptp(run.y) <= 1e-14 * abs(run.y[0])

@@ -9,7 +9,6 @@ import scenes
 from references import reference
 
 from springbeam import simulate, with_changes
-from springbeam.motion.events import EventKind
 from springbeam.scene import scene_from_dict
 
 LOWER = 3.0  # N/m
@@ -70,26 +69,3 @@ def test_what_is_below_the_gap_is_placed_by_it(body, where):
     assert run.time[0] == keys.time[0] == GAP
     for column in run.columns:
         np.testing.assert_array_equal(run[column], keys[column])
-
-
-@pytest.mark.parametrize(
-    ("lower", "stop"),
-    [({"element": "rigid_wall"}, None), ({"mass": 1.0, "linear_stiffness": 100.0, "unloaded": 0.05}, 0.0)],
-    ids=["wall", "spring on its stop"],
-)
-def test_nothing_ties_a_tip_to_an_end_that_is_held_at_equilibrium(lower, stop):
-    """Tied needs Ψ − y > 0, and y = Ψ stays; a pull of 5 N from 0.5 s on lifts the tip: ½ (1 − cos √10 (t − ½))."""
-    pressed = {"external_force": -100.0} if stop is not None else {}  # the spring onto its stop
-    run = simulate({
-        "time": {"t_end": 1.0},
-        "beam": {"element": "spring_damper", "mass": 1.0, "stiffness": 10.0, "displacement": 0.1, "velocity": -1.0},
-        "spring": lower | pressed,
-        **({} if stop is None else {"stop": {"position": stop, "restitution": 0.0}}),
-        "loads": [{"on": "tip", "signal": "step", "amplitude": 5.0, "start": 0.5}],
-        "coupling": {"macro_step": 1e-2},
-    })  # fmt: skip
-    assert [event.time for event in run.events if event.kind is EventKind.SEPARATION] == [0.5]
-    later = run.time > 0.5
-    lifted = 0.5 * (1.0 - np.cos(np.sqrt(10.0) * (run.time[later] - 0.5)))
-    np.testing.assert_allclose(run.u_tip[later], lifted, rtol=0.0, atol=1e-12)
-    assert run.summary["warnings"] == []
