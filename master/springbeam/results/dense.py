@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..motion.curves import LAST_MOMENT, Curve, derivative, sign_changes
+from ..motion.curves import LAST_MOMENT, Curve
 from ..motion.events import Event
 from ..scene import Scene
 from .columns import columns
@@ -51,16 +51,10 @@ _TOGETHER = 65536
 _SAME = 1e-12
 #: Powers of s of the Legendre polynomials of 2s − 1 up to degree 5, by columns.
 _LEGENDRE = np.array([[(-1.0) ** (k + j) * comb(k, j) * comb(k + j, j) for k in range(6)] for j in range(6)])
-#: Places of a step where the lowest value of its curve is looked for.
-_PLACES_INSIDE = np.linspace(0.0, 1.0, 9)[:, None]
-#: So many of the steps with the lowest values there are searched closely.
-_SEARCHED = 16
 #: Positions and velocities of both ends.
-_PLACES = ("u_tip", "y")
-_SPEEDS = ("v_tip", "z")
+PLACES = ("u_tip", "y")
+SPEEDS = ("v_tip", "z")
 _INTEGRALS = ("_integral", "_integral_2")
-#: Values that differ by less than this share of the largest one are equal: well above rounding.
-_ALIKE = 1e-13
 
 
 def at(run: Trajectory, times: Any) -> Trajectory:
@@ -118,15 +112,13 @@ def ends_at(run: Trajectory, times: np.ndarray) -> dict[str, np.ndarray]:
     _refuse_outside(steps["time"], times)
     made = np.flatnonzero(steps["size"] > 0.0)
     begins = steps["time"][made - 1]
-    found = {name: np.empty(len(times)) for name in (*_PLACES, *_SPEEDS) if name in run.columns}
+    found = {name: np.empty(len(times)) for name in (*PLACES, *SPEEDS) if name in run.columns}
     for begin in range(0, len(times), _TOGETHER):
         some = slice(begin, begin + _TOGETHER)
-        step = np.maximum(np.searchsorted(begins, times[some], side="right") - 1, 0)
-        first = np.diff(step, prepend=-1) > 0  # of its step
-        after = made[step[first]]
-        which = np.cumsum(first) - 1
+        step = made[np.maximum(np.searchsorted(begins, times[some], side="right") - 1, 0)]
+        after, which = np.unique(step, return_inverse=True)
         curves = motion(run.scene.contact.rigid, Rows(steps, after - 1), Rows(steps, after))
-        share = (times[some] - begins[step]) / steps["size"][made[step]]
+        share = (times[some] - steps["time"][step - 1]) / steps["size"][step]
         for name, values in found.items():
             values[some] = curves[name].among(which).at(share)
     return found
@@ -161,26 +153,21 @@ def inside(rigid: bool, steps: np.ndarray, *names: str) -> Inside:
 
     ``steps`` are all records of a run, ``rigid`` as of `motion`.
     """
-    places = {name: steps[f"{name}_after"] for name in (*_PLACES, *_SPEEDS)}
+    places = {name: steps[f"{name}_after"] for name in (*PLACES, *SPEEDS)}
     places["gap"] = places["u_tip"] - places["y"]
-    known = {name: [*Extremes.of_rows(steps["time"], places[name])] for name in names}
+    extremes = {name: Extremes.of_rows(steps["time"], places[name]) for name in names}
     error = 0.0
     rounding = rounding_of_steps(steps)
     made = np.flatnonzero(steps["size"] > 0.0)
     for begin in range(0, len(made), _TOGETHER):
         after = made[begin : begin + _TOGETHER]
         curves = motion(rigid, Rows(steps, after - 1), Rows(steps, after))
-        for name, found in known.items():
-            for place, sign, curve in ((0, 1.0, curves[name]), (2, -1.0, -curves[name])):
-                lowest, step, share = _lowest(curve, below=sign * found[place])
-                if step >= 0:
-                    end = after[step]
-                    found[place] = sign * lowest
-                    found[place + 1] = float(steps["time"][end - 1] + share * steps["size"][end])
-        for name in _PLACES:
+        for name in names:
+            extremes[name] = extremes[name].along(curves[name], steps["time"][after - 1])
+        for name in PLACES:
             unsure = LAST_MOMENT * np.abs(curves[name].powers[-1]).max() - rounding
             error = max(error, float(unsure) / (span(places[name], rounding) or 1.0))
-    return Inside({name: Extremes(*found) for name, found in known.items()}, error)
+    return Inside(extremes, error)
 
 
 def motion(rigid: bool, before: Records, steps: Records) -> dict[str, Curve]:
@@ -199,14 +186,14 @@ def motion(rigid: bool, before: Records, steps: Records) -> dict[str, Curve]:
 
     def of(end: int, records: Records, field: str) -> Any:
         """Return a field of an end; for joined ends that of their common motion."""
-        names = [name + field for name in (_PLACES if field.startswith("_integral") else _SPEEDS)]
+        names = [name + field for name in (PLACES if field.startswith("_integral") else SPEEDS)]
         return np.where(together, common(records, held, *names), records[names[end]])
 
     def curve(end: int, position: str) -> Curve:
         start = before[f"{position}_after"], of(end, before, "_after")
         return Curve.quintic(start, (steps[position], *(of(end, steps, f) for f in ("", *_INTEGRALS))), size)
 
-    apart, low = (curve(end, position) for end, position in enumerate(_PLACES))
+    apart, low = (curve(end, position) for end, position in enumerate(PLACES))
     gap = before["u_tip_after"] - before["y_after"]
     w, rate, *bends = low.powers
     joint = Curve([w + gap, rate + (steps["u_tip"] - steps["y"] - gap), *bends], size)
@@ -280,7 +267,7 @@ def _between(
         if name == "contact_force" and scene.contact.opens:
             found[f"{name}_after"] = np.maximum(found[f"{name}_after"], 0.0)
     there = {name: curve.at(share) for name, curve in motion(scene.contact.rigid, before, after).items()}
-    for name in (*_PLACES, *_SPEEDS):
+    for name in (*PLACES, *SPEEDS):
         found[f"{name}_after"] = there[name]
     if scene.coupled and not (scene.contact.rigid or scene.contact.lasting):
         found["phase"] = np.where(seated(before), before["phase"], np.where(there["gap"] < 0.0, 2.0, 0.0))
@@ -296,28 +283,3 @@ def _between(
     found["beam_kinetic"] = linear("beam_kinetic", after["beam_kinetic"] + lost + to_spring)
     found["spring_kinetic"] = linear("spring_kinetic", after["spring_kinetic"] - to_spring)
     return found
-
-
-def _lowest(curve: Curve, below: float) -> tuple[float, int, float]:
-    """Return the lowest value of any of n curves, which one has it, and at which s.
-
-    The number is -1 if none is lower than ``below``, a value that is known, but for rounding. Minima are looked for in
-    the curves that are lowest at some places.
-    """
-    best = below
-    step = -1
-    share = 0.0
-    values = curve.at(_PLACES_INSIDE)
-    tolerance = _ALIKE * float(np.abs(values).max(initial=0.0))
-    lowest = values.min(axis=0)
-    few = min(_SEARCHED, len(lowest))
-    for i in np.argpartition(lowest, few - 1)[:few].tolist():
-        one = curve.one(i)
-        # Not at 0: where it begins another one ends, or there is a row.
-        for s in (*sign_changes(derivative(one.powers), 0.0, 1.0), 1.0):
-            there = one.at(s)
-            if there < best - tolerance:
-                best = there
-                step = i
-                share = s
-    return best, step, share

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .contact_changes import contact_time_difference, impulse_difference
-from .dense import ends_at
+from .dense import PLACES, SPEEDS, ends_at
 from .spans import FLOOR, ROUNDING, energy_of_force, rounding_of, span
 from .trajectory import Trajectory
 
@@ -17,9 +17,6 @@ from .trajectory import Trajectory
 _BETWEEN = np.arange(4.0) / 4.0
 #: Times closer than this share of the run are one.
 _SAME = 1e-12
-#: Columns of both ends.
-_PLACES = ("u_tip", "y")
-_SPEEDS = ("v_tip", "z")
 
 
 class Distance(NamedTuple):
@@ -79,7 +76,7 @@ def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
 
 def motion(columns: Mapping[str, np.ndarray], exact: Mapping[str, np.ndarray], rounding: float = 0.0) -> float:
     """Return the larger of the largest differences of u_tip and of y, `apart`, at equal times; ∞ without any."""
-    names = [name for name in _PLACES if name in columns and name in exact]
+    names = [name for name in PLACES if name in columns and name in exact]
     found = (apart(columns[name], exact[name], rounding) for name in names)
     return max((float(each.max(initial=0.0)) for each in found), default=inf)
 
@@ -103,8 +100,8 @@ def _velocities_apart(
     """
     inside = np.searchsorted(moments[:, 0], times, "right") > np.searchsorted(moments[:, 1], times, "left")
     found = [0.0]
-    for name in (name for name in _SPEEDS if name in columns and name in exact):
-        fastest = max(float(np.abs(exact[of]).max(initial=0.0)) for of in _SPEEDS if of in exact)
+    for name in (name for name in SPEEDS if name in columns and name in exact):
+        fastest = max(float(np.abs(exact[of]).max(initial=0.0)) for of in SPEEDS if of in exact)
         off = apart(columns[name], exact[name], max(rounding, ROUNDING * fastest))
         found.append(float(off[~inside].max(initial=0.0)))
     return max(found)
@@ -142,7 +139,7 @@ def _ends_at(run: Trajectory, times: np.ndarray) -> Mapping[str, np.ndarray]:
     if run.steps is not None:
         return ends_at(run, times)
     rows = np.isin(run.time, times)
-    return {name: run[name][rows] for name in (*_PLACES, *_SPEEDS) if name in run.columns}
+    return {name: run[name][rows] for name in (*PLACES, *SPEEDS) if name in run.columns}
 
 
 def _all_times(run: Trajectory, exact: Trajectory) -> np.ndarray:

@@ -57,19 +57,11 @@ def curves(steps: np.ndarray, name: str) -> tuple[np.ndarray, Curve]:
 
 def inside(steps: np.ndarray, name: str) -> Extremes:
     """Return the extremes of a column of `INNER` on its curve."""
-    rows = Extremes.of_rows(steps["time"], steps[name])
     made, curve = curves(steps, name)
-    if not len(made):
-        return rows
-    places = _turning(curve)
-    values = np.concatenate([curve.at(s) for s in places])
-    if name == MAGNITUDE:
-        values = np.maximum(values, 0.0)
-    times = np.concatenate([steps["time"][made] - (1.0 - s) * steps["size"][made] for s in places])
-    found = Extremes.of_rows(times, values)
-    low = found[:2] if found.lowest < rows.lowest else rows[:2]
-    high = found[2:] if found.highest > rows.highest else rows[2:]
-    return Extremes(*low, *high)
+    extremes = Extremes.of_rows(steps["time"], steps[name])
+    if len(made):
+        extremes = extremes.along(curve, steps["time"][made - 1])
+    return extremes._replace(lowest=max(extremes.lowest, 0.0)) if name == MAGNITUDE else extremes
 
 
 def largest(run: Trajectory, name: str) -> Extremes:
@@ -81,14 +73,3 @@ def largest(run: Trajectory, name: str) -> Extremes:
     if name not in INNER or run.steps is None:
         return Extremes.of_rows(later.time, later[name])
     return inside(run.steps[-len(later) :], name)
-
-
-def _turning(curve: Curve) -> list[np.ndarray]:
-    """Return where cubics turn, twice (n,): shares of the step, 0 where that is outside."""
-    _, a, b, c = curve.powers
-    # Roots of a + 2 b s + 3 c s², in the form that loses no digits.
-    root = np.sqrt(np.maximum(b * b - 3.0 * a * c, 0.0))
-    q = -(b + np.copysign(root, b))
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        both = [q / (3.0 * c), a / q]
-    return [np.where((s > 0.0) & (s < 1.0), s, 0.0) for s in both]

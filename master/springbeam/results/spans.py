@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..motion.curves import Curve, derivative, sign_changes
 from .records import FORCE_COLUMNS
 from .trajectory import Trajectory
 
@@ -16,6 +17,12 @@ from .trajectory import Trajectory
 ROUNDING = 1e-13
 #: Least range of a quantity over its rounding; an end that has less does not move.
 FLOOR = 1e4
+#: Places of a step where the lowest value of its curve is looked for.
+_PLACES = np.linspace(0.0, 1.0, 9)[:, None]
+#: So many of the steps with the lowest values there are searched closely.
+_SEARCHED = 16
+#: Values that differ by less than this share of the largest one are equal: well above rounding.
+_ALIKE = 1e-13
 
 
 class Extremes(NamedTuple):
@@ -32,6 +39,31 @@ class Extremes(NamedTuple):
         low = int(np.argmin(values))
         high = int(np.argmax(values))
         return cls(float(values[low]), float(times[low]), float(values[high]), float(times[high]))
+
+    def along(self, curve: Curve, begins: np.ndarray) -> Extremes:
+        """Return those with the values of the curves of n steps that begin at ``begins`` [s], shape (n,)."""
+        highest, time = _lowest(-curve, begins, -self.highest, self.highest_time)
+        return Extremes(*_lowest(curve, begins, self.lowest, self.lowest_time), -highest, time)
+
+
+def _lowest(curve: Curve, begins: np.ndarray, best: float, time: float) -> tuple[float, float]:
+    """Return the lowest value on n curves and its time [s]: ``best`` at ``time`` if none is lower, but for rounding.
+
+    Minima are looked for on the curves that are lowest at some places.
+    """
+    values = curve.at(_PLACES)
+    tolerance = _ALIKE * float(np.abs(values).max(initial=0.0))
+    lowest = values.min(axis=0)
+    few = min(_SEARCHED, len(lowest))
+    for i in np.argpartition(lowest, few - 1)[:few].tolist():
+        one = curve.one(i)
+        # Not at 0: where it begins another one ends, or there is a row.
+        for s in (*sign_changes(derivative(one.powers), 0.0, 1.0), 1.0):
+            there = one.at(s)
+            if there < best - tolerance:
+                best = there
+                time = float(begins[i] + s * one.size)
+    return best, time
 
 
 def span(values: Any, rounding: float = 0.0) -> float:

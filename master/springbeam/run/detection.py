@@ -180,16 +180,16 @@ class Detector:
         found: EventKind | None = None
         guards = self.guards(state.phase)
         for _ in range(2 * len(guards) + 1):
-            if self.pair.opens_softly:
-                whole = step
-                step = self._touched_inside(state, step)
-                found = found if step is whole else None
             for guard in guards:
                 bracket = self._bracket(state, guard, step)
                 if bracket is not None and not (guard.kind is found and bracket is step):
                     break
             else:
-                break
+                if not self.pair.opens_softly or (touched := self._touched_inside(state, step)) is step:
+                    break
+                step = touched
+                found = None
+                continue
             found = guard.kind
             step = self._located(state, guard, bracket)
             if step.size < SAME * self.H:
