@@ -34,27 +34,6 @@ def test_they_converge_to_the_reference_of_the_same_mesh(name):
         assert 2.0**7.5 < errors[0][name] / errors[1][name] < 2.0**8.5
 
 
-#: Force and moment of the loads about the clamp [N, N·m].
-CLAMPED = {
-    "uniform": (6.0, 6.0),
-    "hat": (2.0, 2.0 * (2.0 - 0.5 / 3.0)),
-    "growing": (5.0, 20.0 / 3.0),
-    "at a place": (7.0, 3.5),
-    "at the tip": (2.0, 4.0),
-    "base moves": (-6.0, -6.0),
-}
-
-
-@pytest.mark.parametrize("name", CLAMPED)
-@pytest.mark.parametrize("simulated", [simulate, reference])
-def test_the_clamp_bears_what_loads_a_beam_at_rest(name, simulated):
-    """On the beam and on its reference."""
-    force, moment = CLAMPED[name]
-    run = simulated(scenes.named(f"clamped/{name}"))
-    for row in (0, -1):
-        assert (run.clamp_force[row], run.clamp_moment[row]) == pytest.approx((-force, -moment), rel=1e-10)
-
-
 @pytest.mark.parametrize(("steps", "most", "rows_miss"), [(60, 4e-3, 0.015), (40, 0.025, 0.04)])
 def test_largest_inner_forces_are_those_of_the_curve(steps, most, rows_miss):
     """A load of 5 N at 9 Hz on two modes, with 13 and 9 steps a period of the load; rows miss the peaks by (ωH)²/8.

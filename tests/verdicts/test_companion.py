@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import oscillator
 import pytest
 from references import reference
@@ -36,32 +35,6 @@ def test_ends_are_no_further_from_the_reference_than_is_said(name, share, degree
     if run.summary["resolved"]:
         assert true < LIMITS.motion / 2.0
     assert true <= max(run.summary["errors"]["motion"], 1e-9)
-
-
-OSCILLATOR = {
-    "time": {"t_end": 2.0},
-    "beam": {"element": "spring_damper", "mass": 1.0, "stiffness": 1e4, "displacement": 0.01, "velocity": -1.0},
-    "spring": {"mass": 1.0, "linear_stiffness": 9e4, "equilibrium": -0.02},
-    "contact": {"law": "compliance", "stiffness": 1e5, "exponent": 1.5},
-}
-LATE = {"on": "tip", "signal": "half_sine", "start": 1.637, "duration": 0.004, "amplitude": 2e4}
-ABRUPT = {"on": "tip", "signal": "half_sine", "start": 0.0503, "duration": 0.0004, "amplitude": 2e4}
-
-
-@pytest.mark.parametrize(
-    ("changes", "why"),
-    [
-        ({"coupling": {"macro_step": 0.02 * np.pi}}, "an element at its own period"),
-        ({"coupling": {"macro_step": 0.02 * np.pi / 3.0}}, "both at a whole number of their periods"),
-        ({"coupling": {"macro_step": 0.02}, "loads": [LATE]}, "a load that begins late, between two rows"),
-        ({"coupling": {"macro_step": 0.05}, "loads": [ABRUPT]}, "a short pulse that no row has"),
-    ],
-    ids=lambda value: value if isinstance(value, str) else "",
-)
-def test_what_the_steps_cannot_follow_is_not_resolved(changes, why):
-    run = simulate(scene_from_dict({**OSCILLATOR, **changes}))
-    assert run.summary["resolved"] is False, why
-    assert any(warning.startswith("not resolved") for warning in run.summary["warnings"])
 
 
 def test_a_check_changes_no_bit_of_the_run_and_may_come_later():
