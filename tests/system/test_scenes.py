@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scenes
-from judge import judge
+from judge import Reference, judge
 from references import integrated_anew, reference
 
 from springbeam import RunStopped, simulate, with_changes
@@ -62,10 +62,26 @@ def beside_formula(scene, values, _):
     }
 
 
+def beside_twin(scene, bounds, _):
+    run = simulate(scene, check=False)
+    twin = simulate(scenes.named(bounds["twin"]), check=False)
+    assert run.time[0] == bounds["begins"]
+    for column in run.columns:
+        np.testing.assert_array_equal(run[column], twin[column])
+
+
 def within_limits(scene, _, __):
     """Bodies neither overlap nor part, by 1e-9 of the motion; energy is kept, to 1e-8."""
     found = judge(scene)
     assert found["kind"] in ("conserved", "dissipative"), found["reason"]
+
+
+def judged(scene, bounds, _):
+    found = judge(scene, Reference(scene))
+    for name, allowed in bounds.items():
+        value = found[name]
+        inside = any(word in value for word in allowed) if isinstance(value, str) else allowed[0] <= value <= allowed[1]
+        assert inside, (name, value)
 
 
 def beside_scipy(scene, bounds, monkeypatch):
@@ -75,7 +91,14 @@ def beside_scipy(scene, bounds, monkeypatch):
     assert run.summary["counts"]["steps"] < 1000
 
 
-ORACLES = {"formula": beside_formula, "reference": beside_reference, "limits": within_limits, "scipy": beside_scipy}
+ORACLES = {
+    "formula": beside_formula,
+    "reference": beside_reference,
+    "limits": within_limits,
+    "judge": judged,
+    "twin": beside_twin,
+    "scipy": beside_scipy,
+}
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -1,4 +1,4 @@
-"""Where the spring is without force: `unloaded` of [spring], and `gap` of [contact], which puts both ends there.
+"""Where the spring is without force: `unloaded` of [spring].
 
 A linear spring that is unloaded at y₀ is one that is unloaded at 0 under a further load k1 y₀, whatever it meets.
 """
@@ -46,26 +46,3 @@ def test_a_linear_spring_is_one_under_the_load_of_its_preload(program, tables):
     stored = 0.5 * LOWER * Y0**2  # that the load has not
     total = moved.e_total - stored - loaded.e_total
     np.testing.assert_allclose(total, 0.0, atol=1e-12)
-
-
-# -- a gap ---------------------------------------------------------------------------------------------------------
-
-GAP = 0.01
-
-
-@pytest.mark.parametrize(
-    ("body", "where"),
-    [
-        ({"mass": 1.0, "linear_stiffness": LOWER}, {"equilibrium": -GAP, "unloaded": -GAP}),
-        ({"element": "point_mass", "mass": 1.0}, {"displacement": -GAP}),
-        ({"element": "spring_damper", "mass": 1.0, "stiffness": 3.0}, {"displacement": -GAP, "rest": -GAP}),
-        ({"element": "rigid_wall"}, {"position": -GAP}),
-    ],
-)
-def test_what_is_below_the_gap_is_placed_by_it(body, where):
-    tables = {name: table for name, table in PAIR.items() if name != "stop"} | {"spring": body}
-    run = simulate(scene_from_dict(tables | {"contact": {"gap": GAP}}))
-    keys = simulate(scene_from_dict(tables | {"spring": body | where}))
-    assert run.time[0] == keys.time[0] == GAP
-    for column in run.columns:
-        np.testing.assert_array_equal(run[column], keys[column])

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from judge import ERRORS, Reference, judge
 from references import reference
 from scenes import scene_from_dict, table
 
@@ -14,7 +13,6 @@ from springbeam.run.runner import run
 from springbeam.run.simulate import simulate
 
 SCENES = table("verdicts/accuracy.toml")
-FOUND = table("verdicts/found.toml")
 
 
 def errors(found, reference):
@@ -38,50 +36,6 @@ def test_the_promise_is_kept_on_the_whole_curve(name):
     wrong = errors(found, reference(found.scene, sample_times=times))
     assert max(wrong.values()) <= asked, wrong
     assert all(found.summary["errors"][name] <= asked for name in search.KEPT if name in found.summary["errors"])
-
-
-@pytest.mark.parametrize("name", FOUND["alone"])
-def test_a_spring_alone_is_right_with_an_accuracy_and_says_so(name):
-    found = judge(scene_from_dict({"accuracy": 1e-3, **FOUND["alone"][name]}))
-    assert not found["warns"]
-    assert max(found[error] for error in ERRORS) <= 1e-3
-    assert found["do_steps"] <= 250
-
-
-@pytest.mark.parametrize("name", FOUND["impulses"])
-def test_impulses_are_part_of_the_promise(name):
-    scene = scene_from_dict({"accuracy": 1e-3, **FOUND["impulses"][name]})
-    found = judge(scene, Reference(scene))
-    assert 0.0 < found["error_impulses"] <= 1e-3
-    assert found["factor"] <= 1.0
-
-
-@pytest.mark.parametrize("name", FOUND["warned"])
-def test_what_a_campaign_found_wrong_warns(name):
-    run = simulate(scene_from_dict(FOUND["warned"][name]))
-    assert run.summary["resolved"] is False
-    assert any("steps 2.3 times as long differ by" in warning for warning in run.summary["warnings"])
-
-
-@pytest.mark.parametrize("name", FOUND["curves"])
-def test_curves_that_a_campaign_found_wrong_between_right_rows_warn(name):
-    """Its last moments show 0.8 %: up to half of the error where waves turn by more than 2π in a step."""
-    scene = scene_from_dict(FOUND["curves"][name])
-    found = judge(scene, Reference(scene))
-    assert 0.01 < found["error_motion"] < 0.02
-    assert found["warns"]
-
-
-@pytest.mark.parametrize("name", FOUND["hard"])
-def test_runs_agree_where_rounding_decides(name):
-    tables = dict(FOUND["hard"][name])
-    most = tables.pop("steps")
-    run = simulate(scene_from_dict(tables))
-    exact = reference(run.scene, sample_times=np.linspace(0.0, tables["time"]["t_end"], 401)[1:])
-    for column in {"u_tip", "y"} & set(run.columns):
-        off = np.abs(run.at(exact.time)[column] - exact[column]).max()
-        assert off <= tables["accuracy"] * np.ptp(exact[column]) + 1e-15
-    assert run.summary["accuracy"]["pilot_steps"] + run.do_steps <= most
 
 
 # -- a scene that asks for an accuracy, in the studies ---------------------------------------------------------------

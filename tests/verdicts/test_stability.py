@@ -2,12 +2,10 @@
 
 import pickle
 
-import judge
 import pytest
 from bodies import couple
 from draw import AT_REST
 from grid import Grid
-from scenes import table
 from worked import Part
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
@@ -16,8 +14,6 @@ from springbeam.bodies.own import FmuBeam
 from springbeam.bodies.protocol import NO_FORCE
 from springbeam.coupling import coupling_of
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.run.ledger import EXACT
-from springbeam.scene import Beam, scene_from_dict
 from springbeam.scene.laws import LAW
 from springbeam.scene.statics import tip_reach
 from springbeam.studies.predict import THRESHOLD, critical_step, linear_pair
@@ -28,20 +24,6 @@ def judge_cell(cell):
 
 
 # -- classes --------------------------------------------------------------------------------------------------------
-
-
-TABLE = table("verdicts/judged.toml")
-
-
-@pytest.mark.parametrize("name", TABLE["found"])
-def test_a_scene_that_was_found_garbage_is_none(name):
-    found = dict(TABLE["found"][name])
-    kinds = found.pop("kinds")
-    reason = found.pop("reason")
-    outcome = judge.judge(scene_from_dict({**found, "beam": Beam.ones() | found["beam"]}))
-    assert outcome["kind"] in kinds
-    assert reason in outcome["reason"]
-    assert outcome["residual"] < EXACT
 
 
 # -- mutations ------------------------------------------------------------------------------------------------------
