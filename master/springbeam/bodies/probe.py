@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
-from operator import mul
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -89,10 +88,14 @@ class Bench:
         body.rewind()
         if impulse:
             body.apply_impulse(impulse)
-        rows = [[*body.motion(), sum(body.energies()), body.received]]
+
+        def row() -> list[float]:
+            return [*body.motion(), sum(body.energies()), body.received]
+
+        rows = [row()]
         for i, given in enumerate(forces):
             body.advance(self._start + i * size, size, given)
-            rows.append([*body.motion(), sum(body.energies()), body.received])
+            rows.append(row())
         return np.array(rows)
 
     def response(self, size: float, force: Force, impulse: float = 0.0) -> tuple[float, float]:
@@ -115,22 +118,20 @@ class Bench:
 
     def extrapolated(self, inertia: Callable[[float], float | None]) -> float | None:
         """Return the limit of ``inertia`` as the step's size [s] goes to 0, from the shortest steps that show it."""
-        shares = (1.0, 0.5, 0.25) if self.body.abilities.any_size else (1.0,)
+        halvings = range(2 if self.body.abilities.any_size else 1)
 
         def column_of(size: float) -> list[float | None]:
-            return list(self.taken(inertia, [size * share for share in shares]))
+            return list(self.taken(inertia, [size / 2**halving for halving in halvings]))
 
-        found = None
-        for values in self.taken(column_of, reversed(self.sizes)):
-            column = [value for value in values if value is not None]
-            if len(column) < len(values):
-                continue
-            # The polynomial through the sizes.
-            weights = {1: (1.0,), 2: (-1.0, 2.0), 3: (1.0 / 3.0, -2.0, 8.0 / 3.0)}[len(column)]
-            found = sum(map(mul, weights, column))
-            if abs(column[-1] - column[0]) <= _AGREE * abs(column[0]):
-                break
-        return found
+        limit = None
+        for column in self.taken(column_of, reversed(self.sizes)):
+            if None not in column:
+                first = column[0] or 0.0
+                last = column[-1] or 0.0
+                limit = 2.0 * last - first
+                if abs(last - first) <= _AGREE * abs(first):
+                    break
+        return limit
 
     def wrong(self, check: Callable[[float], set[str]]) -> set[str]:
         """Return the faults that ``check`` of a step's size [s] finds at every size that the FMU takes."""
@@ -276,7 +277,7 @@ def _check_grid(bench: Bench, size: float) -> None:
     force = (1.0, 0.0, 0.0)
     column = 1 if bench.spec.velocity else 0
     moved, free = (bench.run(H, [given] * _GRADUAL)[:, column] for given in (force, NO_FORCE))
-    gained = np.diff(moved - free, n=1 if bench.spec.velocity else 2)
+    gained = np.diff(moved - free, n=2 - column)
     # Of an end that swings, differences become smaller by ω H each; of one that is a step ahead in some, larger by 2.
     if np.abs(np.diff(gained, n=6)).max() > _ALIKE * np.abs(gained).max():
         bench.faults.append(f"{said}, nor do steps of {H:.6g} s; {remedy}")
@@ -291,26 +292,24 @@ def _lag(bench: Bench, impetus: float) -> float:
     """
 
     def behind(size: float) -> float | None:
+        """Return ε over the ``size`` of a step."""
         moved, faster = bench.response(size, (impetus / size**2, 0.0, 0.0))
-        return 0.5 * size - moved / faster if faster else None
+        return 0.5 - moved / (faster * size) if faster else None
 
-    def error(size: float) -> float | None:
-        lag = behind(size)
-        return None if lag is None else 2.0 * abs(lag) / size
-
-    shortest = next((value for value in bench.taken(error, reversed(bench.sizes)) if value is not None), 0.0)
-    if shortest <= _SECOND_ORDER:
+    shortest = next((value for value in bench.taken(behind, reversed(bench.sizes)) if value is not None), 0.0)
+    if abs(2.0 * shortest) <= _SECOND_ORDER:
         return 0.0
+    H = bench.sizes[0]
     able = bench.body.abilities
     corrected = able.velocity and able.state
-    lag = behind(bench.sizes[0]) or 0.0
+    lag = behind(H) or 0.0
     bench.renew(order=2 if corrected else 1, integrals=0)
     bench.warnings.append(
-        f"its solver is of order 1 (as Euler's): over a step of {bench.sizes[0]:.6g} s a force moves its end by "
-        f"{1.0 - 2.0 * lag / bench.sizes[0]:.3g} of what the velocity says; errors of order 1 in its internal step "
+        f"its solver is of order 1 (as Euler's): over a step of {H:.6g} s a force moves its end by "
+        f"{1.0 - 2.0 * lag:.3g} of what the velocity says; errors of order 1 in its internal step "
         "remain at any macro step, and are in no estimate: make that step shorter, or export it with another solver"
     )
-    return lag if corrected else 0.0
+    return lag * H if corrected else 0.0
 
 
 def _wrong_outputs(bench: Bench, impetus: float, h: float) -> set[str]:
@@ -326,40 +325,41 @@ def _wrong_outputs(bench: Bench, impetus: float, h: float) -> set[str]:
     received = np.diff(work)
     means = 0.5 * h * (v[:-1] + v[1:])
     first, second = np.array(moments(x[:-1], v[:-1] if spec.velocity else v[1:], x[1:], v[1:], h))
-    seen, seen_work = (
-        _TOLERANCE * np.abs(steps).sum() + _ROUNDING * n * np.abs(values).max()
-        for steps, values in ((moved, x), (received, energy))
-    )
-    of = f"of displacement {spec.displacement!r}"
-    added = "name dissipated_energy and load_potential as well, or no energies"
-    return {
-        what
-        for named, what, values, due, allowed in (
-            (spec.velocity, f"velocity {spec.velocity!r} is not the rate {of}", means, moved, seen),
-            (spec.integral, f"integral {spec.integral!r} is not that {of}", once[1:], first, h * seen),
-            (spec.integral_2, f"integral_2 {spec.integral_2!r} is not that {of}", twice[1:], second, h * h * seen),
-            (
-                spec.kinetic_energy and spec.potential_energy,
-                f"the energies named do not account for work on the end; {added}",
-                *(gained, received, seen_work),
-            ),
-        )
-        if named and not np.abs(values - due).sum() <= allowed
+
+    def differs(
+        values: np.ndarray, due: np.ndarray, steps: np.ndarray, amounts: np.ndarray, factor: float = 1.0
+    ) -> bool:
+        allowed = _TOLERANCE * np.abs(steps).sum() + _ROUNDING * n * np.abs(amounts).max()
+        return not np.abs(values - due).sum() <= factor * allowed
+
+    outputs = {
+        "velocity": ("the rate", means, moved, 1.0),
+        "integral": ("that", once[1:], first, h),
+        "integral_2": ("that", twice[1:], second, h * h),
     }
+    wrong = {
+        f"{key} {spec.named[key]!r} is not {what} of displacement {spec.displacement!r}"
+        for key, (what, values, due, factor) in outputs.items()
+        if key in spec.named and differs(values, due, moved, x, factor)
+    }
+    if bench.body.abilities.energies and differs(gained, received, received, energy):
+        wrong.add(
+            "the energies named do not account for work on the end; name dissipated_energy and load_potential as well, "
+            "or no energies"
+        )
+    return wrong
 
 
 def _try_slopes(bench: Bench, impetus: float) -> None:
     """Find the highest derivative of the force over a step that the motion follows; ``impetus`` as above."""
     for order in (1, 2):
-        due = 1.0 / (order + 1.0)  # of the velocity, by F τ/h or F τ²/h² over that by F
 
-        def unfollowed(size: float, order: int = order, due: float = due) -> set[str]:
-            force = impetus / size**2
-            slopes = (force / size, 0.0) if order == 1 else (0.0, 2.0 * force / size**2)
-            _, held = bench.response(size, (force, 0.0, 0.0))
-            _, grown = bench.response(size, (0.0, *slopes))
-            follows = abs(grown - due * held) <= _AGREE * due * abs(held)
-            return set() if follows and held else {"unfollowed"}
+        def unfollowed(size: float, order: int = order) -> set[str]:
+            push = impetus / size**2
+            _, held = bench.response(size, (push, 0.0, 0.0))
+            _, grown = bench.response(size, (0.0, push / size, 0.0) if order == 1 else (0.0, 0.0, 2.0 * push / size**2))
+            due = held / (order + 1.0)  # by F τ/h or F τ²/h²
+            return set() if held and abs(grown - due) <= _AGREE * abs(due) else {"unfollowed"}
 
         bench.renew(slopes=order)
         try:

@@ -130,7 +130,8 @@ def tried(body: Body, time: float, macro_step: float) -> Abilities:
             body.rewind()
             return np.array(body.advance(time, size, (push * force[0], push * force[1], push * force[2])))
 
-        return np.subtract(after(2.0 * body.mass * length / (size * size)), after(0.0))
+        moved: np.ndarray = after(2.0 * body.mass * length / (size * size)) - after(0.0)
+        return moved
 
     body.mark()
     try:
