@@ -28,10 +28,10 @@ class Bodies(NamedTuple):
     contact_force: float = 0.0
 
 
-def load_bodies(scene: Scene, start_time: float, degree: int, found: Mapping[str, Findings] | None = None) -> Bodies:
+def load_bodies(scene: Scene, start_time: float, degree: int) -> Bodies:
     """Make the bodies of ``scene`` at ``start_time`` [s], our beam as the approach leaves it.
 
-    The force between them is a polynomial of ``degree`` over a step; ``found`` are the `findings`.
+    The force between them is a polynomial of ``degree`` over a step.
 
     Raises
     ------
@@ -40,13 +40,12 @@ def load_bodies(scene: Scene, start_time: float, degree: int, found: Mapping[str
     SceneError
         If the scene starts at rest and its spring has no equilibrium.
     """
-    if found is None:
-        found = findings(scene)
-    faults = [fault for finding in found.values() for fault in finding.faults]
+    checked = findings(scene)
+    faults = [fault for finding in checked.values() for fault in finding.faults]
     if faults:
         raise FmuError("\n".join(faults))
 
-    make = partial(_body, scene, start_time, degree, found)
+    make = partial(_body, scene, start_time, degree, checked)
     contact_force = 0.0
     rest = None
     with ExitStack() as made:
@@ -69,7 +68,7 @@ def _body(
     scene: Scene,
     start_time: float,
     degree: int,
-    found: Mapping[str, Findings],
+    checked: Mapping[str, Findings],
     table: str,
     contact_force: float,
     rest: float | None = None,
@@ -81,7 +80,7 @@ def _body(
     if isinstance(spec, ForeignFmu):
         from .foreign import ForeignBody
 
-        return ForeignBody(spec, table == "beam", (start_time, scene.time.t_end), found[table])
+        return ForeignBody(spec, table == "beam", (start_time, scene.time.t_end), checked[table])
     if isinstance(spec, Spring):
         return FmuSpring(spec, start_time, rest)
     if isinstance(spec, Beam):

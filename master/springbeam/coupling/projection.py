@@ -182,7 +182,7 @@ class Projection:
         def varies(s: float) -> bool:
             return self.law.resistance(*_at(path, s, size))[2] > 0.0
 
-        found = []
+        limits = []
         for left, right in pairwise(breaks):
             points = [left + 0.5 * (1.0 + s) * (right - left) for s, _ in _MANY]
             for (low, before), (high, after) in pairwise((s, varies(s)) for s in points):
@@ -191,8 +191,8 @@ class Projection:
                     b = high
                     while a < (middle := 0.5 * (a + b)) < b:
                         a, b = (middle, b) if varies(middle) is before else (a, middle)
-                    found.append(b)
-        return found
+                    limits.append(b)
+        return limits
 
 
 def _changes(start: float, end: float) -> bool:

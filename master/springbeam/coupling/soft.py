@@ -73,16 +73,16 @@ class SoftSolver(SoftCoupling, StepSolver):
         x = list(map(neg, gap))
         data = (low.displacement - tip.displacement, size, x, a, descent)
         last_size, flexibility = self.state.last_crossing
-        found = None
+        crossing = None
         try:
             if self.degree > 0 and size == last_size:  # at degree 0 the law's slope costs no more than a third force
-                found = self._newton(*data, flexibility)
-            found = found or self._newton(*data) or self._stiffened(*data)
+                crossing = self._newton(*data, flexibility)
+            crossing = crossing or self._newton(*data) or self._stiffened(*data)
         except np.linalg.LinAlgError:
             pass
-        if found is None:
+        if crossing is None:
             raise NotConverged(max(map(abs, x)), _MAX_NEWTON)
-        moved, step = found
+        moved, step = crossing
         return list(map(neg, map(add, x, moved))), step, list(map(add, a, step))
 
     def _newton(
@@ -158,10 +158,10 @@ class SoftSolver(SoftCoupling, StepSolver):
         softness = min(1.0, 1.0 / gain) if gain > 0.0 else 1.0
         while True:
             harder = [[e / softness for e in row] for row in descent]
-            found = self._newton(start, size, softened, [c / softness for c in acting], harder)
-            if found is None:
+            crossing = self._newton(start, size, softened, [c / softness for c in acting], harder)
+            if crossing is None:
                 return None
-            moved, pushed = found
+            moved, pushed = crossing
             softened = list(map(add, softened, moved))
             acting = [c + softness * push for c, push in zip(acting, pushed, strict=True)]
             if softness == 1.0:

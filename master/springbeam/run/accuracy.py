@@ -43,7 +43,7 @@ def pick(scene: Scene, progress: Progress | None = None) -> Check:
     steps = _FEWEST
     pilots: list[Trajectory] = []
     coarse: Trajectory | None = None
-    found: Check | None = None
+    check: Check | None = None
     agreed = False
     while steps <= _MOST:
         try:
@@ -53,26 +53,26 @@ def pick(scene: Scene, progress: Progress | None = None) -> Check:
                 raise
             pilots.append(error.run)
             coarse = None
-            found = None
+            check = None
             agreed = False
             steps *= LONGER
             continue
         if coarse is not None:
-            found = compared(fine, coarse, LONGER, float(coarse.summary["wall_time"]))
+            check = compared(fine, coarse, LONGER, float(coarse.summary["wall_time"]))
             # Runs that are far too coarse may agree by chance, so that those before it have to be near each other, too.
-            if agreed and _worst(found)[1] <= asked and fine.summary["resolved"] is not False:
-                return _with_settings(found, asked, pilots)
-            agreed = all(found.errors[name] <= getattr(LIMITS, name) for name in KEPT if name in found.errors)
+            if agreed and _worst(check)[1] <= asked and fine.summary["resolved"] is not False:
+                return _with_settings(check, asked, pilots)
+            agreed = all(check.errors[name] <= getattr(LIMITS, name) for name in KEPT if name in check.errors)
         pilots.append(fine)
         coarse = fine
         steps *= LONGER
-    if found is None:
+    if check is None:
         reached = f"runs in up to {steps / LONGER:.0f} steps stop early"
     else:
-        name, least = _worst(found)
+        name, least = _worst(check)
         reached = f"the error of {WORDS[name]} is up to {least:.1e}"
         if least <= asked:
-            reached = "; ".join(text for text in found.run.summary["warnings"] if text.startswith("not resolved"))
+            reached = "; ".join(text for text in check.run.summary["warnings"] if text.startswith("not resolved"))
     undamped = scene.beam is not None and not scene.massless and scene.beam.alpha_b == 0.0
     damped = ", damp the beam ([beam] alpha_b)" * undamped
     raise SceneError(
@@ -81,9 +81,9 @@ def pick(scene: Scene, progress: Progress | None = None) -> Check:
     )
 
 
-def _worst(found: Check) -> tuple[str, float]:
+def _worst(check: Check) -> tuple[str, float]:
     """Return the largest error that an accuracy bounds, and its name."""
-    return max(((name, found.errors.get(name, -inf)) for name in KEPT), key=lambda pair: pair[1])
+    return max(((name, check.errors.get(name, -inf)) for name in KEPT), key=lambda pair: pair[1])
 
 
 def prepared(scene: Scene, macro_step: float) -> Scene:
@@ -97,9 +97,9 @@ def prepared(scene: Scene, macro_step: float) -> Scene:
     return with_changes(scene, accuracy=None, coupling=coupling, spring=ida)
 
 
-def _with_settings(found: Check, asked: float, pilots: list[Trajectory]) -> Check:
-    """Return ``found``, whose run has in its summary what was picked and what it has cost."""
-    run = found.run
+def _with_settings(check: Check, asked: float, pilots: list[Trajectory]) -> Check:
+    """Return ``check``, whose run has in its summary what was picked and what it has cost."""
+    run = check.run
     coupling = run.scene.coupling
     spring = run.scene.spring
     picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": run.summary["degree"], "macro_step": coupling.H}
@@ -112,4 +112,4 @@ def _with_settings(found: Check, asked: float, pilots: list[Trajectory]) -> Chec
         "pilot_steps": sum(pilot.do_steps for pilot in pilots),
         "pilot_time": sum(float(pilot.summary["wall_time"]) for pilot in pilots),
     }
-    return found
+    return check
