@@ -6,10 +6,8 @@ kinds.py. A Latin hypercube covers a range; a slice of the extreme one varies tw
 others at rest. The same seed gives the same cells.
 """
 
-from collections.abc import Sequence
 from math import inf, sqrt
 from pathlib import Path
-from typing import Any
 
 from springbeam.scene import Beam
 from springbeam.scene.files import tables_of
@@ -31,36 +29,36 @@ COUPLINGS = (
 )
 
 
-def _axes(range_: dict[str, Any]) -> tuple[Axis, ...]:
+def _axes(range_):
     return tuple(Axis(name, **{key: _tuples(value) for key, value in axis.items()}) for name, axis in range_.items())
 
 
-def _tuples(value: Any) -> Any:
+def _tuples(value):
     """Return ``value`` with tuples for lists, which can be members of a set."""
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
 _RANGES = tables_of(Path(__file__).with_name("ranges.toml"))
 #: Values of parameters that a range does not have, and in slices.
-AT_REST: dict[str, Any] = {name: _tuples(value) for name, value in _RANGES["at_rest"].items()}
+AT_REST = {name: _tuples(value) for name, value in _RANGES["at_rest"].items()}
 EXTREME = (Axis("coupling", COUPLINGS), *_axes(_RANGES["extreme"]))
 USUAL = _axes(_RANGES["usual"])
 KINDS = _axes(_RANGES["kinds"])
 #: Two axes over their ranges by the name of the slice, and other values that are not at rest.
-SLICES: dict[str, tuple[str, str, dict[str, Any]]] = {
+SLICES = {
     name: (*fixed.pop("axes"), {key: _tuples(value) for key, value in fixed.items()})
     for name, fixed in _RANGES["slices"].items()
 }
 
 
-def drawn(axes: Sequence[Axis], count: int, seed: int) -> list[dict[str, Any]]:
+def drawn(axes, count, seed):
     """Return a Latin hypercube of ``count`` cells over a range."""
     names = [axis.name for axis in axes]
     found = design(axes, count, seed, "latin_hypercube") if count else []
     return [{**AT_REST, **dict(zip(names, values, strict=True))} for values in found]
 
 
-def slice_cells(resolution: int) -> list[dict[str, Any]]:
+def slice_cells(resolution):
     """Return ``resolution``² cells of each of `SLICES`, both ends of the ranges included; ``slice`` names it."""
     grids = {axis.name: axis.grid(resolution) for axis in EXTREME if axis.low != axis.high} if resolution else {}
     return [
@@ -71,7 +69,7 @@ def slice_cells(resolution: int) -> list[dict[str, Any]]:
     ]
 
 
-def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
+def scene_dict(cell):
     """Return the scene of a cell, as `springbeam.scene.scene_from_dict` takes it."""
     law, scheme, degree = cell["coupling"]
     with_beam = cell["bodies"] != "spring"
@@ -106,7 +104,7 @@ def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
     if elastic:
         clearance = min(clearance, 0.1 * speed * steps * H)  # else most would never meet
     damping = cell["contact_damping"]
-    scene: dict[str, Any] = {
+    scene = {
         "coupling": {"scheme": scheme, "degree": degree, "macro_step": H},
         "time": {"t_end": steps * H + (0.0 if elastic or not with_beam else clearance / speed)},
         "contact": {"law": law},
@@ -149,7 +147,7 @@ def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
     return scene
 
 
-def _beam(cell: dict[str, Any]) -> Beam:
+def _beam(cell):
     """Return the beam of a cell, of a section of 1 m²."""
     length = cell["length"]
     root = sqrt(cell["shear_ratio"])
@@ -171,7 +169,7 @@ def _beam(cell: dict[str, Any]) -> Beam:
     )
 
 
-def _spring_frequency(mass: float, k1: float, k2: float, psi: float, energy: float, load: float) -> float:
+def _spring_frequency(mass, k1, k2, psi, energy, load):
     """Return an upper estimate [rad/s], at the static deflection under the loads plus that of all the energy."""
     linear = sqrt(2.0 * energy / k1) + 2.0 * load / k1
     cubic = (4.0 * energy / k2) ** 0.25 + 2.0 * (load / k2) ** (1.0 / 3.0) if k2 > 0.0 else inf

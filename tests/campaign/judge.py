@@ -1,26 +1,22 @@
 """Judge a run: classify it by its records, and compare it with the event-driven reference."""
 
-from collections.abc import Iterator
 from contextlib import suppress
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from springbeam.bodies.protocol import FmuError
 from springbeam.monolithic import event_driven
 from springbeam.results.distance import distance
-from springbeam.results.trajectory import Trajectory
 from springbeam.run.accuracy import pick
 from springbeam.run.companion import check
 from springbeam.run.ledger import EXACT, bounds
 from springbeam.run.outcome import RunStopped
 from springbeam.run.peaks import PEAK_DOUBTED
 from springbeam.run.runner import Simulation
-from springbeam.scene import Scene, SceneError, with_changes
+from springbeam.scene import SceneError, with_changes
 from springbeam.scene.plausibility import warnings_of
 from springbeam.studies.comparison import initial_speed
-from springbeam.studies.tables import Row
 
 #: Classes of runs (bounds: `ledger.EXACT`, `ledger.bounds`), in the order of pictures and tables; the last must stay
 #: empty.
@@ -61,13 +57,13 @@ class Reference:
     The conditioning is that of the solution itself, not of runs: a run that misses an event would excuse itself.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene):
         self.scene = scene
         times = np.linspace(scene.contact_time or 0.0, scene.time.t_end, TIMES)
-        self._options: dict[str, Any] = {"sample_times": times, "time_limit": PATIENCE}
+        self._options = {"sample_times": times, "time_limit": PATIENCE}
 
     @cached_property
-    def run(self) -> Trajectory | None:
+    def run(self):
         """The solution; ``None`` if there is none within `PATIENCE`."""
         try:
             return event_driven.integrate(self.scene, **self._options)
@@ -75,7 +71,7 @@ class Reference:
             return None
 
     @cached_property
-    def condition(self) -> float:
+    def condition(self):
         """Ratio of the change of the motion or of a time to the relative change of the initial velocity.
 
         It is infinite where the change ends the solution.
@@ -91,7 +87,7 @@ class Reference:
         return found
 
 
-def perturbed(scene: Scene, share: float, **options: Any) -> Iterator[Trajectory]:
+def perturbed(scene, share, **options):
     """Yield the reference of ``scene`` from initial velocities changed by ``share`` of them; ``options`` of its run.
 
     First the beam's; then that of a spring, decreased and increased, if it may have any: a spring that the tip meets a
@@ -108,7 +104,7 @@ def perturbed(scene: Scene, share: float, **options: Any) -> Iterator[Trajectory
                 yield event_driven.integrate(pushed, **options)
 
 
-def judge(scene: Scene, reference: Reference | None = None) -> Row:
+def judge(scene, reference=None):
     """Run ``scene`` and return how the run ended: `ended`. Parameters and comparison as of `judged`."""
     cause = ""
     try:
@@ -132,7 +128,7 @@ def judge(scene: Scene, reference: Reference | None = None) -> Row:
     return judged(found if cause else check(found).judged_run(), cause, reference)
 
 
-def ended(kind: str, reason: str = "") -> Row:
+def ended(kind, reason=""):
     """Return the record of a run that ended as one of `CLASSES`.
 
     ``reason``: the cause of refused, stopped, garbage, or the warnings of approximate. ``warns``: the run is not
@@ -141,12 +137,12 @@ def ended(kind: str, reason: str = "") -> Row:
     unless an ill-conditioned scene explains their errors: `ERRORS`, and ``factor``, the error of the motion over
     `WRONG`, or the largest over the accuracy of the scene. ``H``: the macro step [s].
     """
-    measured: Row = dict.fromkeys(("residual", "overlap", *ERRORS, "factor", "H"))
+    measured = dict.fromkeys(("residual", "overlap", *ERRORS, "factor", "H"))
     counts = dict.fromkeys(("macro_steps", "events", "do_steps"), 0)
     return {"kind": kind, "reason": " ".join(reason.split()), **measured, "warns": False, **counts}
 
 
-def judged(run: Trajectory, cause: str = "", reference: Reference | None = None) -> Row:
+def judged(run, cause="", reference=None):
     """Return the class of a run that is done, or has stopped for ``cause``, from its records, and its errors.
 
     A run that warns is compared only with a given reference.
@@ -175,13 +171,13 @@ def judged(run: Trajectory, cause: str = "", reference: Reference | None = None)
     return found | errors
 
 
-def warns(run: Trajectory) -> bool:
+def warns(run):
     """Return whether ``run`` is not resolved, or has a warning that its computation gave."""
     others = set(run.summary["warnings"]).difference(warnings_of(run.scene))
     return not run.summary["resolved"] or any(not text.startswith(PEAK_DOUBTED) for text in others)
 
 
-def _errors(run: Trajectory, reference: Reference, warned: bool) -> Row:
+def _errors(run, reference, warned):
     """Return the errors of ``run``; none without a reference, or if an ill-conditioned scene explains them."""
     exact = reference.run
     if exact is None:
@@ -196,7 +192,7 @@ def _errors(run: Trajectory, reference: Reference, warned: bool) -> Row:
     return dict(zip(ERRORS, found, strict=False)) | {"factor": factor}
 
 
-def _class(run: Trajectory, cause: str, relative: np.ndarray, scale: np.ndarray, overlap: float) -> tuple[str, str]:
+def _class(run, cause, relative, scale, overlap):
     """Return the class of a run and why, by its relative residuals, the scale of its energy and its overlap."""
     scene = run.scene
     residual = float(np.abs(relative).max())
@@ -218,7 +214,7 @@ def _class(run: Trajectory, cause: str, relative: np.ndarray, scale: np.ndarray,
     return "garbage", f"energy residual {residual:.1e} without a warning"
 
 
-def _faults(run: Trajectory, overlap: float, scale: np.ndarray) -> Iterator[str]:
+def _faults(run, overlap, scale):
     """Yield faults that no scene explains."""
     for name, values in run.columns.items():
         if name != "phase" and not np.all(np.isfinite(values)):
@@ -232,7 +228,7 @@ def _faults(run: Trajectory, overlap: float, scale: np.ndarray) -> Iterator[str]
         yield f"the bodies overlap or part by {overlap:.1e} of their motion"
 
 
-def _overlap(run: Trajectory) -> float:
+def _overlap(run):
     """Return the largest inadmissible overlap of bodies, over the largest deflection or motion in a step."""
     scene, overlaps = run.scene, [0.0]
     positions = [run[name] for name in ("u_tip", "y") if name in run.columns]

@@ -6,11 +6,11 @@ import sys
 from ecospy import EcosSimulation, EcosSimulationStructure
 
 
-def path(name: str) -> str:
+def path(name):
     return name.replace(".", "::", 1)
 
 
-def structure(job: dict) -> EcosSimulationStructure:
+def structure(job):
     made = EcosSimulationStructure()
     for name, file in job["fmus"].items():
         made.add_model(name, file)

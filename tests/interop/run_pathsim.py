@@ -15,7 +15,7 @@ job = json.loads(sys.argv[1])
 size = job["size"]
 
 
-def fmu(name: str) -> CoSimulationFMU:
+def fmu(name):
     values = {path.split(".")[1]: value for path, value in job["parameters"].items() if path.startswith(f"{name}.")}
     return CoSimulationFMU(job["fmus"][name], name, values, size)
 

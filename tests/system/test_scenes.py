@@ -8,6 +8,7 @@ from references import integrated_anew, reference
 
 from springbeam import RunStopped, simulate, with_changes
 from springbeam.results.contact_changes import contact_changes
+from springbeam.studies.comparison import compare
 from springbeam.studies.metrics import METRICS
 
 CASES = scenes.TABLE["cases"]
@@ -70,6 +71,11 @@ def beside_twin(scene, bounds, _):
         np.testing.assert_array_equal(run[column], twin[column])
 
 
+def crosschecked(scene, bounds, _):
+    report = compare(scene)
+    assert (report["verdict"], report["horizon"]) == (bounds["verdict"], pytest.approx(scene.time.t_end))
+
+
 def within_limits(scene, _, __):
     """Bodies neither overlap nor part, by 1e-9 of the motion; energy is kept, to 1e-8."""
     found = judge(scene)
@@ -97,6 +103,7 @@ ORACLES = {
     "limits": within_limits,
     "judge": judged,
     "twin": beside_twin,
+    "crosscheck": crosschecked,
     "scipy": beside_scipy,
 }
 

@@ -23,34 +23,6 @@ def write(scene, folder):
     return path
 
 
-LOADS = [
-    {"on": "base", "signal": "harmonic", "frequency": 12.0, "amplitude": 5.0},
-    {"on": "beam", "shape": [1.0, -2.0, 0.5, 0.3], "signal": "half_sine", "start": 0.01, "duration": 0.033},
-    {"on": "beam", "at": 0.37, "signal": "step", "start": 0.02, "amplitude": -0.5},
-    {"on": "spring", "signal": "ramp", "start": 0.0, "duration": 0.05, "amplitude": -1.0},
-]
-
-
-@pytest.mark.parametrize(
-    ("degree", "loads", "beam"),
-    [
-        (0, [], {"n_elements": 6, "element_degree": 2, "reduced_integration": True, "tip_load_coefficient": -6.0}),
-        (0, [], {"n_elements": 6, "n_modes": 2, "integrator": "midpoint"}),  # which keeps all modes
-        (0, [], {"n_elements": 30, "element_degree": 10, "n_modes": 8, "distributed_load": -2.0, "alpha_b": 1e-3}),
-        (2, LOADS, {"n_elements": 6, "element_degree": 3, "n_modes": 8, "mass_matrix": "averaged"}),
-    ],
-)
-def test_any_elements_and_loads_pass(degree, loads, beam):
-    """The reference assembles another basis (Lagrange, by quadrature) of the same space.
-
-    It takes loads on a mesh of its own and samples their signals.
-    """
-    coupling = {"macro_step": 5e-4, "degree": degree}
-    report = compare(with_changes(SOFT, time={"t_end": 0.1}, coupling=coupling, beam=beam, loads=loads))
-    assert report["verdict"] == "agrees", report["quantities"]
-    assert report["horizon"] == pytest.approx(0.1)
-
-
 @pytest.mark.parametrize(
     ("error", "at", "passed"),
     [
