@@ -37,6 +37,7 @@ DAMPING = 0.1
 WITHOUT = {"nothing": (), "velocity, impulse": ("velocity", "impulse")}
 DOCS = Path(__file__).parents[2] / "docs"
 BAD = scenes.table("bad_inputs.toml")["fmus"]
+TABLE = scenes.table("system/foreign.toml")
 #: What an FMU does after 1.5 s, and the cause that is named.
 LATE = BAD["late"]
 ENERGIES = ("kinetic_energy", "potential_energy", "dissipated_energy", "load_potential")
@@ -126,28 +127,22 @@ def test_link_and_tie_are_exact_and_keep_the_interface_energy(fmu, without):
 
 
 ELEMENT = {"element": "spring_damper", "mass": M2, "stiffness": K, "damping": C}
-#: A mass of weight 8 N below: its tables, and the stiffness k of what holds it.
-HEAVY = {
-    "by the FMU": ({"spring": {"parameters": {"m": M2, "v0": V, "load": -8.0}}}, 0.0),
-    "by a load": ({"spring": {"parameters": {"m": M2, "v0": V}}, "loads": [{"on": "spring", "amplitude": -8.0}]}, 0.0),
-    "as an element": ({"spring": {**ELEMENT, "external_force": -8.0}}, K),
-}
 
 
 @pytest.mark.parametrize(
     ("heavy", "position", "restitution"),
-    [*((heavy, -0.01, 0.5) for heavy in HEAVY), ("by the FMU", 0.0, 0.0), ("by a load", 0.0, 0.0)],
+    [*((heavy, -0.01, 0.5) for heavy in TABLE["heavy"]), ("by the FMU", 0.0, 0.0), ("by a load", 0.0, 0.0)],
 )
 def test_the_seated_force_is_the_body_s(fmu, heavy, position, restitution):
     """It falls or starts on the foundation and comes to rest on it; the foundation bears 8 N + k φ."""
-    tables, k = HEAVY[heavy]
+    k = TABLE["heavy"][heavy]["k"]
     scene = pair(
         fmu(),
         beam={"element": "point_mass", "mass": 1e-3, "displacement": 5.0, "velocity": 0.0},
         stop={"position": position, "restitution": restitution},
         contact={"law": "compliance", "stiffness": 1e4, "damping": 0.0, "exponent": 1.0},
         coupling={"degree": 0},
-        **tables,
+        **TABLE["heavy"][heavy]["change"],
     )
     run = simulate(scene)
     assert kinds(run)[-1] == "seated"
@@ -193,35 +188,16 @@ def test_an_fmu_that_cannot_be_used_is_refused_before_the_run(fmu, what):
     assert any(all(text in line for text in said) for line in str(caught.value).splitlines())
 
 
-#: Contacts between a mass and what is below: their tables, the most that displacements [m] and forces [N] may miss by
-#: when the steps inside are 1 ms. Motion: half of that times the speed, 0.3 m/s, twice; forces: k of all times that.
-EULER = {
-    "tie": ({"contact": TIE}, 3e-4, 0.03),
-    "link": ({}, 3e-4, 0.03),
-    "transmission": ({"beam": {"displacement": 0.05}, "contact": {"law": "transmission"}}, 3e-4, 0.03),
-    "stop": (
-        {
-            "beam": {"displacement": 0.05, "external_force": -3.0},
-            "contact": {"law": "transmission"},
-            "stop": {"position": -0.06, "restitution": 0.5},
-        },
-        6e-4,
-        0.06,
-    ),
-}
-
-
 @pytest.mark.parametrize("macro_step", [1e-2, 1e-3])
 @pytest.mark.parametrize("kind", ["explicit", "semi-implicit"])
-@pytest.mark.parametrize("law", EULER)
+@pytest.mark.parametrize("law", TABLE["euler"])
 def test_contact_with_a_solver_of_order_1_is_right_to_that_order(fmu, law, kind, macro_step):
     """Errors are in proportion to the steps inside, also where a macro step is one of them.
 
     The displacement that a force causes over a step of K Euler steps is short or long by 1/K: a tie doubled the
     difference of both velocities every few steps, to 0.47 m of 7 mm, and the contact force had the wrong sign.
     """
-    tables, apart, missed = EULER[law]
-    tables = {"coupling": {"degree": 0, "macro_step": macro_step}, **tables}
+    tables = {"coupling": {"degree": 0, "macro_step": macro_step}, **TABLE["euler"][law]["change"]}
     exact = simulate(pair(fmu(), spring=ELEMENT, **tables))
     times = np.linspace(macro_step, 1.0, 300)
     errors = []
@@ -232,7 +208,7 @@ def test_contact_with_a_solver_of_order_1_is_right_to_that_order(fmu, law, kind,
         assert any("its solver is of order 1" in warning for warning in run.summary["warnings"])
         a, b = run.at(times), exact.at(times)
         errors.append(np.array([np.abs(a[name] - b[name]).max() for name in ("y", "contact_force")]))
-    assert (errors[0] < [apart, missed]).all()
+    assert (errors[0] < TABLE["euler"][law]["most"]).all()
     assert 1.6 < errors[0][0] / errors[1][0] < 2.4
 
 
@@ -256,34 +232,9 @@ def test_a_slope_that_an_fmu_does_not_follow_is_not_used(fmu):
     assert any("a force that grows over a step is not followed" in warning for warning in run.summary["warnings"])
 
 
-#: Units of an FMU that counts in mm, ms and kN, its masses in kg: SI units of each.
-_MM = 'm="1" factor="0.001"'
-_MS = 's="1" factor="0.001"'
-_KN = 'kg="1" m="1" s="-2" factor="1000"'
-BASES = {
-    "mm": _MM,
-    "ms": _MS,
-    "kN": _KN,
-    "mm/ms": 'm="1" s="-1"',
-    "kN.ms": 'kg="1" m="1" s="-1"',
-    "mm.ms": 'm="1" s="1" factor="1e-6"',
-    "mm.ms2": 'm="1" s="2" factor="1e-9"',
-    "J": 'kg="1" m="2" s="-2"',
-}
-UNITS = {
-    "F": "kN",
-    "J": "kN.ms",
-    "x": "mm",
-    "v": "mm/ms",
-    "ix": "mm.ms",
-    "ix2": "mm.ms2",
-    **dict.fromkeys(("Ek", "Ep", "Ed", "El"), "J"),
-}
-
-
 def test_units_that_an_fmu_declares_are_converted(fmu, tmp_path):
     """F [kN] = m [kg] a [mm/ms²], k [kN/mm] and c [kN ms/mm]: 1e-6 and 1e-3 of their values in SI units."""
-    path = fmu(edits=oscillator.in_units("ms", UNITS, BASES))
+    path = fmu(edits=oscillator.in_units("ms", TABLE["units"], TABLE["bases"]))
     scene = pair(path, spring={"parameters": {"m": M2, "k": 1e-6 * K, "c": 1e-3 * C}})
     run = simulate(scene)
     assert error(run, linked) < 1e-9
