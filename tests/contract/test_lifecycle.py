@@ -192,32 +192,54 @@ def run(instance, parameters, i):
     assert i % 7 or instance.try_step(1.0, -1.0) == ERROR
 
 
+def growth(work, cycles):
+    """Return what malloc gave out and did not get back over so many calls of ``work`` [bytes]."""
+    information = ct.CDLL(None).mallinfo2
+    information.restype = MallocInfo
+    held = []
+    for calls in (0, cycles):
+        for i in range(1, calls + 1):
+            work(i)
+        gc.collect()
+        now = information()
+        held.append(now.in_use + now.hblkhd)
+    return held[1] - held[0]
+
+
 @without_mallinfo
 def test_memory_is_flat_over_many_instances(case):
-    """What malloc gave out and did not get back over 100 of them, in the best of five rounds; a lost pointer takes 32.
+    """Over 100 of them, in the best of five rounds; a lost pointer takes 32 bytes.
 
     What else the process allocates at times is not in every round. One Python object serves all.
     """
-    information = ct.CDLL(None).mallinfo2
     instance = case.instance()
-    information.restype = MallocInfo
     instance.free()
 
-    def growth(cycles):
-        gc.collect()
-        before = information()
-        for i in range(1, cycles + 1):
-            instance.make(callbacks=False)
-            run(instance, PARAMETERS[case.name], i)
-            if i % 10 == 0:
-                assert instance.call("Reset") == OK
-                run(instance, PARAMETERS[case.name], 1)
-            instance.free()
-        gc.collect()
-        return (information().in_use + information().hblkhd) - (before.in_use + before.hblkhd)
+    def work(i):
+        instance.make(callbacks=False)
+        run(instance, PARAMETERS[case.name], i)
+        if i % 10 == 0:
+            assert instance.call("Reset") == OK
+            run(instance, PARAMETERS[case.name], 1)
+        instance.free()
 
-    growth(200)
-    assert min(growth(100) for _ in range(5)) < 16 * 100
+    growth(work, 200)
+    assert min(growth(work, 100) for _ in range(5)) < 16 * 100
+
+
+@without_mallinfo
+def test_a_library_that_is_unloaded_leaves_no_memory_behind(case):
+    """It had left libstdc++'s room for exceptions, 72,704 bytes each time: FMPy unloads it with every instance."""
+    load, unload = (getattr(ct.CDLL(None), name) for name in ("dlopen", "dlclose"))
+    load.restype = ct.c_void_p
+    copy = case.folder / "alone.so"  # which no other test has loaded
+    shutil.copy(case.binary, copy)
+
+    def work(_):
+        assert unload(ct.c_void_p(load(str(copy).encode(), 2))) == 0
+
+    growth(work, 10)
+    assert min(growth(work, 20) for _ in range(3)) < 20 * 1000
 
 
 def test_every_output_is_real(case):
@@ -248,23 +270,3 @@ def test_importers_write_again_what_cannot_change(case):
         value = case.parameters.get(name, case.variables[name].start)
         assert k.try_set(name, float(words.get(value, value))) == OK, name
     k.step(0.0, 0.01)
-
-
-@without_mallinfo
-def test_a_library_that_is_unloaded_leaves_no_memory_behind(case):
-    """It had left libstdc++'s room for exceptions, 72,704 bytes each time: FMPy unloads it with every instance."""
-    information = ct.CDLL(None).mallinfo2
-    information.restype = MallocInfo
-    load, unload = (getattr(ct.CDLL(None), name) for name in ("dlopen", "dlclose"))
-    load.restype = ct.c_void_p
-
-    def growth(cycles):
-        before = information()
-        for _ in range(cycles):
-            assert unload(ct.c_void_p(load(str(copy).encode(), 2))) == 0
-        return (information().in_use + information().hblkhd) - (before.in_use + before.hblkhd)
-
-    copy = case.folder / "alone.so"  # which no other test has loaded
-    shutil.copy(case.binary, copy)
-    growth(10)
-    assert min(growth(20) for _ in range(3)) < 20 * 1000
