@@ -1,7 +1,7 @@
 """The charts of the report, JSON of plotly.js: panels over a common time axis, and sketches that the script moves.
 
-They are dictionaries and not the figures of plotly's Python package, which takes as long to load and to check each key
-as all the rest of a report.
+The look that they share is the script's. They are dictionaries and not the figures of plotly's Python package, which
+takes as long to load and to check each key as all the rest of a report.
 """
 
 from __future__ import annotations
@@ -14,9 +14,7 @@ import numpy as np
 
 from ...results.trajectory import Trajectory
 from ..drawing import (
-    BLACK,
     EVENT_LOOKS,
-    GREY,
     MANY_EVENTS,
     Look,
     Marker,
@@ -27,7 +25,6 @@ from ..drawing import (
 from ..frames import Frames, Sketch
 from ..panels import Curve, Panel, panels
 
-_GRID = "#E3E3E3"
 #: A curve that varies by less than this share of its values keeps its double precision.
 _FINE = 1e-3
 #: Pixels of the page for a point of the pictures.
@@ -57,9 +54,9 @@ class Chart:
         arrays = {key: _encoded(value) for key, value in given.items() if isinstance(value, np.ndarray)}
         self.traces.append({"type": "scatter", **given, **arrays})
 
-    def set_axis(self, name: str, title: str, **keys: Any) -> None:
+    def set_axis(self, name: str, title: str = "", **keys: Any) -> None:
         """Set the title of the axis ``name`` and some of its keys."""
-        self.layout[name].update(keys, title={"text": title, "standoff": 6})
+        self.layout[name] = {"title": {"text": title}, **keys}
 
 
 def charts(trajectory: Trajectory) -> list[Chart]:
@@ -102,13 +99,12 @@ def _of_panel(trajectory: Trajectory, panel: Panel) -> Chart:
             hovertemplate=f"%{{y:.6g}} {panel.unit.name}",
             **_style(curve, panel),
         )
-    chart.set_axis("yaxis", panel.axis)
+    scale: dict[str, Any] = {}
     if panel.logarithmic is not None:
         begin, end = (float(np.log10(limit)) for limit in panel.logarithmic)
-        chart.layout["yaxis"].update(
-            type="log", range=[begin, end], tick0=0.0, dtick=max(1, round((end - begin) / 4.0)), exponentformat="e",
-            zeroline=False,
-        )  # fmt: skip
+        scale = {"type": "log", "range": [begin, end], "tick0": 0.0, "dtick": max(1, round((end - begin) / 4.0))}
+        scale |= {"exponentformat": "e", "zeroline": False}
+    chart.set_axis("yaxis", panel.axis, **scale)
     return chart
 
 
@@ -131,17 +127,22 @@ def _timeline(trajectory: Trajectory) -> Chart:
     if not kinds:
         chart.add(x=[], y=[])  # plotly draws no axes without a curve
     chart.layout.update(hovermode="closest", showlegend=False)
-    chart.layout["yaxis"].update(
-        range=[-len(kinds), 1.0], showgrid=False, zeroline=False, showticklabels=False, ticks="", fixedrange=True
+    chart.set_axis(
+        "yaxis",
+        range=[-len(kinds), 1.0],
+        showgrid=False,
+        zeroline=False,
+        showticklabels=False,
+        ticks="",
+        fixedrange=True,
     )
     return chart
 
 
 def moving_chart(sketch: Sketch, frames: Frames) -> Chart:
     """Draw a sketch at the first frame; the page's script moves it."""
-    chart = Chart(sketch.name, sketch.heading, _layout(_height_of(_SKETCH_HEIGHT)))
+    chart = Chart(sketch.name, sketch.heading, {"height": _height_of(_SKETCH_HEIGHT), "margin": {"r": 30}})
     chart.layout.update(hovermode="closest", showlegend=len(sketch.moving) > 1)
-    chart.layout["margin"].update(r=30)
     chart.set_axis("xaxis", f"position along the beam x [{sketch.along.name}]", range=sketch.x)
     chart.set_axis("yaxis", f"height [{sketch.unit.name}]", range=sketch.y, zeroline=False)
     for look, x, y, part, label in sketch.strokes:
@@ -186,30 +187,10 @@ def _height_of(inches: float) -> int:
 def _over_time(trajectory: Trajectory, name: str, heading: str, height: int) -> Chart:
     """Return a chart of ``height`` [px] over the run's time, without curves."""
     unit = time_unit(trajectory)
-    chart = Chart(name, heading, _layout(height))
+    chart = Chart(name, heading, {"height": height})
     ends = (unit.factor * trajectory["time"][[0, -1]]).tolist()
     chart.set_axis("xaxis", f"time t [{unit.name}]", range=ends)
     return chart
-
-
-def _layout(height: int) -> dict[str, Any]:
-    """Return the layout that all charts share; ``height`` in pixels."""
-    axis = {
-        "gridcolor": _GRID, "zeroline": False, "showline": True, "linecolor": BLACK, "ticks": "outside", "ticklen": 4,
-        "exponentformat": "power",
-    }  # fmt: skip
-    return {
-        "height": height,
-        "margin": {"l": 66, "r": 14, "t": 10, "b": 42},
-        "font": {"family": "system-ui, sans-serif", "size": 12, "color": "#222222"},
-        "paper_bgcolor": "white",
-        "plot_bgcolor": "white",
-        "hovermode": "x",
-        "showlegend": True,
-        "legend": {"orientation": "h", "x": 0.0, "xanchor": "left", "y": 1.0, "yanchor": "bottom"},
-        "xaxis": {**axis},
-        "yaxis": {**axis, "zeroline": True, "zerolinecolor": GREY, "zerolinewidth": 1.0},
-    }
 
 
 def _style(curve: Curve, panel: Panel) -> dict[str, Any]:

@@ -19,8 +19,25 @@
   // A finger that moves across a chart as wide as the screen scrolls the page.
   const dragmode = matchMedia("(pointer: coarse)").matches ? false : "zoom";
 
+  // The look that all charts share.
+  const axis = {
+    gridcolor: "#E3E3E3", zeroline: false, showline: true, linecolor: "#000000", ticks: "outside", ticklen: 4,
+    exponentformat: "power", title: { standoff: 6 },
+  };
+  const layout = {
+    margin: { l: 66, r: 14, t: 10, b: 42 },
+    font: { family: "system-ui, sans-serif", size: 12, color: "#222222" },
+    paper_bgcolor: "white",
+    plot_bgcolor: "white",
+    hovermode: "x",
+    showlegend: true,
+    legend: { orientation: "h", x: 0, xanchor: "left", y: 1, yanchor: "bottom" },
+    xaxis: axis,
+    yaxis: { ...axis, zeroline: true, zerolinecolor: "#777777", zerolinewidth: 1 },
+  };
+
   for (const name of page.overTime) page.charts[name].layout.shapes = [...page.backdrop];
-  for (const chart of Object.values(page.charts)) chart.layout.dragmode = dragmode;
+  for (const chart of Object.values(page.charts)) Object.assign(chart.layout, { dragmode, template: { layout } });
   for (const [name, chart] of Object.entries(page.charts)) Plotly.newPlot(name, chart.data, chart.layout, config);
 
   // One time axis for all.
