@@ -59,8 +59,9 @@ def sweep(
     SceneError
         If a key, a value or a metric is none.
     """
-    texts = tuple(f"{name}={_text(values)}" for name, values in vary.items())
-    own = Sweep(scene=as_scene(scene), vary=texts, samples=samples, sampling=sampling, seed=seed, metric=tuple(metrics))
+    own = Sweep(
+        scene=as_scene(scene), vary=_texts(vary), samples=samples, sampling=sampling, seed=seed, metric=tuple(metrics)
+    )
     return _carried_out(own, workers, directory, progress)
 
 
@@ -98,15 +99,13 @@ def fit(
     SceneError
         If a key or the file cannot be used.
     """
-    texts = tuple(f"{name}={_text(values)}" for name, values in vary.items())
-    options = [tuple(f"{key}={value}" for key, value in (given or {}).items()) for given in (names, scale, read)]
     own = Fit(
         scene=as_scene(scene),
         file=Path(measured),
-        vary=texts,
-        names=options[0],
-        scale=options[1],
-        read=options[2],
+        vary=_texts(vary),
+        names=_texts(names),
+        scale=_texts(scale),
+        read=_texts(read),
         shift=shift,
         repeat=None if repeat is None else Path(repeat),
     )
@@ -128,11 +127,13 @@ def crosscheck(scene: AnyScene, *, quick: bool = False, progress: Progress | Non
     return comparing.crosscheck(as_scene(scene), quick=quick, done=_counting(progress))
 
 
-def _text(values: Iterable[Any] | str | float) -> str:
-    """Return values as ``--vary`` takes them."""
-    if isinstance(values, str) or not isinstance(values, Iterable):
-        return str(values)
-    return ",".join(str(value) for value in values)
+def _texts(given: Mapping[str, Any] | None) -> tuple[str, ...]:
+    """Return values by name as an option of a command takes them."""
+    listed = {
+        name: values if isinstance(values, str) or not isinstance(values, Iterable) else ",".join(map(str, values))
+        for name, values in (given or {}).items()
+    }
+    return tuple(f"{name}={values}" for name, values in listed.items())
 
 
 def _counting(progress: Progress | None) -> Done:

@@ -8,17 +8,20 @@ from typing import Any
 import numpy as np
 
 from ..pictures.diagrams import Diagram, draw_diagrams
+from ..results.dense import rows_at
 from ..results.judged import WORDS
 from ..results.totals import LOSS_NAMES, TOTALS
 from ..results.trajectory import Trajectory, columns_of
 from ..results.window_peak import peak_force
 from ..scene import Scene
-from ..signals.curves import unit_of
+from ..signals.curves import signal, unit_of
 from ..signals.measured import Measured, model, residuals, time_shift
 from ..signals.spectra import without_peak
 from .metrics import heading
 from .tables import Findings, table
 
+#: Points of a curve of a run that is drawn.
+_DRAWN = 2000
 #: Results of a run with their units, by their names in a summary.
 _HEADINGS = {name: heading(name) for name in (*TOTALS, *LOSS_NAMES)}
 
@@ -53,16 +56,6 @@ def beside_measured(run: Trajectory, measured: Measured, shift: float | None) ->
     """Compare a run with measured curves."""
     moved = time_shift(run, measured) if shift is None else shift
     rows = residuals(run, measured, moved)
-
-    covered, curves = model(run, measured, moved)
-    time = measured.time[covered] + moved
-    diagrams = []
-    for name, curve in curves.items():
-        both = {"measured": measured.values[name][covered], "run": curve}
-        points = {which: np.column_stack([time, values]) for which, values in both.items()}
-        unit = unit_of(name, columns_of(run.scene))
-        label = f"{name} [{unit}]" if unit else name
-        diagrams.append(Diagram("time t [s]", label, points, log=False, dots=("measured",)))
     columns = ("curve", "points:", "rms:.4g", "of its spread:.2%", "largest:.4g", "at t [s]:.6g")
     by_what = ", found by correlation" * (shift is None)
     shown = [
@@ -72,8 +65,31 @@ def beside_measured(run: Trajectory, measured: Measured, shift: float | None) ->
         *filter(None, [without_peak(run, measured.values)]),
     ]
     document = {"shift": moved, "residuals": [row._asdict() for row in rows], "read": measured.notes}
-    draw = partial(draw_diagrams, diagrams, "", (8.2, 2.2), wide=1)
+    draw = partial(draw_diagrams, overlaid(run, measured, moved, "run"), "", (8.2, 2.2), wide=1)
     return Findings(document, shown, pictures={"comparison": draw})
+
+
+def overlaid(run: Trajectory, measured: Measured, shift: float, called: str, *, left: bool = False) -> list[Diagram]:
+    """Return diagrams of measured curves and those of a run, ``called`` so, each above what is ``left`` if wanted."""
+    covered, curves = model(run, measured, shift)
+    time = measured.time[covered] + shift
+    dense = np.linspace(time[0], time[-1], _DRAWN)
+    between = rows_at(run, dense)
+    units = columns_of(run.scene)
+    diagrams = []
+    for name, curve in curves.items():
+        values = measured.values[name][covered]
+        unit = unit_of(name, units)
+        label = f"{name} [{unit}]" if unit else name
+        both = {
+            "measured": np.column_stack([time, values]),
+            called: np.column_stack([dense, signal(between, name)]),
+        }
+        diagrams.append(Diagram("" if left else "time t [s]", label, both, log=False, dots=("measured",)))
+        if left:
+            points = {f"{called} less measured": np.column_stack([time, curve - values])}
+            diagrams.append(Diagram("time t [s]", f"left of {label}", points, log=False, dots=tuple(points)))
+    return diagrams
 
 
 def differing_keys(scenes: list[Scene]) -> dict[str, list[Any]]:

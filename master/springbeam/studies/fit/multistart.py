@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -59,44 +60,21 @@ def name_of(case: Row) -> str:
     return ", ".join(f"{key} = {value}" for key, value in case.items())
 
 
+@dataclass
 class MultiStart:
-    """A fit of keys in ``ranges`` to ``data``.
+    """A fit of keys to measured data."""
 
-    Parameters
-    ----------
-    ranges
-        Where keys are sought.
-    data, repeated
-        What is measured, and a second measurement of the same.
-    shift
-        By which the clock of the measurement is moved [s]; ``None`` if that is found.
-    duration
-        Of a whole run [s].
-    make
-        Makes the record of a case (`springbeam.studies.fit.study.Fit.record`).
-    """
-
-    def __init__(
-        self,
-        ranges: Ranges,
-        data: Measured,
-        repeated: Measured | None,
-        shift: float | None,
-        duration: float,
-        make: Callable[[Row], Row],
-    ) -> None:
-        self._ranges = ranges
-        self._data = data
-        self._repeated = repeated
-        self._free = shift is None
-        self._duration = duration
-        self._make = make
-        self._names = list(ranges.ends)
-        self._made = set[str]()
+    ranges: Ranges  #: where keys are sought
+    data: Measured
+    repeated: Measured | None  #: a second measurement of the same
+    free: bool  #: whether the shift of the clock of the measurement is found
+    duration: float  #: of a whole run [s]
+    make: Callable[[Row], Row]  #: makes the record of a case (`springbeam.studies.fit.study.Fit.record`)
+    made: set[str] = field(default_factory=set)  #: the cases made so far, but for those that judge a minimum
 
     def found(self) -> Found | None:
         """Search from the best of runs all over the ranges; return what was found, ``None`` if nothing can be run."""
-        starts = self._ranges.starts(STARTS[-1])
+        starts = self.ranges.starts(STARTS[-1])
         begun = list[Search]()
         looked = list[Search]()
         chosen = list[Search]()
@@ -117,32 +95,32 @@ class MultiStart:
                 best = self._judged(looked)
                 if best.ended and not any(map(no_noise, best.left.values())):
                     break
-        return best and best._replace(ended=best.ended and len(self._made) <= most(len(self._names)))
+        return best and best._replace(ended=best.ended and len(self.made) <= most(len(self.ranges.ends)))
 
     def _trial(self, case: Row) -> Row:
         if not case.keys() & _JUDGES:
-            self._made.add(name_of(case))
-            if len(self._made) > most(len(self._names)):
+            self.made.add(name_of(case))
+            if len(self.made) > most(len(self.ranges.ends)):
                 return {"error": "the search has made as many runs as it may"}
-        return self._make(case)
+        return self.make(case)
 
     def _begun(self, at: np.ndarray, more: Row | None = None) -> Search | None:
         """Return the search from a run, ``None`` if it cannot be made or covers too few points.
 
         ``more`` is what the case says beside the keys (`springbeam.studies.fit.study.Fit.record`).
         """
-        row = self._trial(self._ranges.values(at) | (more or {}))
+        row = self._trial(self.ranges.values(at) | (more or {}))
         if row["error"]:
             return None
         search = Search(
-            lambda unknowns, window: self._trial(self._ranges.values(unknowns) | window | {"step": row["step"]}),
-            self._data,
-            self._ranges.limits,
+            lambda unknowns, window: self._trial(self.ranges.values(unknowns) | window | {"step": row["step"]}),
+            self.data,
+            self.ranges.limits,
             at,
             row,
-            free=self._free,
+            free=self.free,
         )
-        return search if search.points > len(at) + self._free else None
+        return search if search.points > len(at) + self.free else None
 
     def _elsewhere(self, begun: Sequence[Search], looked: Sequence[Search]) -> list[Search]:
         """Return searches that begin at other shifts of the clock than all that have ``looked``, at most `_SHIFTS`.
@@ -152,7 +130,7 @@ class MultiStart:
         if its mean square is no hopeless multiple of the best.
         """
         best = min(looked, key=_cost)
-        last = self._begun(best.at, {"step": best.row["step"]}) if self._free else None
+        last = self._begun(best.at, {"step": best.row["step"]}) if self.free else None
         if last is None:
             return []
         away = _AWAY * best.period
@@ -186,18 +164,18 @@ class MultiStart:
         size = best.derivatives.shape[1]
         chance = float(fdtri(size, best.freedom, _CONFIDENCE)) * size / best.freedom
         as_well = [other for other in minima if other.cost <= (1.0 + chance) * best.cost and _apart(other.at, best)]
-        names = [*self._names, *[SHIFT] * self._free]
-        alike = best.alike(names, float(np.ptp(self._data.time))) if best.ended else []
+        names = [*self.ranges.ends, *[SHIFT] * self.free]
+        alike = best.alike(names, float(np.ptp(self.data.time))) if best.ended else []
         changed = self._changed(best)
         left = self._left(best, changed)
-        if self._repeated is not None:
+        if self.repeated is not None:
             left = {name: self._beside_noise(best, name, part) for name, part in left.items()}
         # Points that remember their past count as fewer.
         counted = max(1.0 if is_white(part.off) else remembered(part.off) for part in left.values())
         half = math.sqrt(counted) * _half(best) + OWN * np.abs(best.moved_by(changed))
         keys = self._intervals(best, [math.inf] * size if alike else half.tolist())
-        rivals = [self._ranges.values(other.at) for other in as_well]
-        return Found(keys, self._ranges.ends, left, alike, rivals, best.ended, best.row[SHIFT])
+        rivals = [self.ranges.values(other.at) for other in as_well]
+        return Found(keys, self.ranges.ends, left, alike, rivals, best.ended, best.row[SHIFT])
 
     def _ended(self, search: Search) -> Minimum:
         """Return the minimum to which a search leads, several curves weighed by what is left of each.
@@ -205,22 +183,22 @@ class MultiStart:
         Where another shift of the clock fits these keys as well, and is smaller, the search goes on from there.
         """
         search = search.least(_MOST)
-        if self._free:
+        if self.free:
             anywhere = self._begun(search.at, {"step": search.row["step"]})
             if anywhere is not None and self._moved(anywhere.row, search.row) and _as_good(anywhere, search):
                 search = anywhere.least(_MOST)
-        if len(self._data.values) > 1:
+        if len(self.data.values) > 1:
             search = search.evenly().least(_MOST)
         return search.minimum()
 
     def _moved(self, row: Row, other: Row) -> bool:
         """Return whether the clocks of two runs are apart."""
-        return bool(abs(row[SHIFT] - other[SHIFT]) > _NEAR * self._duration)
+        return bool(abs(row[SHIFT] - other[SHIFT]) > _NEAR * self.duration)
 
     def _left(self, best: Minimum, changed: Mapping[str, np.ndarray]) -> dict[str, Left]:
         """Return what is left of the curves, by their names, beside what shorter steps have ``changed``."""
         return {
-            name: Left(off, rms(off), rms(off) / self._data.spread(name), rms(changed[name]))
+            name: Left(off, rms(off), rms(off) / self.data.spread(name), rms(changed[name]))
             for name, off in best.left.items()
         }
 
@@ -236,15 +214,15 @@ class MultiStart:
         }
 
     def _keys(self, best: Minimum) -> Row:
-        return {name: best.row[name] for name in self._names}
+        return {name: best.row[name] for name in self.ranges.ends}
 
     def _intervals(self, best: Minimum, half: Sequence[float]) -> list[Row]:
         """Return the values at a minimum, with intervals of a half width unless that is infinite."""
-        width = np.nan_to_num(half[: len(self._names)], posinf=0.0)
-        values, *ends = (self._ranges.values(best.at + side * width) for side in (0.0, -1.0, 1.0))
+        width = np.nan_to_num(half[: len(self.ranges.ends)], posinf=0.0)
+        values, *ends = (self.ranges.values(best.at + side * width) for side in (0.0, -1.0, 1.0))
         intervals = [(value, *sorted(end[name] for end in ends)) for name, value in values.items()]
-        names = [*self._names]
-        if self._free:
+        names = [*self.ranges.ends]
+        if self.free:
             names.append(SHIFT)
             intervals.append((best.shift, best.shift - half[-1], best.shift + half[-1]))
         return [
@@ -254,10 +232,10 @@ class MultiStart:
 
     def _beside_noise(self, best: Minimum, name: str, left: Left) -> Left:
         """Return what is left of a curve with the noise: what two measurements differ in beside the run, over √2."""
-        assert self._repeated is not None
+        assert self.repeated is not None
         row = self._trial(self._keys(best) | {"repeat": True})
-        times = self._repeated.time + row[SHIFT]
-        ours = self._data.time[best.part] + best.row[SHIFT]
+        times = self.repeated.time + row[SHIFT]
+        ours = self.data.time[best.part] + best.row[SHIFT]
         # The nearest point: between two, noise would be smaller.
         nearest = np.searchsorted(0.5 * (times[1:] + times[:-1]), ours)
         apart = np.array(row["off"][name], float)[nearest] - left.off

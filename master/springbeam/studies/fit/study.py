@@ -17,27 +17,25 @@ import numpy as np
 from pydantic import PrivateAttr
 from rich.text import Text
 
-from ...pictures.diagrams import Diagram, draw_diagrams
-from ...results.dense import rows_at
-from ...results.trajectory import Trajectory, columns_of
+from ...pictures.diagrams import draw_diagrams
+from ...results.trajectory import Trajectory
 from ...run.accuracy import prepared
 from ...run.outcome import RunStopped
 from ...run.simulate import simulate_to
 from ...scene import ArgumentError, Scene, SceneError, with_changes
 from ...scene.files import write_tables
 from ...scene.tables import TOLERANCE_KEYS
-from ...signals.curves import signal, unit_of
 from ...signals.measured import (
     Aligned,
     Measured,
     at_shift,
     measured_as,
-    model,
     period,
     rms,
     settled,
     shifts,
 )
+from ..beside import overlaid
 from ..design import with_keys
 from ..study import Make, Study
 from ..tables import Findings, Row, table
@@ -54,8 +52,6 @@ _MARGIN = 0.02
 _BEYOND = 1e-5
 #: Makes a tolerance or an accuracy tighter, as half the macro step does.
 _TIGHTER = 0.1
-#: Points of a curve that is drawn.
-_DRAWN = 2000
 #: Rows of runs that are kept for other shifts of the clock.
 _KEPT = 100_000
 
@@ -230,29 +226,11 @@ class Fit(Study):
     def _drawn(self, fitted: Scene, shift: float) -> Any:
         """Return a figure of the curves, measured and of the fitted scene, each above what is left of it."""
         run = self._run({name: fitted.flat()[name] for name in self.ranges.ends}, float(self.data.time[-1]) + shift)
-        covered, curves = model(run, self.data, shift)
-        time = self.data.time[covered] + shift
-        units = columns_of(self.scene)
-        dense = np.linspace(time[0], time[-1], _DRAWN)
-        between = rows_at(run, dense)
-        diagrams = []
-        for name, curve in curves.items():
-            measured = self.data.values[name][covered]
-            unit = unit_of(name, units)
-            in_unit = f" [{unit}]" * bool(unit)
-            both = {
-                "measured": np.column_stack([time, measured]),
-                "fitted": np.column_stack([dense, signal(between, name)]),
-            }
-            left = {"fitted less measured": np.column_stack([time, curve - measured])}
-            diagrams += [
-                Diagram("", f"{name}{in_unit}", both, log=False, dots=("measured",)),
-                Diagram("time t [s]", f"left of {name}{in_unit}", left, log=False, dots=tuple(left)),
-            ]
+        diagrams = overlaid(run, self.data, shift, "fitted", left=True)
         return draw_diagrams(diagrams, self.scene.title, (8.2, 2.2), wide=1)
 
     def _search(self, make: Callable[[Row], Row]) -> MultiStart:
-        return MultiStart(self.ranges, self.data, self.repeated, self.shift, self.scene.duration, make)
+        return MultiStart(self.ranges, self.data, self.repeated, self.shift is None, self.scene.duration, make)
 
 
 def _finer(scene: Scene) -> Scene:
