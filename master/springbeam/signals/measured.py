@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -11,8 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
-from scipy.interpolate import CubicSpline
-from scipy.optimize import minimize_scalar
 
 from ..results.dense import rows_at
 from ..results.trajectory import Trajectory, columns_of
@@ -266,6 +263,15 @@ def rms(values: Any) -> float:
     return float(np.sqrt(np.nanmean(np.array(values, float) ** 2)))
 
 
+def mean_square(off: Mapping[str, Any], measured: Measured) -> float:
+    """Return the mean square of what is left of curves, over their spread and the share of points that are covered.
+
+    Of periods that fit as well it is smaller for the one that covers more of the measurement.
+    """
+    left = np.array([np.array(off[what], float) / measured.spread(what) for what in measured.values])
+    return float(np.nanmean(left**2) / np.isfinite(left).mean())
+
+
 def weighed(curves: Mapping[str, np.ndarray], measured: Measured, points: slice = slice(None)) -> np.ndarray:
     """Return curves over the spread of the measurement, one after the other, 0 where they are NaN."""
     return np.concatenate([np.nan_to_num(curve[points]) / measured.spread(what) for what, curve in curves.items()])
@@ -298,10 +304,9 @@ def at_shift(run: Trajectory, measured: Measured, shift: float) -> Aligned:
 def shifts(run: Trajectory, measured: Measured) -> list[tuple[float, float]]:
     """Return shifts [s] of the clock with which the measurement fits ``run``, and the mean square with each.
 
-    Periods of an oscillation are similar, so the `_PEAKS` best shifts of a correlation are refined, with splines
-    between its steps. The first one is the best of these, of equally good ones the smallest; the others follow by their
-    mean squares, which are those over the spread of each curve and the share of points that the run covers. At least
-    half of the points that it can cover are used.
+    Periods of an oscillation are similar, so the `_PEAKS` best shifts of a correlation are refined. The first one is
+    the best of these, of equally good ones the smallest; the others follow by their mean squares, as of `mean_square`.
+    At least half of the points that it can cover are used.
     """
     begin = float(run.time[0])
     end = float(run.time[-1])
@@ -330,27 +335,11 @@ def shifts(run: Trajectory, measured: Measured) -> list[tuple[float, float]]:
     total = np.where(number >= 0.5 * number.max(), (total / number.clip(1.0) + ALIKE) / number.clip(1.0), np.inf)
     padded = np.pad(total, 1, constant_values=np.inf)
     lows = np.flatnonzero(np.isfinite(total) & (total <= padded[:-2]) & (total <= padded[2:]))
-    splines = {what: CubicSpline(times, curve) for what, curve in curves.items()}
-
-    def misfit(shift: float) -> float:
-        times = measured.time + shift
-        inside = (times >= begin) & (times <= end)
-        off = {what: splines[what](times[inside]) - values[inside] for what, values in measured.values.items()}
-        if not inside.any():
-            return sys.float_info.max
-        # Of periods that fit as well, the one that covers more of the measurement.
-        return (float(np.mean(weighed(off, measured) ** 2)) + ALIKE) / float(inside.mean())
-
-    refined = [
-        minimize_scalar(
-            misfit,
-            bounds=(moved[k] - step, moved[k] + step),
-            method="bounded",
-            options={"xatol": 1e-4 * step},
-        )
-        for k in lows[np.argsort(total[lows])][:_PEAKS]
-    ]
-    ranked = sorted(((float(at.x), float(at.fun)) for at in refined), key=lambda pair: pair[1])
+    best = moved[lows[np.argsort(total[lows])][:_PEAKS]].tolist()
+    refined = [settled(run, measured, at_shift(run, measured, at), limits=(at - step, at + step)) for at in best]
+    ranked = sorted(
+        ((here.shift, mean_square(here.off, measured) + ALIKE) for here in refined), key=lambda pair: pair[1]
+    )
     equal = [pair for pair in ranked if pair[1] <= (1.0 + EQUAL) * ranked[0][1]]
     smallest = min(equal, key=lambda pair: abs(pair[0]))
     return [smallest, *(pair for pair in ranked if pair is not smallest)]

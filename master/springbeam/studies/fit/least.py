@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from ...signals.measured import Measured, period, rms
+from ...signals.measured import Measured, mean_square, period, rms
 from ..tables import Row
 
 #: The unknown that moves the clock of the measurement [s], beside keys.
@@ -134,7 +134,7 @@ class Search:
     @property
     def cost(self) -> float:
         """The mean square of what is left of the curves where it begins, over their spread and the share of points."""
-        return _mean_square(self.row, self._data)
+        return mean_square(self.row["off"], self._data)
 
     def evenly(self) -> Search:
         """Return this search with each curve weighed by what is left of it."""
@@ -274,10 +274,3 @@ class Search:
 def window(shifts: Sequence[float], part: slice) -> Row:
     """Return what a case says of the clock: the lowest, a first and the highest shift [s], and which points count."""
     return {"clock": shifts, "points": (part.start, part.stop)}
-
-
-def _mean_square(row: Row, data: Measured) -> float:
-    """Return the mean square of what is left in a record, over the spread of curves and the share of points."""
-    off = np.array([row["off"][what] for what in data.values], float)
-    spread = np.array([[data.spread(what)] for what in data.values])
-    return float(np.nanmean((off / spread) ** 2) / np.isfinite(off).mean())
