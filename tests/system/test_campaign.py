@@ -6,7 +6,6 @@ What cannot run is refused by one error that names a key, and leaves nothing.
 """
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -186,7 +185,3 @@ def test_options_run_together_or_are_refused(tmp_path_factory, names):
     if "interval" in names:
         rows = np.loadtxt(folder / "run/trajectory.csv", delimiter=",", skiprows=1, usecols=0)
         assert rows / 1e-3 == pytest.approx(np.round(rows / 1e-3), abs=1e-9)
-    tables = ("trajectory.csv", "events.csv", "contacts.csv", *(["shapes.csv"] if run.scene.beam else []))
-    arrays = ("steps.bin", "events.bin", *(["shapes.bin"] if run.scene.beam else []))
-    files = {*tables, *arrays, "summary.json"}
-    assert {path.name for path in Path(folder, "run").iterdir()} == files
