@@ -161,6 +161,8 @@ def desk(tmp_path_factory):
     (folder / "comma.toml").write_text("[time]\nt_end = 0.6\n\n[spring]\nmass = 1,0\n")
     spring = {"fmu": "a.fmu", "force": "F", "displacement": "x"}
     (folder / "fmu.toml").write_text(tomli_w.dumps({"time": {"t_end": 1.0}, "spring": spring}))
+    rows = "".join(f"{0.1 * k:g} {k % 7} {k % 5}\n" for k in range(400))
+    (folder / "record.dat").write_text(f"# time [ms] table [g] dut [mV]\n{rows}")
     (folder / "empty").mkdir()
     (folder / "folder.toml").mkdir()
     (folder / "circle.toml").symlink_to("circle.toml")

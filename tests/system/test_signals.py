@@ -5,7 +5,7 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from commands import printed, refused
+from commands import printed
 from scenes import scene_from_dict
 
 from springbeam import load_scene, simulate, with_changes
@@ -261,23 +261,6 @@ def test_a_record_is_judged_by_the_spectrum_that_is_required_and_says_where_it_i
     assert "table: within -0.5 to +0.5 dB of --required at 100%" in words
     assert "uncertain from 1000 Hz on" in words
     assert "at 0%" in " ".join(printed(*line, "--tolerance", "1:6").split())
-
-
-@pytest.mark.parametrize(
-    ("more", "why"),
-    [
-        (["--of", "x"], "--of x: there are the columns table, dut"),
-        (["--of", "dut"], "column dut: [mV] is no unit of what a run has in m/s²"),
-        (["--over", "dut"], "--over dut: there are shock spectra of table"),
-        (["--tolerance", "3"], "--tolerance 3: must be LOW:HIGH in dB"),
-        (["--since", "1"], "--since is for runs"),
-        (["--required", "nowhere.csv"], "nowhere.csv: No such file"),
-        (["--low", "9", "--high", "6"], "from 9 to 6 Hz: frequencies rise"),
-        (["--high", "1e5"], "must lie between 0 and half the sampling rate, 5000 Hz"),
-    ],
-)
-def test_a_spectrum_that_a_record_does_not_have_is_refused(tmp_path, more, why):
-    assert why in " ".join(refused("spectrum", str(write_record(tmp_path / "record.dat")), *more).split())
 
 
 def test_the_shock_of_a_run_is_shown_over_that_of_its_base(tmp_path):
