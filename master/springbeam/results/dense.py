@@ -214,40 +214,28 @@ def forces(exchanges: bool, before: np.ndarray, steps: np.ndarray) -> dict[str, 
     ``exchanges`` says whether the scheme exchanges values once per macro step; other parameters are as of `motion`.
 
     They are the polynomials applied minus a defect D. For a soft law D has no part of a degree up to d; for a tie it is
-    μ g̈, whose parts up to degree 3 follow from the rates and the moments of the gap. The parts of the next two degrees
-    bring both forces to what they are at the ends of the step. Between two exchanges of values they are linear.
+    μ g̈, which the curve of the gap has up to degree 3. The Legendre polynomials of the next two degrees bring both
+    forces to what they are at the ends of the step. Between two exchanges of values they are linear.
     """
     size = steps["size"]
-    tied = steps["reduced_mass"] > 0.0
-    first = np.zeros(len(steps), int) if exchanges else np.where(tied, 4, steps["degree"].astype(int) + 1)
-    signs = (-1.0) ** np.arange(6)
-    each = np.arange(len(steps))
+    mass = steps["reduced_mass"]
+    start = [before[f"{tip}_after"] - before[f"{low}_after"] for tip, low in (PLACES, SPEEDS)]
+    end = [steps[tip] - steps[low] for tip, low in (PLACES, SPEEDS)]
+    moments = [np.subtract(*(steps[position + field] for position in PLACES)) for field in _INTEGRALS]
+    reversal = mass * np.array(Curve.quintic(start, [*end, *moments], size).rate.rate.powers)
+    first = np.zeros(len(steps), int) if exchanges else np.where(mass > 0.0, 4, steps["degree"].astype(int) + 1)
+    sign = (-1.0) ** first
     found = {}
     for name in ("contact_force", "foundation_force"):
-        c, dc, ddc = (size**k * steps[name + order] for k, order in enumerate(("", "_rate", "_rate_2")))
-        series = np.zeros((6, len(steps)))
+        powers = np.zeros((6, len(steps)))
         if not exchanges:
-            series[:3] = c + dc / 2.0 + ddc / 6.0, dc / 2.0 + ddc / 4.0, ddc / 12.0
-            series[:4] -= np.where((name == "contact_force") | seated(before), _reversal(before, steps), 0.0)
-        at_start = signs[first] * (before[f"{name}_after"] - signs @ series)
-        at_end = steps[f"{name}_end"] - series.sum(axis=0)
-        series[first, each] += 0.5 * (at_end + at_start)
-        series[first + 1, each] += 0.5 * (at_end - at_start)
-        found[name] = Curve(_LEGENDRE @ series, size)
+            powers[:3] = steps[name], size * steps[f"{name}_rate"], 0.5 * size**2 * steps[f"{name}_rate_2"]
+            powers[:4] -= np.where((name == "contact_force") | seated(before), reversal, 0.0)
+        at_start = sign * (before[f"{name}_after"] - powers[0])
+        at_end = steps[f"{name}_end"] - powers.sum(axis=0)
+        powers += 0.5 * ((at_end + at_start) * _LEGENDRE[:, first] + (at_end - at_start) * _LEGENDRE[:, first + 1])
+        found[name] = Curve(powers, size)
     return found
-
-
-def _reversal(before: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Return μ g̈ [N] of ends that are joined, by parts: Legendre coefficients of degrees 0 to 3, shape (4, n)."""
-    size = steps["size"]
-    mass = steps["reduced_mass"]
-    rate = before["v_tip_after"] - before["z_after"]
-    rate_after = steps["v_tip"] - steps["z"]
-    once, twice = (steps[f"u_tip_{name}"] - steps[f"y_{name}"] for name in ("integral", "integral_2"))
-    even = 0.5 * size * (rate_after - rate)
-    odd = 0.5 * size * (rate_after + rate)
-    moments = [even, odd, even + 6.0 * once / size, odd + 30.0 * (once - 2.0 * twice / size) / size]
-    return np.array([mass / size**2 * (4.0 * k + 2.0) * moment for k, moment in enumerate(moments)])
 
 
 def _between(
