@@ -16,15 +16,14 @@ from ..motion.curves import EPS, Sample
 _MAX_EVALUATIONS = 60
 
 
-class Gap:
+#: f of the ends (tip, lower end), positive while nothing happens, after a step of a size [s].
+EventFunction = Callable[[Ends, float], Sample]
+
+
+def gap(ends: Ends, size: float) -> Sample:
     """g = u_tip − y, or what lies below the tip instead of y."""
-
-    def __call__(self, ends: Ends, size: float) -> Sample:
-        (u, v, u_1, u_2), (y, z, y_1, y_2) = ends
-        return u - y, v - z, u_1 - y_1, u_2 - y_2
-
-
-gap = Gap()
+    (u, v, u_1, u_2), (y, z, y_1, y_2) = ends
+    return u - y, v - z, u_1 - y_1, u_2 - y_2
 
 
 @dataclass(frozen=True)
@@ -43,10 +42,6 @@ class Height:
         below = self.level * size
         rate = z + self.share * (v - z)
         return sign * (w - self.level), sign * rate, sign * (once - below), sign * (twice - 0.5 * below * size)
-
-
-#: f of the ends (tip, lower end), positive while nothing happens, after a step of a size [s].
-EventFunction = Gap | Height
 
 
 def position_tolerance(ends: Ends, macro_step: float) -> float:

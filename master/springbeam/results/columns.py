@@ -50,9 +50,9 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
     phase = PHASE_NAMES[steps["phase"].astype(int)]
     if rigid:  # ends that touch and part at once: a pulling force is no contact force
         contact = np.where(phase == "touch", np.maximum(contact, 0.0), contact)
-    inside = zeros if rigid else contact
+    compliance = zeros if rigid else contact
     if scene.coupled and scene.contact.impacts:
-        inside = np.minimum(normal_compliance(scene, u, first), MOST_SHOWN)
+        compliance = np.minimum(normal_compliance(scene, u, first), MOST_SHOWN)
     energies = ledger(steps)
     table = {
         "time": steps["time"],
@@ -61,8 +61,8 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
         "y": y,
         "z": z,
         "contact_force": contact,
-        "compliance_force": inside,
-        "tie_reaction": contact - inside if rigid else zeros,
+        "compliance_force": compliance,
+        "tie_reaction": contact - compliance if rigid else zeros,
         "foundation_force": steps["foundation_force_after"],
         "gap": u - y,
         "phase": phase,
@@ -118,8 +118,8 @@ def trajectory_of(
     scene: Scene, steps: np.ndarray, events: list[Event], shapes: np.ndarray | None, summary: dict[str, Any]
 ) -> Trajectory:
     """Return the run of records, events and shapes; parameters as of `springbeam.results.recording`."""
-    inside = steps if steps["size"].any() else None
-    return Trajectory(scene, columns(scene, steps, steps[:1]), events, shapes, summary, inside)
+    between = steps if steps["size"].any() else None
+    return Trajectory(scene, columns(scene, steps, steps[:1]), events, shapes, summary, between)
 
 
 def normal_compliance(scene: Scene, u: np.ndarray, first: np.ndarray) -> np.ndarray:

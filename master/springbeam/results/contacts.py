@@ -17,10 +17,10 @@ from .trajectory import Contact, Trajectory
 from .window_peak import peak_force
 
 
-def contacts_as_array(found: Sequence[Contact]) -> np.ndarray:
+def contacts_as_array(each_contact: Sequence[Contact]) -> np.ndarray:
     """Return contacts as an array of their columns, NaN for ``None``."""
     kind = np.dtype([(name, "<f8") for name in Contact._fields])
-    return np.array([tuple(nan if value is None else value for value in contact) for contact in found], kind)
+    return np.array([tuple(nan if value is None else value for value in contact) for contact in each_contact], kind)
 
 
 def contacts(scene: Scene, steps: np.ndarray, events: Sequence[Event], window: float | None) -> list[Contact]:
@@ -40,8 +40,8 @@ def contacts(scene: Scene, steps: np.ndarray, events: Sequence[Event], window: f
         return []
     events = events[: int(steps["events"][-1])]  # a run that was killed may have some without their records
     between = between_tip_and_spring(events) if scene.coupled else with_foundation(events)
-    found = _Found(scene, steps, events, window)
-    return [found.contact(*each) for each in between]
+    run = _Run(scene, steps, events, window)
+    return [run.contact(*each) for each in between]
 
 
 def contacts_of(run: Trajectory) -> list[Contact]:
@@ -50,7 +50,7 @@ def contacts_of(run: Trajectory) -> list[Contact]:
     return contacts(run.scene, steps, run.events, run.summary.get("contact_force_window"))
 
 
-class _Found:
+class _Run:
     """What all contacts of a run follow from; parameters as of `contacts`."""
 
     def __init__(self, scene: Scene, steps: np.ndarray, events: Sequence[Event], window: float | None) -> None:
@@ -91,10 +91,11 @@ class _Found:
         time = self._steps["time"]
         begin = self._events[first].time
         end = float(time[-1]) if last is None else self._events[last].time
-        found = {}
+        overlaps = {}
         for row in {self._row(first), len(time) - 1 if last is None else self._row(last)}:
-            found[row] = max(min(end, float(time[row])) - max(begin, float(time[row] - self._steps["size"][row])), 0.0)
-        return found
+            start = float(time[row] - self._steps["size"][row])
+            overlaps[row] = max(min(end, float(time[row])) - max(begin, start), 0.0)
+        return overlaps
 
     def _soft(self, first: int, last: int | None, rows: slice) -> tuple[float, float, float, float, float]:
         """Return impulse, peak force and its time, depth and loss; contacts share a step by their times in it."""

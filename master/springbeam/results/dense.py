@@ -31,7 +31,7 @@ from ..motion.curves import LAST_MOMENT, Curve
 from ..motion.events import Event
 from ..scene import Scene
 from .columns import columns
-from .inner import INNER, MAGNITUDE, curves
+from .inner import INNER, MAGNITUDE, curves_of
 from .records import Records, Rows, common, joined, seated
 from .spans import Extremes as Extremes
 from .spans import rounding_of_steps, span
@@ -65,13 +65,13 @@ def at(run: Trajectory, times: Any) -> Trajectory:
     between those of the run, some 400, and less accurate; before the first shape and after the last one the beam has
     these. Raises ValueError for times outside of those that are known, and for a run that has no steps.
     """
-    found = rows_at(run, times)
+    rows = rows_at(run, times)
     table = run.shape_table
     if table is None or not len(table):
-        return found
-    there = np.column_stack([np.interp(found.time, table[:, 0], column) for column in table.T])
-    there[:, 0] = found.time
-    return replace(found, shape_table=there)
+        return rows
+    there = np.column_stack([np.interp(rows.time, table[:, 0], column) for column in table.T])
+    there[:, 0] = rows.time
+    return replace(rows, shape_table=there)
 
 
 # Also for functions of the caller's that a command gives a run. Not by assignment, which a type checker refuses.
@@ -96,7 +96,7 @@ def rows_at(run: Trajectory, times: Any) -> Trajectory:
     after = steps.take(row[between] + 1)
     np.put(records, between, _between(run.scene, before, after, run.events, wanted[between]))
     for name in INNER:
-        number, curve = curves(steps, name)
+        number, curve = curves_of(steps, name)
         begins = steps["time"][row[between]]
         share = (wanted[between] - begins) / (steps["time"][row[between] + 1] - begins)
         there = curve.among(np.searchsorted(number, row[between] + 1)).at(share)
@@ -112,16 +112,16 @@ def ends_at(run: Trajectory, times: np.ndarray) -> dict[str, np.ndarray]:
     _refuse_outside(steps["time"], times)
     made = np.flatnonzero(steps["size"] > 0.0)
     begins = steps["time"][made - 1]
-    found = {name: np.empty(len(times)) for name in (*PLACES, *SPEEDS) if name in run.columns}
+    ends = {name: np.empty(len(times)) for name in (*PLACES, *SPEEDS) if name in run.columns}
     for begin in range(0, len(times), _TOGETHER):
         some = slice(begin, begin + _TOGETHER)
         step = made[np.maximum(np.searchsorted(begins, times[some], side="right") - 1, 0)]
         after, which = np.unique(step, return_inverse=True)
         curves = motion(run.scene.contact.rigid, Rows(steps, after - 1), Rows(steps, after))
         share = (times[some] - steps["time"][step - 1]) / steps["size"][step]
-        for name, values in found.items():
+        for name, values in ends.items():
             values[some] = curves[name].among(which).at(share)
-    return found
+    return ends
 
 
 def _refuse_outside(known: np.ndarray, wanted: np.ndarray) -> None:
@@ -225,7 +225,7 @@ def forces(exchanges: bool, before: np.ndarray, steps: np.ndarray) -> dict[str, 
     reversal = mass * np.array(Curve.quintic(start, [*end, *moments], size).rate.rate.powers)
     first = np.zeros(len(steps), int) if exchanges else np.where(mass > 0.0, 4, steps["degree"].astype(int) + 1)
     sign = (-1.0) ** first
-    found = {}
+    curves = {}
     for name in ("contact_force", "foundation_force"):
         powers = np.zeros((6, len(steps)))
         if not exchanges:
@@ -234,33 +234,33 @@ def forces(exchanges: bool, before: np.ndarray, steps: np.ndarray) -> dict[str, 
         at_start = sign * (before[f"{name}_after"] - powers[0])
         at_end = steps[f"{name}_end"] - powers.sum(axis=0)
         powers += 0.5 * ((at_end + at_start) * _LEGENDRE[:, first] + (at_end - at_start) * _LEGENDRE[:, first + 1])
-        found[name] = Curve(powers, size)
-    return found
+        curves[name] = Curve(powers, size)
+    return curves
 
 
 def _between(
     scene: Scene, before: np.ndarray, after: np.ndarray, events: Sequence[Event], times: np.ndarray
 ) -> np.ndarray:
     """Return records at ``times`` [s] strictly between the records ``before`` and ``after``, all of shape (n,)."""
-    found: np.ndarray = before.take(np.arange(len(before)))
+    records: np.ndarray = before.take(np.arange(len(before)))
     share = (times - before["time"]) / (after["time"] - before["time"])
 
     def linear(name: str, end: np.ndarray) -> np.ndarray:
         return np.asarray((1.0 - share) * before[name] + share * end)
 
-    found["time"] = times
-    found["size"] = share * after["size"]
+    records["time"] = times
+    records["size"] = share * after["size"]
     for name, curve in forces(scene.coupling.exchanges, before, after).items():
-        found[f"{name}_after"] = curve.at(share)
+        records[f"{name}_after"] = curve.at(share)
         if name == "contact_force" and scene.contact.opens:
-            found[f"{name}_after"] = np.maximum(found[f"{name}_after"], 0.0)
+            records[f"{name}_after"] = np.maximum(records[f"{name}_after"], 0.0)
     there = {name: curve.at(share) for name, curve in motion(scene.contact.rigid, before, after).items()}
     for name in (*PLACES, *SPEEDS):
-        found[f"{name}_after"] = there[name]
+        records[f"{name}_after"] = there[name]
     if scene.coupled and not (scene.contact.rigid or scene.contact.lasting):
-        found["phase"] = np.where(seated(before), before["phase"], np.where(there["gap"] < 0.0, 2.0, 0.0))
+        records["phase"] = np.where(seated(before), before["phase"], np.where(there["gap"] < 0.0, 2.0, 0.0))
     for name in _LINEAR:
-        found[name] = linear(name, after[name])
+        records[name] = linear(name, after[name])
     # An event at the end of the step changes kinetic energy: that of the spring by an impulse times the mean velocity,
     # that of the beam by the rest of what is lost. Where ends part, the impulse is that of their common velocity.
     lost = after["impact_loss"] - before["impact_loss"]
@@ -268,6 +268,6 @@ def _between(
     on_tip, of_foundation, opens = np.array(kicks)[after["events"].astype(int)].T
     on_tip = np.where(opens > 0.0, after["reduced_mass"] * (after["z"] - after["v_tip"]), on_tip)
     to_spring = (after["events"] > before["events"]) * (of_foundation - on_tip) * 0.5 * (after["z"] + after["z_after"])
-    found["beam_kinetic"] = linear("beam_kinetic", after["beam_kinetic"] + lost + to_spring)
-    found["spring_kinetic"] = linear("spring_kinetic", after["spring_kinetic"] - to_spring)
-    return found
+    records["beam_kinetic"] = linear("beam_kinetic", after["beam_kinetic"] + lost + to_spring)
+    records["spring_kinetic"] = linear("spring_kinetic", after["spring_kinetic"] - to_spring)
+    return records

@@ -60,12 +60,12 @@ def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
     duration = float(exact.time[-1] - exact.time[0])
     impulses = [impulse_difference(run, exact), impulse_difference(exact, run)]
     late = contact_time_difference(run, exact, window)
-    found, beside = (_ends_at(of, times) for of in (run, exact))
+    ours, theirs = (_ends_at(of, times) for of in (run, exact))
     speeds = None
     if curves:
-        speeds = _velocities_apart(found, beside, times, _moments(run, exact, late), rounding / _step(exact))
+        speeds = _velocities_apart(ours, theirs, times, _moments(run, exact, late), rounding / _step(exact))
     return Distance(
-        motion(found, beside, rounding),
+        motion(ours, theirs, rounding),
         late / duration,
         max(np.nan_to_num(impulses).tolist()),
         None if exact.scene.contact.rigid else _peaks_apart(run, exact),
@@ -77,8 +77,8 @@ def distance(run: Trajectory, exact: Trajectory, window: float) -> Distance:
 def motion(columns: Mapping[str, np.ndarray], exact: Mapping[str, np.ndarray], rounding: float = 0.0) -> float:
     """Return the larger of the largest differences of u_tip and of y, `apart`, at equal times; ∞ without any."""
     names = [name for name in PLACES if name in columns and name in exact]
-    found = (apart(columns[name], exact[name], rounding) for name in names)
-    return max((float(each.max(initial=0.0)) for each in found), default=inf)
+    differences = (apart(columns[name], exact[name], rounding) for name in names)
+    return max((float(each.max(initial=0.0)) for each in differences), default=inf)
 
 
 def apart(values: np.ndarray, exact: np.ndarray, rounding: float = 0.0) -> np.ndarray:
@@ -98,13 +98,13 @@ def _velocities_apart(
 
     ``rounding`` [m/s] is that of positions over a step.
     """
-    inside = np.searchsorted(moments[:, 0], times, "right") > np.searchsorted(moments[:, 1], times, "left")
-    found = [0.0]
+    near_event = np.searchsorted(moments[:, 0], times, "right") > np.searchsorted(moments[:, 1], times, "left")
+    largest = [0.0]
     for name in (name for name in SPEEDS if name in columns and name in exact):
         fastest = max(float(np.abs(exact[of]).max(initial=0.0)) for of in SPEEDS if of in exact)
         off = apart(columns[name], exact[name], max(rounding, ROUNDING * fastest))
-        found.append(float(off[~inside].max(initial=0.0)))
-    return max(found)
+        largest.append(float(off[~near_event].max(initial=0.0)))
+    return max(largest)
 
 
 def _moments(run: Trajectory, exact: Trajectory, late: float) -> np.ndarray:
@@ -121,11 +121,11 @@ def _energies_apart(run: Trajectory, exact: Trajectory) -> float:
     """
     assert exact.steps is not None
     largest = FLOOR * ROUNDING * float(energy_of_force(exact.steps).sum())
-    found = 0.0
+    difference = 0.0
     for name in (name for name in exact.columns if name.startswith("e_")):
         largest = max(largest, float(np.abs(exact[name]).max()))
-        found = max(found, abs(float(run[name][-1] - exact[name][-1])))
-    return found / (largest or 1.0)
+        difference = max(difference, abs(float(run[name][-1] - exact[name][-1])))
+    return difference / (largest or 1.0)
 
 
 def _step(run: Trajectory) -> float:

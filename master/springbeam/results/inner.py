@@ -21,7 +21,7 @@ INNER = ("clamp_force", "clamp_moment", "bending_stress")
 MAGNITUDE = "bending_stress"
 
 
-def curves(steps: np.ndarray, name: str) -> tuple[np.ndarray, Curve]:
+def curves_of(steps: np.ndarray, name: str) -> tuple[np.ndarray, Curve]:
     """Return the numbers of the records that end a step, shape (n,), and the curve of a column over each.
 
     Parameters
@@ -55,21 +55,17 @@ def curves(steps: np.ndarray, name: str) -> tuple[np.ndarray, Curve]:
     return made, Curve.cubic((start, first), (end, last), size)
 
 
-def inside(steps: np.ndarray, name: str) -> Extremes:
-    """Return the extremes of a column of `INNER` on its curve."""
-    made, curve = curves(steps, name)
-    extremes = Extremes.of_rows(steps["time"], steps[name])
-    if len(made):
-        extremes = extremes.along(curve, steps["time"][made - 1])
-    return extremes._replace(lowest=max(extremes.lowest, 0.0)) if name == MAGNITUDE else extremes
-
-
 def largest(run: Trajectory, name: str) -> Extremes:
     """Return the extremes of a column of a body in ``run``, on its curve where it has one.
 
     The first row is left out where it contradicts the clamp (`Trajectory.without_start`).
     """
     later = run.without_start()
+    extremes = Extremes.of_rows(later.time, later[name])
     if name not in INNER or run.steps is None:
-        return Extremes.of_rows(later.time, later[name])
-    return inside(run.steps[-len(later) :], name)
+        return extremes
+    steps = run.steps[-len(later) :]
+    made, curve = curves_of(steps, name)
+    if len(made):
+        extremes = extremes.along(curve, steps["time"][made - 1])
+    return extremes._replace(lowest=max(extremes.lowest, 0.0)) if name == MAGNITUDE else extremes

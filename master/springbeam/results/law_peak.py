@@ -42,9 +42,9 @@ def peak_of_law(law: SoftLaw, steps: np.ndarray) -> tuple[float, float]:
         for k in np.argsort(-most):
             if most[k] <= best * (1.0 + _ALIKE):
                 break
-            found, share = _largest(law, penetration.one(k))
-            if found > best:
-                best = found
+            force, share = _largest(law, penetration.one(k))
+            if force > best:
+                best = force
                 time = float(steps["time"][after[k]] - (1.0 - share) * penetration.size[k])
     return max(best, 0.0), time
 

@@ -81,10 +81,10 @@ def span(values: Any, rounding: float = 0.0) -> float:
 
 def rounding_of(run: Trajectory) -> float:
     """Return the rounding [m] of the positions of ``run``: of its ends, and of the beam between them."""
-    found = [float(np.abs(run.columns[name]).max(initial=0.0)) for name in ("u_tip", "y") if name in run.columns]
+    largest = [float(np.abs(run.columns[name]).max(initial=0.0)) for name in ("u_tip", "y") if name in run.columns]
     if run.shapes is not None:
-        found.append(float(np.abs(run.shapes[1]).max(initial=0.0)))
-    of_positions = ROUNDING * max(found, default=0.0)
+        largest.append(float(np.abs(run.shapes[1]).max(initial=0.0)))
+    of_positions = ROUNDING * max(largest, default=0.0)
     return of_positions if run.steps is None else max(of_positions, rounding_of_steps(run.steps, _tolerance(run)))
 
 

@@ -95,47 +95,47 @@ def totals(
         Of the positions of the tip.
     """
     events = list(events)
-    found: dict[str, float | int] = {}
+    numbers: dict[str, float | int] = {}
     beam = scene.upper is not None
     spring = scene.lower is not None
     stop = scene.stop is not None and not scene.elastic_stop
     if scene.coupled or (beam and stop):
-        found |= _contact(scene, steps, events, window)
+        numbers |= _contact(scene, steps, events, window)
     if beam:
-        found |= {"deepest_tip": tip.lowest, "deepest_tip_time": tip.lowest_time}
+        numbers |= {"deepest_tip": tip.lowest, "deepest_tip_time": tip.lowest_time}
     if stop:
-        found["stop_strokes"] = sum(event.kind.strikes for event in events)
-        held = impulse(steps, "foundation_force").sum()
-        found["foundation_impulse"] = held + sum(event.impulse_foundation for event in events)
-        found["loss_stop"] = sum(event.energy_loss for event in events if event.kind.strikes)
+        numbers["stop_strokes"] = sum(event.kind.strikes for event in events)
+        pressed = impulse(steps, "foundation_force").sum()
+        numbers["foundation_impulse"] = pressed + sum(event.impulse_foundation for event in events)
+        numbers["loss_stop"] = sum(event.energy_loss for event in events if event.kind.strikes)
     if beam and spring:
-        found["loss_impact"] = sum(e.energy_loss for e in events if not e.kind.strikes)
+        numbers["loss_impact"] = sum(e.energy_loss for e in events if not e.kind.strikes)
     if impacts := [event.time for event in events if event.kind.collision or event.kind.strikes]:
-        found["last_impact_time"] = impacts[-1]
+        numbers["last_impact_time"] = impacts[-1]
     return {
-        name: float(value) if name not in TOTALS or TOTALS[name].unit else int(value) for name, value in found.items()
+        name: float(value) if name not in TOTALS or TOTALS[name].unit else int(value) for name, value in numbers.items()
     }
 
 
 def _contact(scene: Scene, steps: np.ndarray, events: list[Event], window: float | None) -> dict[str, float | int]:
-    found: dict[str, float | int] = {"contact_impulse": gained(steps, events).sum()}
+    numbers: dict[str, float | int] = {"contact_impulse": gained(steps, events).sum()}
     if window is None:
         assert scene.soft_law is not None
         largest, since = peak_of_law(scene.soft_law, steps)
     else:
         largest, since = peak_force(steps, events, window)
-        found["contact_force_window"] = window
-    found |= {"contact_force_max": largest, "contact_force_max_time": since}
+        numbers["contact_force_window"] = window
+    numbers |= {"contact_force_max": largest, "contact_force_max_time": since}
     if scene.contact.lasting and scene.coupled:
-        return found
+        return numbers
     end = float(steps["time"][-1])
     intervals = tip_contacts(scene, events, end) if scene.coupled else foundation_contacts(events, end)
     lengths = [until - since for since, until in intervals]
-    found |= {"contact_duration": max(lengths, default=0.0), "contact_duration_total": sum(lengths)}
-    found["number_of_contacts"] = len(intervals)
+    numbers |= {"contact_duration": max(lengths, default=0.0), "contact_duration_total": sum(lengths)}
+    numbers["number_of_contacts"] = len(intervals)
     if intervals and intervals[-1][1] == end and joined(steps[-1]):
-        found["bounce_time"] = intervals[-1][0] - intervals[0][0]
+        numbers["bounce_time"] = intervals[-1][0] - intervals[0][0]
     opened = max((until for _, until in intervals if until < end), default=None)
     if left := [event.v_tip for event in events if event.time == opened and event.v_tip is not None]:
-        found["rebound_velocity"] = left[-1]
-    return found
+        numbers["rebound_velocity"] = left[-1]
+    return numbers

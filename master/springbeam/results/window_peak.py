@@ -51,9 +51,9 @@ def peak_force(steps: np.ndarray, events: Iterable[Event], window: float) -> tup
     c, b, twice_a = upto(middle + window, "right", 1, 2, 3) - upto(middle, "right", 1, 2, 3)
     with np.errstate(divide="ignore", invalid="ignore"):
         root = 2.0 * c / (np.sqrt(b**2 - 2.0 * twice_a * c) - b)
-    inside = np.where(np.abs(root) < half, middle + root, edges[:-1])
-    first = np.maximum(np.concatenate([rows - window, rows, inside]), rows[0])
-    last = np.minimum(np.concatenate([rows, rows + window, inside + window]), rows[-1])
+    turning = np.where(np.abs(root) < half, middle + root, edges[:-1])
+    first = np.maximum(np.concatenate([rows - window, rows, turning]), rows[0])
+    last = np.minimum(np.concatenate([rows, rows + window, turning + window]), rows[-1])
     # Where the ends pull at each other, a window that the run cuts short would have the larger mean.
     rounding = 4.0 * EPS * np.abs(rows).max()
     whole = last - first >= min(window, rows[-1] - rows[0]) - rounding
@@ -61,7 +61,7 @@ def peak_force(steps: np.ndarray, events: Iterable[Event], window: float) -> tup
     last = last[whole]
     (most,) = np.maximum(upto(last, "left", 0), upto(last, "right", 0))
     (least,) = np.minimum(upto(first, "left", 0), upto(first, "right", 0))
-    found = most - least
-    largest = found.max()
-    since = first[found >= largest - _ALIKE * np.abs(passed[0]).max()].min()  # of a constant force all are alike
+    gains = most - least
+    largest = gains.max()
+    since = first[gains >= largest - _ALIKE * np.abs(passed[0]).max()].min()  # of a constant force all are alike
     return max(0.0, float(largest)) / window, float(since)

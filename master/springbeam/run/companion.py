@@ -206,14 +206,14 @@ def results_of(run: Trajectory) -> dict[str, float]:
     When an extreme comes is left out, which jumps where two are alike.
     """
     names = [name for name in (*TOTALS, *LOSS_NAMES) if name not in BESIDE]
-    found = {name: float(run.summary[name]) for name in names if run.summary.get(name) is not None}
+    results = {name: float(run.summary[name]) for name in names if run.summary.get(name) is not None}
     later = run.without_start()
     for name in (name for name in ("v_tip", "z") if name in later.columns):
-        found[f"max_{name}"] = float(np.abs(later[name]).max(initial=0.0))
+        results[f"max_{name}"] = float(np.abs(later[name]).max(initial=0.0))
     for column in (column for column in BODY_COLUMNS if column in run.columns and len(later)):
         lowest, _, highest, _ = largest(run, column)
-        found[f"max_{column}"] = max(highest, -lowest)
-    return found
+        results[f"max_{column}"] = max(highest, -lowest)
+    return results
 
 
 def _why_not(run: Trajectory, errors: Mapping[str, float], ratio: float) -> str:

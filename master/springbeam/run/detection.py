@@ -177,26 +177,26 @@ class Detector:
 
         Under the force of a shorter step the ends move differently, so all guards are asked again after a cut.
         """
-        found: EventKind | None = None
+        kind: EventKind | None = None
         guards = self.guards(state.phase)
         for _ in range(2 * len(guards) + 1):
             for guard in guards:
                 bracket = self._bracket(state, guard, step)
-                if bracket is not None and not (guard.kind is found and bracket is step):
+                if bracket is not None and not (guard.kind is kind and bracket is step):
                     break
             else:
                 if not self.pair.opens_softly or (touched := self._touched_inside(state, step)) is step:
                     break
                 step = touched
-                found = None
+                kind = None
                 continue
-            found = guard.kind
+            kind = guard.kind
             step = self._located(state, guard, bracket)
             if step.size < SAME * self.H:
                 # Too short for a contact force: velocities that differ would be turned round by an infinite one.
                 self.pair.rewind()
-                return step._replace(size=0.0, end=step.start), found
-        return self.pair.repeated(state, step), found
+                return step._replace(size=0.0, end=step.start), kind
+        return self.pair.repeated(state, step), kind
 
     def _bracket(self, state: State, guard: Position | Push, step: Step) -> Step | None:
         """Return ``step`` if ``guard`` ends below its floor, a shorter one if it dips below it before, or None."""

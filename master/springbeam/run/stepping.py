@@ -158,9 +158,9 @@ class Pair:
             contact_force = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
         joint = Joint.TIED if self.law is not None and self.setup.lasting else Joint.FREE
         seated = self.setup.at_rest and not self.alone and low.displacement == self.setup.floor
-        held = (contact_force, 0.0, 0.0)
+        constant = (contact_force, 0.0, 0.0)
         alone = self.alone and self.law is None
-        return State(time, ends, Phase(joint, seated), contact=held, foundation=held if alone else NO_FORCE)
+        return State(time, ends, Phase(joint, seated), contact=constant, foundation=constant if alone else NO_FORCE)
 
     def mark(self) -> None:
         """Remember the bodies' states as those that steps start from."""
@@ -315,11 +315,11 @@ class Pair:
         """Return `Body.decay` of ``body``, asked once; 0 where that is not known."""
         if id(body) not in self._decays:
             speed = max(abs(end.velocity) for end in self.ends())
-            found = body.decay(time, macro_step, speed)
-            if found is None:
+            decay = body.decay(time, macro_step, speed)
+            if decay is None:
                 self.without_acceleration.append(body)
             # An impulse that is gone within the step leaves no velocity to be taken out.
-            self._decays[id(body)] = found if found is not None and found * macro_step < _KEPT else 0.0
+            self._decays[id(body)] = decay if decay is not None and decay * macro_step < _KEPT else 0.0
         return self._decays[id(body)]
 
     def _ties(self, phase: Phase) -> bool:
