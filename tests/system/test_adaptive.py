@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import scenes
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
 
@@ -59,15 +60,8 @@ def test_fine_data_ends_no_steps(tmp_path):
     times = np.linspace(0.0, 0.3, 1201)
     record = sum(np.sin(2.0 * np.pi * f * times + f) / f for f in (3.0, 7.0, 13.0, 23.0))
     np.savetxt(tmp_path / "record.csv", np.column_stack([times, record]), delimiter=",")
-    scene = with_changes(
-        load_scene("soft"),
-        time={"t_end": 0.35},
-        beam={"n_elements": 10, "n_modes": 6, "alpha_b": 1e-3, "initial_velocity_slope": 0.0, "approach": "elastic"},
-        spring={"damping": 0.5},
-        stop=None,
-        contact={"law": "tie"},
-        loads=[{"on": "base", "signal": "table", "file": str(tmp_path / "record.csv"), "amplitude": 20.0}],
-    )
+    load = {"on": "base", "signal": "table", "file": str(tmp_path / "record.csv"), "amplitude": 20.0}
+    scene = with_changes(scenes.named("shaken"), loads=[load])
     every_line = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": 2.5e-4}))
     assert every_line.summary["macro_steps"] >= 1400
     for tolerance, most in ((1e-4, 46), (1e-6, 140)):

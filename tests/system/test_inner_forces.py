@@ -40,20 +40,8 @@ def test_largest_inner_forces_are_those_of_the_curve(steps, most, rows_miss):
 
     The curve misses a part of order 4, by the companion run no more than that either.
     """
-    beam = {"length": 0.5, "width": 0.02, "height": 0.005, "density": 7850.0, "young_modulus": 2.1e11, "alpha_b": 1e-5}
-    scene = {
-        "time": {"t_end": 0.5},
-        "beam": {
-            **beam,
-            "poisson_ratio": 0.3,
-            "n_elements": 8,
-            "element_degree": 4,
-            "n_modes": 2,
-            "approach": "elastic",
-        },
-        "loads": [{"on": "tip", "signal": "harmonic", "amplitude": 5.0, "frequency": 9.0}],
-    }
-    fine, run = (simulate(scene | {"coupling": {"macro_step": 0.5 / n}}) for n in (4000, steps))
+    scene = scenes.named("driven at 9 Hz")
+    fine, run = (simulate(with_changes(scene, coupling={"macro_step": 0.5 / n})) for n in (4000, steps))
     missed = []
     for name in ("clamp_force", "clamp_moment", "bending_stress"):
         exact = METRICS[f"max_{name}"](fine)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import oscillator
 import pytest
 from references import reference
-from scenes import group
+from scenes import group, named
 
 import springbeam
 from springbeam import PointMass, SpringDamper, load_scene, simulate, with_changes
@@ -65,26 +65,16 @@ def test_the_error_of_any_function_of_a_run_is_that_of_both():
     assert abs(found.run.summary["bounce_time"] - fine.summary["bounce_time"]) <= said["bounce_time"]
 
 
-def falling():
-    """Scene of a mass that falls onto a spring."""
-    return scene_from_dict(
-        {
-            "time": {"t_end": 1.0},
-            "beam": {"element": "point_mass", "mass": 2.0, "displacement": 0.1, "velocity": -1.0},
-            "spring": {"mass": 1.0, "linear_stiffness": 300.0},
-            "contact": {"stiffness": 1e4, "exponent": 3.0},
-            "coupling": {"macro_step": 0.01},
-        }
-    )
+FALLING = named("falling")
 
 
 def test_bodies_of_the_caller_are_judged_if_they_can_return_to_their_start():
     upper = PointMass(2.0, displacement=0.1, velocity=-1.0)
     lower = SpringDamper(1.0, 300.0)
-    run = simulate(falling(), upper=upper, lower=lower)
+    run = simulate(FALLING, upper=upper, lower=lower)
     assert run.summary["resolved"]
     assert (upper.motion().displacement, lower.motion().displacement) == (run.u_tip[-1], run.y[-1])
-    with_element = simulate(falling(), lower=SpringDamper(1.0, 300.0))
+    with_element = simulate(FALLING, lower=SpringDamper(1.0, 300.0))
     assert run.summary["errors"]["motion"] == with_element.summary["errors"]["motion"]
 
 
@@ -127,7 +117,7 @@ def test_a_body_with_steps_of_one_size_in_a_prime_number_of_them_has_no_companio
 
 
 def test_a_run_without_a_companion_says_why(monkeypatch):
-    run = simulate(falling(), check=False)
+    run = simulate(FALLING, check=False)
     monkeypatch.setattr(companion, "run_in_memory", lambda *_, **__: (_ for _ in ()).throw(springbeam.SceneError("no")))
     found = check(run)
     assert (found.resolved, found.judged) == (None, False)
@@ -139,7 +129,7 @@ def test_a_run_without_a_companion_says_why(monkeypatch):
 def test_a_companion_that_stops_early_leaves_the_run_unresolved(monkeypatch):
     """An exchange that is unstable at 2.3 times its steps: the energy grows beyond what stops a run."""
     contact = {"law": "compliance", "stiffness": 1e6, "exponent": 1.0}
-    scene = with_changes(falling(), contact=contact, coupling={"scheme": "jacobi", "macro_step": 3e-5})
+    scene = with_changes(FALLING, contact=contact, coupling={"scheme": "jacobi", "macro_step": 3e-5})
     found = check(simulate(scene, check=False))
     assert found.resolved is False
     assert found.why_not.startswith("not resolved: ")
@@ -148,7 +138,7 @@ def test_a_companion_that_stops_early_leaves_the_run_unresolved(monkeypatch):
 @pytest.mark.parametrize("steps", [1, 4, 8])
 def test_a_run_of_few_steps_has_a_companion_in_shorter_ones(steps):
     """A mass on a spring alone, whose error at degree 2 is rounding, and a contact, whose error is not."""
-    scene = with_changes(falling(), coupling={"macro_step": 1.0 / steps})
+    scene = with_changes(FALLING, coupling={"macro_step": 1.0 / steps})
     found = check(simulate(scene, check=False))
     assert found.ratio == 1.0 / LONGER
     fine = simulate(with_changes(scene, coupling={"macro_step": 1e-3}), check=False)
@@ -164,16 +154,16 @@ def test_an_adaptive_run_has_a_companion_with_larger_tolerances():
 
 
 def test_an_unfinished_run_is_not_checked():
-    run = simulate(falling(), check=False)
+    run = simulate(FALLING, check=False)
     with pytest.raises(ValueError, match="has not come to its end"):
         check(replace(run, summary={**run.summary, "status": "stopped"}))
 
 
 def test_a_case_of_a_study_has_the_error_of_each_metric():
-    found = measured(falling, metrics_of(["y_min", "number_of_contacts", "max_z"]))
-    run = check(simulate(falling(), check=False))
+    found = measured(lambda: FALLING, metrics_of(["y_min", "number_of_contacts", "max_z"]))
+    run = check(simulate(FALLING, check=False))
     assert found["error_y_min"] == run.error_of(metrics_of(["y_min"])["y_min"])
     assert found["error_number_of_contacts"] == 0.0
-    unjudged = measured(falling, metrics_of(["y_min"]), judge=False)
+    unjudged = measured(lambda: FALLING, metrics_of(["y_min"]), judge=False)
     assert "error_y_min" not in unjudged
     assert found["y_min"] == unjudged["y_min"]

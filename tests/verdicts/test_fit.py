@@ -11,11 +11,10 @@ import pytest
 from commands import Interrupt, command, printed, refused
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
-from scenes import scene_from_dict
+from scenes import named, scene_from_dict
 from scipy.stats import t as student
 
 from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
-from springbeam.scene import as_scene
 from springbeam.signals.measured import Measured, read_measured, residuals
 from springbeam.studies.fit import study as fit
 from springbeam.studies.fit.least import Search
@@ -272,14 +271,7 @@ def test_of_minima_one_bounce_apart_the_lower_wins(tmp_path):
 
     That was called determined (with seeds 1 to 5); the right minimum is a third lower.
     """
-    scene = as_scene(
-        {
-            "time": {"t_end": 6.0},
-            "spring": {"mass": 1.0, "linear_stiffness": 9.0, "damping": 0.1, "equilibrium": 0.5, "unloaded": 0.0},
-            "stop": {"position": -0.2, "restitution": 0.7},
-            "coupling": {"macro_step": 0.05},
-        }
-    )
+    scene = named("bounces")
     times = np.linspace(2.122, 5.92, 79)
     values = simulate(scene).at(times)["y"]
     noise = 0.03 * np.ptp(values) * np.random.default_rng(1).normal(size=len(times))
