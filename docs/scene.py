@@ -7,7 +7,9 @@ from pathlib import Path
 
 from pages import DOCS, table  # beside this script
 
-from springbeam.scene import messages
+from springbeam.cli import keys as listing
+from springbeam.scene.messages import schema as schema_of_scenes
+from springbeam.scene.tables import OneOf, Table
 
 HEAD = """# Scene files
 
@@ -39,7 +41,7 @@ SHORT = {
 COLUMNS = ("key", "value", "default", "meaning")
 
 
-def row(key: messages.Key) -> tuple[str, ...]:
+def row(key: listing.Key) -> tuple[str, ...]:
     """Return a line of a table."""
     value = key.allowed
     for words, short in SHORT.items():
@@ -49,16 +51,22 @@ def row(key: messages.Key) -> tuple[str, ...]:
     return f"`{key.name}`{unit}", value, default, key.meaning.replace("|", "\\|")
 
 
+def models_of(name: str) -> list[type[Table]]:
+    """Return the alternatives for a table."""
+    model = listing.MODELS[name]
+    return [*model.tables.values()] if isinstance(model, OneOf) else [model]
+
+
 def page() -> str:
     """Return the text of scene.md."""
     lines = [HEAD]
-    for name in messages.MODELS:
-        heading = messages.heading(name)
-        lines += [f"## {heading}\n\n{messages.about(name)}\n" if name else f"## {heading.capitalize()}\n"]
-        for ways in [ways for model in messages.models_of(name).values() for ways in model.WAYS]:
+    for name in listing.MODELS:
+        heading = listing.heading(name)
+        lines += [f"## {heading}\n\n{listing.about(name)}\n" if name else f"## {heading.capitalize()}\n"]
+        for ways in [ways for model in models_of(name) for ways in model.WAYS]:
             marked = ", or ".join(" and ".join(f"`{key}`" for key in group) for group in ways)
             lines.append(f"Give only one of these: {marked}.\n")
-        keys = messages.listed(name)
+        keys = listing.listed(name)
         some = any(key.of for key in keys)
         rows = [(*row(key), key.of) if some else row(key) for key in keys]
         lines += [*table((*COLUMNS, "with") if some else COLUMNS, rows), ""]
@@ -67,7 +75,7 @@ def page() -> str:
 
 def files() -> dict[Path, str]:
     """Return the text of each file."""
-    schema = json.dumps(messages.schema(), indent=1, ensure_ascii=False)
+    schema = json.dumps(schema_of_scenes(), indent=1, ensure_ascii=False)
     return {DOCS / "scene.md": page(), DOCS / "scene.schema.json": f"{schema}\n"}
 
 

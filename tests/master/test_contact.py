@@ -8,7 +8,8 @@ from bodies import interface_of
 from springbeam import Motion, load_scene, with_changes
 from springbeam.contact.phases import Automaton, Instant, Joint, Phase
 from springbeam.motion.events import EventKind
-from springbeam.scene.laws import Compliance, KelvinVoigt, Link, depth
+from springbeam.scene.laws import Compliance, KelvinVoigt, Link
+from springbeam.studies.linearised import depth
 
 
 def automaton_of(scene="soft", tip_mass=0.01, mass=1.0, equilibrium=0.0, **tables):

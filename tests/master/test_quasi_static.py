@@ -9,8 +9,8 @@ from scenes import scene_from_dict
 from springbeam.bodies.quasi_static import QuasiStaticBeam
 from springbeam.monolithic.semi_discrete import assemble, constant_forces
 from springbeam.scene import Beam, load_scene, statics, with_changes
-from springbeam.scene.linearised import contact_energy
 from springbeam.scene.statics import SHAPE_POINTS
+from springbeam.studies.linearised import contact_energy
 
 BEAM = Beam.with_ones(
     density=2.0, area=0.5, second_moment_of_area=0.3, young_modulus=30.0, shear_modulus=50.0, shear_coefficient=0.8,

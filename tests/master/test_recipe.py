@@ -10,7 +10,7 @@ from springbeam import simulate
 from springbeam.monolithic import event_driven
 from springbeam.monolithic import laws as references
 from springbeam.scene import Scene, laws, load_scene, with_changes
-from springbeam.scene.linearised import contact_energy
+from springbeam.studies.linearised import contact_energy
 from springbeam.studies.predict import predict
 
 PAGE = Path(__file__).parents[2] / "docs" / "contributing.md"

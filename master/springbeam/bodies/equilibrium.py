@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 
 from ..scene import Beam, Scene, SceneError
-from ..scene.linearised import hilltop
+from ..scene.energies import hilltop
 from ..scene.partners import RigidWallElement, SpringDamperElement
 from ..scene.statics import mesh_compliance, resting_height
 

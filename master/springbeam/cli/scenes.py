@@ -18,7 +18,7 @@ from .common import BAD_INPUT, JsonOption, SceneArgument, SettingsOption, fail, 
 
 
 def _complete_table(incomplete: str) -> list[str]:
-    from ..scene.messages import MODELS
+    from .keys import MODELS
 
     return [name for name in MODELS if name and name.startswith(incomplete)]
 
@@ -57,19 +57,20 @@ def keys(
 
     Example: springbeam keys beam
     """
-    from ..scene import messages
+    from . import keys as described
 
     if schema:
         from ..results.document import as_json as json_of
+        from ..scene.messages import schema as schema_of_scenes
 
-        document = messages.schema()
+        document = schema_of_scenes()
         return Findings(document, files=[("", json_of(document).decode())])
     if metrics:
         from ..studies.metrics import METRICS, heading
 
         listed = [{"name": name, "unit": m.unit, "meaning": m.words} for name, m in METRICS.items()]
         return Findings(listed, files=[("", f"{heading(name)}: {m.words}") for name, m in METRICS.items()])
-    known = messages.listed()
+    known = described.listed()
     if what is not None:
         wanted = re.sub(r"\.\d+", "", what)  # loads.0.frequency is a key of loads
         known = [key for key in known if wanted in (key.table, f"{key.table}.{key.name}".lstrip("."))]
@@ -77,7 +78,7 @@ def keys(
             fail(BAD_INPUT, f"{what}: no table and no key; springbeam keys lists all")
     shown: list[Any] = []
     for name, group in groupby(known, lambda key: key.table):
-        title = f"\n{messages.heading(name)}  {messages.about(name)}" if name else messages.heading(name)
+        title = f"\n{described.heading(name)}  {described.about(name)}" if name else described.heading(name)
         shown.append(Text(title, style="bold"))
         for key in group:
             unit = "" if key.unit == "–" else f" [{key.unit}]"

@@ -13,7 +13,6 @@ from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError
 from ..scene.frequencies import slowest_frequency
 from ..scene.laws import TransmissionContact
-from ..scene.linearised import spring_frequency
 
 #: Table 2 by figure: iterations per solve of (53), and time per step [s]. Its header says "Figure 5" twice; the third
 #: column is taken as Figure 4.
@@ -51,8 +50,12 @@ def steps(scene: Scene) -> Iterator[tuple[float, float]]:
 def _not_resolved(scene: Scene) -> str | None:
     """Return in words by how much the slowest oscillation turns in a step; ``None`` if it is at most 1 rad."""
     assert scene.beam is not None
+    assert scene.spring is not None
     H = scene.coupling.H
-    turn = H * max(slowest_frequency(scene.beam), spring_frequency(scene))
+    p = scene.spring
+    heights = [p.equilibrium] if scene.stop is None else [p.equilibrium, scene.stop.position]
+    stiffest = max(0.0, *map(p.stiffness, heights))
+    turn = H * max(slowest_frequency(scene.beam), (stiffest / p.mass) ** 0.5)
     if turn <= 1.0:
         return None
     return (

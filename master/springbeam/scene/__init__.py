@@ -2,9 +2,9 @@
 
 Imports nothing else of the package. Modules, from below: ``tables`` (the keys), ``laws``, ``loads`` and ``schemes``
 (those of ``[contact]``, ``[[loads]]`` and ``[coupling]``; ``recorded`` reads the file of a load) → ``scene`` (all
-tables) → ``messages`` (keys and errors in words): these load numpy when they compute. ``statics`` → ``linearised``
-(energies), ``frequencies`` → ``plausibility`` (warnings), ``rules`` (errors) → ``reading`` (files, overrides; start
-here). ``files`` reads TOML; ``shipped/`` has the scenes that come with the package.
+tables) → ``messages`` (errors in words): these load numpy when they compute. ``statics`` → ``energies``,
+``frequencies`` → ``plausibility`` (warnings), ``rules`` (errors) → ``reading`` (files, overrides; start here).
+``files`` reads TOML; ``shipped/`` has the scenes that come with the package.
 """
 
 from typing import TYPE_CHECKING

@@ -161,27 +161,6 @@ class Link(SoftLaw):
         return self.damping * rate, 0.0, self.damping
 
 
-def depth(law: SoftLaw, energy: float) -> float:
-    """Return the penetration [m] at which a one-sided ``law`` stores ``energy`` [J], to rounding."""
-    if energy <= 0.0:
-        return 0.0
-
-    def stores_less(p: float) -> bool:
-        try:
-            return law.potential(p) < energy
-        except OverflowError:
-            return False
-
-    low = 0.0
-    high = 1.0
-    while stores_less(high):
-        low = high
-        high = 2.0 * high
-    while low < (middle := 0.5 * (low + high)) < high:
-        low, high = (middle, high) if stores_less(middle) else (low, middle)
-    return high
-
-
 # -- tables ------------------------------------------------------------------------------------------------------------
 
 

@@ -1,4 +1,4 @@
-"""Texts about keys, values and scenes: descriptions of keys in words and as a JSON Schema, and error messages.
+"""Texts about keys, values and scenes: the JSON Schema of the keys, and error messages.
 
 The text about a key, in errors as in tables, is read from the JSON Schema of its declaration.
 """
@@ -8,33 +8,20 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 from .laws import LAW
 from .loads import SIGNAL
-from .partners import LOWER, PARTNERS, UPPER, ForeignFmu
+from .partners import LOWER, UPPER
 from .scene import TABLES, Scene
 from .schemes import SCHEME
 from .tables import OneOf, SceneError, Table
 
 #: Alternatives for a table, by its name.
 VARIANTS: dict[str, OneOf] = {"beam": UPPER, "spring": LOWER, "contact": LAW, "coupling": SCHEME, "loads": SIGNAL}
-_ELEMENTS = replace(UPPER, tables={name: PARTNERS[name] for name in UPPER.named}, default="")
-#: Tables by their names ("" for the keys outside of tables), and bodies that are not our own by theirs; or the
-#: alternatives for a table.
-MODELS: dict[str, type[Table] | OneOf] = {
-    "": Scene,
-    **TABLES,
-    "contact": LAW,
-    "coupling": SCHEME,
-    "loads": SIGNAL,
-    "fmu": ForeignFmu,
-    "element": _ELEMENTS,
-}
 #: Values by their types in the JSON Schema, in words.
 _NOUNS = {
     "number": "a finite number",
@@ -53,21 +40,6 @@ _BOUNDS = {
     "maximum": "at most",
     "exclusiveMaximum": "less than",
 }
-
-
-class Key(NamedTuple):
-    """One key of a scene file; ``table`` is "" for those outside a table.
-
-    ``of`` names the alternatives of the table that have the key, if not all do.
-    """
-
-    table: str
-    name: str
-    unit: str
-    allowed: str
-    default: str
-    meaning: str
-    of: str = ""
 
 
 @lru_cache(maxsize=1)
@@ -97,7 +69,7 @@ def models_of(table: str) -> dict[str, type[Table]]:
     ``"loads.0"`` is the first of ``[[loads]]``. Empty if there is no such table.
     """
     name = table.partition(".")[0]
-    model = VARIANTS.get(name) or MODELS.get(name)
+    model = VARIANTS.get(name) or TABLES.get(name)
     return model.tables if isinstance(model, OneOf) else {"": model} if model else {}
 
 
@@ -118,74 +90,14 @@ def allowed(key: Mapping[str, Any]) -> str:
     return f"{_NOUNS[kind]} {bounds}".strip()
 
 
-def listed(table: str | None = None) -> list[Key]:
-    """Return the keys of one table, or all."""
-    return [key for name in MODELS if table in (None, name) for key in _keys(name)]
-
-
-def _keys(table: str) -> Iterator[Key]:
-    """Yield the keys of one of `MODELS`; a key that several of its tables share once."""
-    model = MODELS[table]
-    choice = model if isinstance(model, OneOf) else OneOf(model, "", "", {"": model}, "")
-    kinds_of: dict[Key, list[str]] = {}
-    for kind, one in choice.tables.items():
-        for name, described in keys_of(one).items():
-            if not table and name in MODELS:  # a table, not a key
-                continue
-            if name == choice.name:
-                key = Key(table, name, "–", either(choice.named), choice.default or "needed", choice.meaning)
-            else:
-                key = Key(
-                    table,
-                    name,
-                    described["unit"],
-                    allowed(described),
-                    _default(one, name, described),
-                    described["description"],
-                )
-            kinds_of.setdefault(key, []).append(kind)
-    for key, kinds in kinds_of.items():
-        yield key if len(kinds) == len(choice.tables) else key._replace(of=f"{choice.name} = {either(kinds)}")
-
-
 def either(texts: Iterable[str]) -> str:
     """Return a choice of texts for an error: ``"a" or "b"``."""
     return " or ".join(json.dumps(text, ensure_ascii=False) for text in texts)
 
 
-def heading(table: str) -> str:
-    """Return the heading of a table of `MODELS` in a file."""
-    if table in ("fmu", "element"):
-        return f"[beam] or [spring] with {table}"
-    return "outside the tables" if not table else "[[loads]], any number" if table == "loads" else f"[{table}]"
-
-
 def unit_of(table: str, key: str) -> str:
     """Return the unit of a key of a table, or of a load by its number ("loads.0"); "–" if it has none."""
     return str(keys_of(*models_of(table).values())[key]["unit"])
-
-
-def about(table: str) -> str:
-    """Return the description of a table and of each of its alternatives."""
-    model = MODELS[table]
-    if not isinstance(model, OneOf):
-        return described(model)
-    kinds = [f'`{model.name} = "{kind}"`: {described(one)}' for kind, one in model.tables.items()]
-    return "\n".join([described(model.common), "", *(f"* {kind}" for kind in kinds)]).strip()
-
-
-def described(model: type) -> str:
-    """Return the docstring of a table as one line."""
-    return " ".join((model.__doc__ or "").split()).replace("``", "`")
-
-
-def _default(model: type[Table], name: str, key: Mapping[str, Any]) -> str:
-    if "otherwise" in key:
-        return str(key["otherwise"])
-    if model.model_fields[name].is_required():
-        return "needed" + (", or dimensionless" if name in model.SCALES else "")
-    default = key.get("default")
-    return "none" if default in (None, "") else str(default).lower()
 
 
 # -- errors ------------------------------------------------------------------------------------------------------------
@@ -207,8 +119,9 @@ _KINDS: dict[str, type] = {"integer": int, "boolean": bool, "number": float}
 
 def scene_keys() -> list[str]:
     """Return all keys of our own bodies and of the other tables as ``table.key``."""
-    places = {**{table: table for table in TABLES}, "loads": "loads.0"}
-    return list(dict.fromkeys(f"{places[key.table]}.{key.name}" for key in listed() if key.table in places))
+    models = {**{table: [TABLES[table]] for table in ("beam", "spring")}, "loads.0": models_of("loads").values()}
+    tables = [*TABLES, "loads.0"]
+    return [f"{table}.{name}" for table in tables for name in keys_of(*models.get(table, models_of(table).values()))]
 
 
 def key_kind(table: str, key: str) -> type:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
+from .energies import beam_energy, spring_energy, well_depth
 from .laws import LAW
-from .linearised import beam_energy, spring_energy, well_depth
 from .loads import Load
 from .messages import filled
 from .scene import TABLES, Scene

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from .energies import hilltop, largest_load, spring_energy, well_depth
 from .laws import LAWS
-from .linearised import hilltop, largest_load, spring_energy, well_depth
 from .loads import MOST_POINTS, Load
 from .messages import at, either, filled
 from .partners import MovingWallElement, RigidWallElement, SpringDamperElement

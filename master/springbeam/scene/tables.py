@@ -1,7 +1,7 @@
 """The tables of a scene file, one class each: meaning, unit, default and range of every key.
 
 Field names are those of the FMU parameters; units are SI. `springbeam.scene.rules` has conditions on several tables,
-`springbeam.scene.messages` lists the keys and makes ``docs/scene.md`` and the JSON Schema from them.
+`springbeam.scene.messages` makes the JSON Schema from them, `springbeam.cli.keys` lists them.
 """
 
 import re

@@ -30,10 +30,9 @@ from ..run.companion import LONGER
 from ..run.outcome import RunStopped
 from ..run.runner import Simulation
 from ..scene import Beam, Scene, with_changes
-from ..scene.laws import depth
-from ..scene.linearised import closing_speed, contact_energy, spring_frequency, spring_stiffness
 from ..scene.plausibility import warnings_of
 from ..scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
+from .linearised import closing_speed, contact_energy, depth, spring_frequency, spring_stiffness
 
 #: A coupling is called unstable where its spectral radius exceeds 1 by more than this: e-fold growth in 1000 steps.
 THRESHOLD = 1e-3
