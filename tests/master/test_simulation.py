@@ -93,5 +93,6 @@ def test_a_contact_too_stiff_for_its_degree_is_made_in_shorter_steps_and_keeps_t
     law = {"law": "compliance", "stiffness": 1e18, "exponent": 1.0}
     coupling = {"scheme": "energy", "degree": 2, "macro_step": 4e-3}
     run = simulate(soft(10, contact=law, stop=None, time={"t_end": 0.1}, coupling=coupling), check=False)
-    assert 0 < run.summary["halved_steps"] < 0.5 * run.summary["macro_steps"]
+    assert run.summary["halved_steps"] > 0
+    assert run.summary["macro_steps"] < 50  # twice as many as asked for
     assert run.summary["max_energy_residual"] < 1e-5
