@@ -232,41 +232,38 @@ class Beam::Trial {
   Trial(const Trial&) = delete;
   Trial& operator=(const Trial&) = delete;
   ~Trial() { beam_.restore(state_); }
-  /// At rest, under nothing.
-  void clear() { beam_.restore({Eigen::VectorXd::Zero(state_.q.size()), Eigen::VectorXd::Zero(state_.v.size()), {}}); }
 
  private:
   Beam& beam_;
   State state_;
 };
 
-Beam::Forecast Beam::forecast(double size) {
+double Beam::forecast(double size) {
   const Trial trial(*this);
-  const double u = tip_displacement(), v = tip_velocity();
+  const double u = tip_displacement();
   Loads loads;
   for (std::size_t i = 0; i < Loads::count; ++i) loads.set(i, {now_.scalars.loads[i], 0.0, 0.0});
   for (int i = 0; i < 2; ++i) move(size, {}, loads);
-  return {(tip_displacement() - u) / (2.0 * size), (tip_velocity() - v) / (2.0 * size)};
+  return (tip_displacement() - u) / (2.0 * size);
 }
 
-Beam::Forecast Beam::forecast_per_load(double size, std::size_t shape) {
-  Trial trial(*this);
-  trial.clear();
-  now_.scalars.loads[shape] = 1.0;
+double Beam::forecast_rate(double size, const Loads::Values& loads_rate) {
+  const Trial trial(*this);
+  VectorXd rate = acceleration();
+  now_.q.swap(now_.v);
+  now_.v.swap(rate);
+  now_.scalars.loads = loads_rate;
   return forecast(size);
 }
 
-std::array<double, 3> Beam::tip_response(double size) {
-  Trial trial(*this);
-  trial.clear();
-  std::array<double, 3> response{};
+Beam::TipResponse Beam::tip_response(double size) {
+  const Trial trial(*this);
+  restore({VectorXd::Zero(now_.q.size()), VectorXd::Zero(now_.v.size()), {}});  // at rest, under nothing
+  TipResponse response{};
   for (const std::size_t i : {0U, 1U}) {
     step(size, {i == 0 ? 1.0 : 0.0, 0.0, 0.0}, {});
     response[i] = tip_displacement();
   }
-  trial.clear();
-  apply_tip_impulse(1.0);
-  response[2] = forecast(size).velocity;
   return response;
 }
 

@@ -202,22 +202,18 @@ class Beam {
   /// Put the beam at rest under the tip force and the loads that act now.
   void put_at_rest();
 
-  /// How the tip goes on over two steps of `size` [s] without a tip force.
-  struct Forecast {
-    double velocity = 0.0;      ///< w = [u(t + 2·size) − u(t)]/(2·size) [m/s]
-    double acceleration = 0.0;  ///< its rate without a tip force, [u_t(t + 2·size) − u_t(t)]/(2·size) [m/s²]
-  };
-  /// Under the loads that act now, by two trial steps, which leave no trace.
-  Forecast forecast(double size);
-  /// What a load adds to the forecast per unit, which is linear in it.
-  Forecast forecast_per_load(double size, std::size_t shape);
+  /// Mean velocity of the tip over two steps of `size` [s] without a tip force, under the loads that act now:
+  /// w = [u(t + 2·size) − u(t)]/(2·size) [m/s]. By two trial steps, which leave no trace.
+  double forecast(double size);
+  /// Its rate under what acts now, with the loads at these rates [m/s²]: linear in the state and the loads, it is the
+  /// forecast from the rates of both.
+  double forecast_rate(double size, const Loads::Values& loads_rate);
 
   /// What 1 N held over a step of `size` [s] adds to u(L) at that step's end, and at the end of another step without a
   /// force [m/N]. As the beam is linear, forces C₁, C₂ over the next two steps lead to
   ///     u(t + 2·size) = u(t) + 2·size·w + C₁ r[1] + C₂ r[0].
-  /// r[2]: what a tip impulse of 1 N·s adds to w [1/kg].
   /// @throws as step()
-  using TipResponse = std::array<double, 3>;
+  using TipResponse = std::array<double, 2>;
   TipResponse tip_response(double size);
 
   /// The whole dynamic state.

@@ -1,8 +1,8 @@
 // What an integrator keeps for each step size.
 #pragma once
 
+#include <algorithm>
 #include <array>
-#include <cstddef>
 
 namespace beam {
 
@@ -11,34 +11,27 @@ namespace beam {
 template <typename Value>
 class StepCache {
  public:
-  /// The value of `size`; if it is not there, of the size not used for longest, made over by `make(size, value)`.
+  /// The value of `size`; if it is not there, the one not used for longest, made over by `make(size, value)`.
   /// Valid until the next call.
   template <typename Make>
   const Value& get(double size, const Make& make) {
-    ++clock_;
-    Entry* oldest = &entries_[0];
-    for (Entry& entry : entries_) {
-      if (entry.size == size) {
-        entry.used = clock_;
-        return entry.value;
-      }
-      if (entry.used < oldest->used) oldest = &entry;
+    const auto has_size = [size](const Entry& entry) { return entry.size == size; };
+    auto place = std::find_if(latest_first_.begin(), latest_first_.end() - 1, has_size);
+    if (place->size != size) {
+      place->size = 0.0;  // no step size: a throwing make() must not leave a wrong entry
+      make(size, place->value);
+      place->size = size;
     }
-    oldest->size = 0.0;  // no step size: a throwing make() must not leave a wrong entry
-    make(size, oldest->value);
-    oldest->size = size;
-    oldest->used = clock_;
-    return oldest->value;
+    std::rotate(latest_first_.begin(), place, place + 1);
+    return latest_first_.front().value;
   }
 
  private:
   struct Entry {
     double size = 0.0;
-    std::size_t used = 0;
     Value value;
   };
-  std::array<Entry, 4> entries_;
-  std::size_t clock_ = 0;
+  std::array<Entry, 4> latest_first_;
 };
 
 }  // namespace beam

@@ -116,25 +116,17 @@ struct BeamModel final : fmi::Model {
 
   /// For a partner that exchanges values only between steps: how the tip goes on, and answers forces, in steps of the
   /// size of the last one.
-  const Beam::Forecast& forecast() const {
+  double forecast() const {
     if (!derived_.forecast) derived_.forecast = foreseen([this] { return beam->forecast(size_); });
     return *derived_.forecast;
+  }
+  double forecast_rate() const {
+    return foreseen([this] { return beam->forecast_rate(size_, load_rates()); });
   }
   const Beam::TipResponse& tip_response() const {
     if (!answers_ || answers_->size != size_)
       answers_ = Answers{size_, foreseen([this] { return beam->tip_response(size_); })};
     return answers_->response;
-  }
-  /// As the tip goes on under the tip force and the loads that are set.
-  double forecast_rate() const {
-    double rate = forecast().acceleration + tip_response()[2] * beam->tip_force();
-    loads.for_each([&](std::size_t i, const fmi::Polynomial& f) {
-      if (f[1] != 0.0) rate += f[1] * forecast_per_load(i);
-    });
-    return rate;
-  }
-  double forecast_per_load(std::size_t load) const {
-    return foreseen([this, load] { return beam->forecast_per_load(size_, load); }).velocity;
   }
 
  private:
@@ -157,7 +149,7 @@ struct BeamModel final : fmi::Model {
   struct Derived {
     std::optional<Line> line;
     std::optional<Beam::Response> response;
-    std::optional<Beam::Forecast> forecast;
+    std::optional<double> forecast;
   };
   mutable Derived derived_;
   /// Kept as long as steps have the size that it is for.
@@ -326,7 +318,7 @@ fmi::Table fmi::make_table() {
          "predicted mean velocity of the tip over the next two steps without a tip_force; steps have the size of the "
          "last "
          "one, before the first that of DefaultExperiment",
-         [](const BeamModel& m) { return m.forecast().velocity; }, [](const BeamModel& m) { return m.forecast_rate(); })
+         [](const BeamModel& m) { return m.forecast(); }, [](const BeamModel& m) { return m.forecast_rate(); })
       .only_read()
       .from_all();
   for (const std::string& name : load_names) add.depends(name);

@@ -197,7 +197,7 @@ TEST(BeamModes, StartsDoNotChangeTheBasis) {
         const auto other = make_beam(q);
         EXPECT_EQ(frequencies(q), frequencies(p)) << n_modes;
         EXPECT_EQ(other->tip_mass(), plain->tip_mass()) << n_modes;
-        const std::array<double, 3> found = other->tip_response(1e-4), expected = plain->tip_response(1e-4);
+        const Beam::TipResponse found = other->tip_response(1e-4), expected = plain->tip_response(1e-4);
         for (std::size_t i = 0; i < 2; ++i) EXPECT_NEAR(found[i], expected[i], 1e-12 * expected[i]) << n_modes;
       }
     }
