@@ -89,7 +89,7 @@ void Compliance::extend(Along& along, std::size_t n, const Series& depth, double
   }
 }
 
-bool Compliance::analytic() const { return p_ == std::floor(p_); }
+bool Compliance::polynomial() const { return p_ == std::floor(p_) && p_ <= static_cast<double>(highest_power); }
 bool Compliance::even() const { return p_ / 2.0 == std::floor(p_ / 2.0); }
 
 }  // namespace spring

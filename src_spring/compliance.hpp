@@ -51,12 +51,11 @@ class Compliance {
     std::array<Series, highest_power - 1> power{};  ///< δ², δ³, …
   };
   /// Sets coefficient `n` of each from δ's up to n + 1 and from the lower ones; `size` H [s].
-  /// @pre δ is well above 0 over the segment, polynomial(), analytic() and n < 3, or n < 2
+  /// @pre δ is well above 0 over the segment, or polynomial(), or n < 2, n < 3 if p is a whole number
   void extend(Along& along, std::size_t n, const Series& depth, double size) const;
-  /// p is an integer: the force is analytic in δ ≥ 0, also at δ = 0.
-  bool analytic() const;
-  /// So small a one that extend() multiplies powers instead of dividing by δ.
-  bool polynomial() const { return analytic() && p_ <= static_cast<double>(highest_power); }
+  /// p is a whole number, at which the force is analytic in δ ≥ 0, also at δ = 0, and so small that extend() multiplies
+  /// powers instead of dividing by δ.
+  bool polynomial() const;
 
  private:
   bool even() const;  ///< p is an even number

@@ -50,10 +50,16 @@ double EquationOfMotion::acceleration_by_displacement(double y, double contact_s
   return -(k1_ + 3.0 * k2_ * x * x + contact_slope) / mass_;
 }
 
-Expansion::Expansion(double x, double z, double depth, const Loads& loads, double size)
-    : x{x, size * z}, depth{depth, size * z - loads.tip[1], -loads.tip[2] / 2} {}
+Expansion::Expansion(double x, double z, double depth, const Loads& loads, double size, bool touching)
+    : size(size),
+      loads(loads.scaled(size)),
+      touching(touching),
+      x{x, size * z},
+      depth{depth, size * z - this->loads.tip[1], -this->loads.tip[2] / 2} {}
 
-void Expansion::shorten(double factor) {
+void Expansion::shorten(double factor, const Loads& unscaled) {
+  size *= factor;
+  loads = unscaled.scaled(size);
   double power = 1.0;
   for (std::size_t k = 0; k < x.size(); ++k, power *= factor) {
     x[k] *= power;
@@ -63,8 +69,8 @@ void Expansion::shorten(double factor) {
   }
 }
 
-void EquationOfMotion::extend(Expansion& motion, bool touching, const Loads& loads, double size) const {
-  auto& [x, square, depth, contact, highest] = motion;
+void EquationOfMotion::extend(Expansion& motion) const {
+  auto& [size, loads, touching, x, square, depth, contact, highest] = motion;
   const std::size_t k = highest - 1;
   double cube = 0.0;
   for (std::size_t i = 0; i <= k; ++i) square[k] += x[i] * x[k - i];
@@ -77,7 +83,7 @@ void EquationOfMotion::extend(Expansion& motion, bool touching, const Loads& loa
   depth[highest] += x[highest];
 }
 
-double EquationOfMotion::residual(const Expansion& motion, bool touching, const Loads& loads, double size) const {
+double EquationOfMotion::residual(const Expansion& motion) const {
   constexpr double rounding = 4.0 * std::numeric_limits<double>::epsilon();
   double x = 0.0, rate = 0.0, depth = 0.0, depth_rate = 0.0, acceleration = 0.0, magnitude = 0.0;
   for (std::size_t k = 0; k < motion.highest; ++k) {
@@ -89,9 +95,10 @@ double EquationOfMotion::residual(const Expansion& motion, bool touching, const 
     acceleration += second;
     magnitude += std::abs(second);
   }
-  const double contact = touching ? compliance_.continued(depth, depth_rate / size).force : 0.0;
-  const double per_force = size * size / mass_;
-  for (const double force : {value(loads.force, 1.0), -k1_ * x, -k2_ * x * x * x, -damping_ * rate / size, -contact}) {
+  const double size = motion.size, per_force = size * size / mass_;
+  const double contact = motion.touching ? compliance_.continued(depth, depth_rate / size).force : 0.0;
+  for (const double force :
+       {value(motion.loads.force, 1.0), -k1_ * x, -k2_ * x * x * x, -damping_ * rate / size, -contact}) {
     acceleration -= per_force * force;
     magnitude += per_force * std::abs(force);
   }

@@ -23,17 +23,20 @@ struct Loads {
   Loads scaled(double size) const { return {spring::scaled(force, size), spring::scaled(tip, size)}; }
 };
 
-/// A motion near a segment's start: Taylor coefficients in s = τ/H of the elongation x = y − y₀, of x², of the depth
+/// A motion from a segment's start on: Taylor coefficients in s = τ/H of the elongation x = y − y₀, of x², of the depth
 /// y − u_tip and of the contact. Those of x are known up to `highest`; from s¹ on they are those of y.
 struct Expansion {
+  double size;    ///< H [s]
+  Loads loads;    ///< over s
+  bool touching;  ///< whether the contact force acts
   Series x{}, square{}, depth{};
   Compliance::Along contact;
   std::size_t highest = 1;
 
-  /// From x [m], z [m/s] and y − u_tip, under scaled loads, over a segment of size H [s].
-  Expansion(double x, double z, double depth, const Loads& loads, double size);
-  /// To a segment of H × `factor`; nothing can be added then.
-  void shorten(double factor);
+  /// From x [m], z [m/s] and y − u_tip, under loads over τ, over a segment of `size` [s].
+  Expansion(double x, double z, double depth, const Loads& loads, double size, bool touching);
+  /// To a segment of H × `factor` under the same loads over τ; nothing can be added then.
+  void shorten(double factor, const Loads& unscaled);
 };
 
 /// f_s − m a [N]
@@ -52,11 +55,11 @@ class EquationOfMotion {
   /// ∂ÿ/∂ẏ
   double acceleration_by_velocity(double contact_slope) const { return -(damping_ + contact_slope) / mass_; }
 
-  /// Adds one coefficient to the motion; loads and size are those that it began with.
-  void extend(Expansion& motion, bool touching, const Loads& loads, double size) const;
+  /// Adds one coefficient to the motion.
+  void extend(Expansion& motion) const;
   /// What the motion below its highest coefficient leaves of the equation at s = 1, as H² |ÿ| [m]; 0 if that is
   /// rounding, NaN if it leaves the range of numbers.
-  double residual(const Expansion& motion, bool touching, const Loads& loads, double size) const;
+  double residual(const Expansion& motion) const;
 
   /// Bounds of the rates with which the solution can change, for |x| ≤ `reach`: √(stiffness/m), damping/m [1/s].
   struct Rates {

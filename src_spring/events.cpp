@@ -46,14 +46,16 @@ std::optional<double> first_fall(const Series& c, int degree) {
   return fall;
 }
 
-Occurrence first_event(const Series* to_stop, const Series* to_tip, int degree) {
+Occurrence first_event(const Parameters& parameters, const Series& gap, Series depth, bool touching, int degree) {
   Occurrence first{Event::none, 1.0};
-  const auto look_at = [&](Event event, const Series* distance) {
-    const auto fall = distance ? first_fall(*distance, degree) : std::nullopt;
+  const auto look_at = [&](Event event, const Series& distance) {
+    const auto fall = first_fall(distance, degree);
     if (fall && (first.event == Event::none || *fall < first.s)) first = {event, *fall};
   };
-  look_at(Event::stop, to_stop);
-  look_at(Event::contact, to_tip);
+  if (parameters.stop_enabled) look_at(Event::stop, gap);
+  if (!touching)
+    for (double& c : depth) c = -c;
+  if (parameters.compliant()) look_at(Event::contact, depth);
   return first;
 }
 

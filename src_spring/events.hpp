@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 
+#include "parameters.hpp"
 #include "taylor.hpp"
 
 namespace spring {
@@ -57,7 +58,8 @@ struct Occurrence {
   Event event;
   double s;  ///< 1 for none
 };
-/// The first of the falls of both distances: to the stop (NULL: there is none) and to the tip.
-Occurrence first_event(const Series* to_stop, const Series* to_tip, int degree);
+/// The first of what may happen: `gap`, y − φ, falls below 0 where there is a stop, or `depth`, y − u_tip, leaves its
+/// side of 0, that of `touching` or the other one, where there is a law.
+Occurrence first_event(const Parameters& parameters, const Series& gap, Series depth, bool touching, int degree);
 
 }  // namespace spring

@@ -24,17 +24,14 @@ class Flight {
   Expansion expand(double size);
   EquationOfMotion::Rates rates(const Expansion& motion) const;
   bool analytic(const Expansion& motion) const;
-  void follow(Expansion& motion);
-  void integrate();
-  double dissipated(const Expansion& motion, int order, double s) const;
+  void complete(Expansion& motion) const;
+  FlightEnd follow(const Expansion& motion) const;
+  double dissipated(const Expansion& motion, double s) const;
 
   const EquationOfMotion& equation_;
   const Parameters& parameters_;
   IntegratedFlight integrated_;
   Start start_{};
-  double size_ = 0.0;  ///< H [s]
-  Loads loads_{};      ///< over s
-  bool touching_ = false;
   FlightEnd end_{};
 };
 

@@ -28,7 +28,7 @@ enum Unknown { q, p, A, B, e, unknowns };
 IntegratedFlight::IntegratedFlight(const EquationOfMotion& equation, const Parameters& parameters)
     : equation_(equation), parameters_(parameters), solver_(unknowns) {}
 
-FlightEnd IntegratedFlight::run(const Start& start, bool touching) {
+void IntegratedFlight::run(const Start& start, bool touching, FlightEnd& end) {
   start_ = start;
   loads_ = start.loads.scaled(start.size);
   touching_ = touching;
@@ -36,14 +36,13 @@ FlightEnd IntegratedFlight::run(const Start& start, bool touching) {
   while (solver_.s() < 1.0) {
     solver_.step();
     const auto [event, place] = event_of_last_step();
-    if (event == Event::none) continue;
-    solver_.interpolate(solver_.last_start() + place * solver_.last_size());
-    return end(event);
+    if (event != Event::none) solver_.interpolate(solver_.last_start() + place * solver_.last_size());
+    end = here(event);
+    if (event != Event::none) return;
   }
-  return end();
 }
 
-FlightEnd IntegratedFlight::end(Event event) const {
+FlightEnd IntegratedFlight::here(Event event) const {
   const double H = start_.size, y = start_.y, s = solver_.s();
   const double* Y = solver_.value();
   return {event, s * H,          s == 1.0, y + Y[q], Y[p] / H, H * (s * y + Y[A]), H * H * (s * s / 2 * y + Y[B]),
@@ -106,16 +105,13 @@ void IntegratedFlight::launch() {
 Occurrence IntegratedFlight::event_of_last_step() const {
   const double from = solver_.last_start(), h = solver_.last_size();
   const auto [rise, degree] = solver_.over_last_step(q);
-  Series to_stop = rise, to_tip = rise;
-  to_stop[0] += start_.gap;
+  Series gap = rise, depth = rise;
+  gap[0] += start_.gap;
   const Polynomial tip = scaled(shifted(loads_.tip, from), h);
-  to_tip[0] += start_.depth - (tip[0] - loads_.tip[0]);
-  to_tip[1] -= tip[1];
-  to_tip[2] -= tip[2] / 2;
-  if (!touching_)
-    for (double& c : to_tip) c = -c;
-  return first_event(parameters_.stop_enabled ? &to_stop : nullptr, parameters_.compliant() ? &to_tip : nullptr,
-                     std::max(degree, 2));
+  depth[0] += start_.depth - (tip[0] - loads_.tip[0]);
+  depth[1] -= tip[1];
+  depth[2] -= tip[2] / 2;
+  return first_event(parameters_, gap, depth, touching_, std::max(degree, 2));
 }
 
 double IntegratedFlight::depth(double q, double s) const {

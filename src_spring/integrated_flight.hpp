@@ -38,10 +38,9 @@ class IntegratedFlight final : public ImplicitSystem {
  public:
   IntegratedFlight(const EquationOfMotion& equation, const Parameters& parameters);
 
-  /// Flies on to an event or to the end; `touching` the tip, or not.
-  /// @throws SolverError; end() says how far it came
-  FlightEnd run(const Start& start, bool touching);
-  FlightEnd end(Event event = Event::none) const;
+  /// Flies on to an event or to the end; `touching` the tip, or not. `end` is where it came, also if it fails.
+  /// @throws SolverError
+  void run(const Start& start, bool touching, FlightEnd& end);
 
   bool residual(double s, const double* Y, const double* Yp, double* F) const noexcept override;
   void jacobian(double s, double c, const double* Y, const double* Yp, double* J) const noexcept override;
@@ -49,6 +48,7 @@ class IntegratedFlight final : public ImplicitSystem {
  private:
   void launch();
   Occurrence event_of_last_step() const;
+  FlightEnd here(Event event) const;
   double depth(double q, double s) const;       ///< y − u_tip [m]
   double depth_rate(double p, double s) const;  ///< [m/s]
 

@@ -105,11 +105,16 @@ class Spring::Step {
     state_.seated = state_.z == 0.0 && pressed && !released_ ? 1.0 : 0.0;
   }
 
+  /// Keeps y over `size` [s].
+  void hold(double size) {
+    state_.integral_2 += (state_.integral + state_.y * size / 2) * size;
+    state_.integral += state_.y * size;
+  }
+
   void stay() {
     const SeatedEnd stayed =
         stay_seated(spring_.equation_, state_.y, depth_, parameters_.compliant(), now_, remaining());
-    state_.integral_2 += (state_.integral + state_.y * stayed.size / 2) * stayed.size;
-    state_.integral += state_.y * stayed.size;
+    hold(stayed.size);
     state_.dissipated += stayed.dissipated;
     seated_impulse_ += stayed.impulse;
     t_ = stayed.released ? t_ + stayed.size : size_;
@@ -128,9 +133,7 @@ class Spring::Step {
   }
 
   void rest() {
-    const double left = size_ - t_;
-    state_.integral_2 += (state_.integral + state_.y * left / 2) * left;
-    state_.integral += state_.y * left;
+    hold(size_ - t_);
     t_ = size_;
     released_ = meeting_ = happened_ = false;
   }
@@ -187,7 +190,7 @@ Spring::Spring(const Parameters& p)
   state_.seated = can_rest() ? 1.0 : 0.0;
 }
 
-Spring::Reached Spring::step_to_event(double size, const Inputs& inputs, double time, bool to_event) {
+Reached Spring::step_to_event(double size, const Inputs& inputs, double time, bool to_event) {
   if (size < smallest_step)
     throw StepFailure("spring: a step of " + number(size) + " s is too small, its square underflows; use a step size " +
                       "of at least " + number(smallest_step) + " s");

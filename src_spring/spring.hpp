@@ -16,6 +16,8 @@
 
 namespace spring {
 
+using common::Reached;
+
 /// The step could not be completed: the state is as before the step.
 class StepFailure : public std::runtime_error {
  public:
@@ -39,11 +41,6 @@ class Spring {
   /// @throws StepFailure (state unchanged)
   void step(double size, const Inputs& inputs, double time = 0.0) { step_to_event(size, inputs, time, false); }
 
-  /// How far a step came [s], and whether it ended at an event.
-  struct Reached {
-    double size;
-    bool event;
-  };
   /// Makes a step, if `to_event` only to the first event after its start: contact begins or ends, the top meets the
   /// foundation or leaves it. What happens there is due in strike() or at the start of the next step.
   Reached step_to_event(double size, const Inputs& inputs, double time, bool to_event);

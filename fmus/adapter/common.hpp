@@ -18,6 +18,12 @@ inline double rate(const Polynomial& p, double t) { return p[1] + t * p[2]; }
 /// Over 0 … t.
 inline double mean(const Polynomial& p, double t) { return p[0] + t * (p[1] / 2 + t * p[2] / 6); }
 
+/// How far a step came [s], and whether it ended at an event.
+struct Reached {
+  double size;
+  bool event;
+};
+
 /// The shortest decimal that reads back as the same double.
 inline std::string number(double value) {
   char text[32];

@@ -55,9 +55,9 @@ void Component::reset() {
   report(Status::ok, "reset");
 }
 
-Model::Reached Component::step(double time, double size, bool to_event) {
+Reached Component::step(double time, double size, bool to_event) {
   terminated = false;
-  Model::Reached reached{};
+  Reached reached{};
   try {
     reached = instance.step(time, size, to_event);
   } catch (const Discarded& e) {

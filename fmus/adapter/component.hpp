@@ -64,7 +64,7 @@ class Component {
   void reset();
   /// A step of the instance. The model's warning is reported, no more: the step is done, and some masters stop at any
   /// status but OK.
-  Model::Reached step(double time, double size, bool to_event = false);
+  Reached step(double time, double size, bool to_event = false);
 
   /// Into the state that `*state` names, or a new one if it is NULL.
   void get_state(void** state);

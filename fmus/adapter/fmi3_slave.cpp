@@ -173,7 +173,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint, fmi
                        {lastSuccessfulTime, "lastSuccessfulTime"}});
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = k.instance.progress.time;
-    Model::Reached reached{};
+    Reached reached{};
     try {
       reached = k.step(currentCommunicationPoint, communicationStepSize, k.early_return_allowed);
     } catch (const Discarded&) {

@@ -225,7 +225,7 @@ double Instance::difference(const Variable& of, unsigned known, std::size_t orde
   return finite(of, (above - below) / (high - low), too_large);
 }
 
-Model::Reached Instance::step(double time, double size, bool to_event) {
+Reached Instance::step(double time, double size, bool to_event) {
   if (!std::isfinite(time)) throw std::invalid_argument("currentCommunicationPoint = " + number(time));
   if (!std::isfinite(size) || size <= 0.0) {
     throw std::invalid_argument("communicationStepSize = " + number(size) + ": must be finite and > 0");
@@ -249,7 +249,7 @@ Model::Reached Instance::step(double time, double size, bool to_event) {
     size = end - time;
   }
   evaluate();
-  Model::Reached reached{};
+  Reached reached{};
   try {
     reached = model_->step(time, size, to_event);
   } catch (const Discarded& e) {

@@ -40,7 +40,7 @@ class Instance {
   double partial_derivative(unsigned unknown, unsigned known);
 
   /// @throws Discarded
-  Model::Reached step(double time, double size, bool to_event);
+  Reached step(double time, double size, bool to_event);
   void update();  ///< see Model::update
   /// What the model has to say after a step; empty if nothing.
   std::string take_warning() { return std::exchange(model_->warning, {}); }

@@ -10,7 +10,7 @@
 
 namespace fmi {
 
-using common::number, common::Polynomial;
+using common::number, common::Polynomial, common::Reached;
 
 /// The call cannot be carried out, and nothing has changed: becomes fmi2Discard or fmi3Discard, after which the
 /// instance goes on. So FMI 3.0 has it; an importer that follows FMI 2.0 restores a state before it repeats a step,
@@ -42,11 +42,6 @@ class Model {
   /// Called before anything is read, saved or stepped, once for all that has been set, stepped or restored before.
   virtual void evaluate(Acting acting) = 0;
 
-  /// How far a step came [s], and whether something happens there.
-  struct Reached {
-    double size;
-    bool event;
-  };
   /// Called for each step, the inputs having been set. Only `to_event` lets it end early, where something happens, and
   /// say so: update() is due then.
   /// @throws Discarded

@@ -55,7 +55,7 @@ struct BeamModel final : fmi::Model {
     if (starts_at_rest) beam->put_at_rest();
   }
 
-  Reached step(double time, double size, bool) override {
+  fmi::Reached step(double time, double size, bool) override {
     std::optional<Beam::State> before;
     if (tip_impulse != 0.0) before = beam->state();
     try {

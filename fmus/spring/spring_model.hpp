@@ -50,10 +50,10 @@ class SpringModel final : public fmi::Model {
     observe();
   }
 
-  Reached step(double time, double size, bool to_event) override {
+  fmi::Reached step(double time, double size, bool to_event) override {
     using Remedy = fmi::Discarded::Remedy;
     const State before = state();
-    Reached reached{size, false};
+    fmi::Reached reached{size, false};
     const Remedy remedy = std::isfinite(held_->force()) ? Remedy::other_size : Remedy::none;
     try {
       if (impulse != 0.0) spring_->apply_impulse(impulse);
@@ -62,8 +62,7 @@ class SpringModel final : public fmi::Model {
       } else {
         spring::Inputs present = acting();
         present.tip_displacement = tip();
-        const spring::Spring::Reached came = spring_->step_to_event(size, present, time, to_event);
-        reached = {came.size, came.event};
+        reached = spring_->step_to_event(size, present, time, to_event);
       }
     } catch (const spring::StepFailure& e) {
       restore(before);

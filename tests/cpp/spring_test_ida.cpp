@@ -152,7 +152,8 @@ TEST(IntegratedFlight, JacobianMatchesDifferences) {
     loads.tip = {0.05, speed, -1.0};
     for (const double size : {H, 40 * H}) {
       const Start start{y, z, loads, size, y + 0.2, y - 0.05, false, 100000};
-      flight.run(start, true);
+      FlightEnd end{};
+      flight.run(start, true, end);
       const double d = 1e-5;
       expect_jacobian<5>(flight, 0.3, 17.0, {0.01, 0.003, 0.1, 0.2, 0.3}, {d, d * size, d, d, d}, 1e-7);
     }
@@ -161,8 +162,8 @@ TEST(IntegratedFlight, JacobianMatchesDifferences) {
 
 Series expanded(const EquationOfMotion& equation, double y, double z, const Loads& loads, double H, bool touching,
                 double depth) {
-  Expansion e(y, z, depth, loads, H);
-  while (e.highest <= max_order) equation.extend(e, touching, loads, H);
+  Expansion e(y, z, depth, loads, H, touching);
+  while (e.highest <= max_order) equation.extend(e);
   return e.x;
 }
 
