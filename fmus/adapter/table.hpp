@@ -69,6 +69,10 @@ struct Variable {
   Variable& typical(double value) { return nominal = value, *this; }
   Variable& from(std::vector<std::string> names) { return initial_dependencies = std::move(names), *this; }
   Variable& from_all() { return initial_dependencies.reset(), *this; }
+  Variable& follows(const std::vector<std::string>& inputs, int order = 0) {
+    for (const std::string& input : inputs) dependencies.push_back({input, order});
+    return *this;
+  }
 };
 
 /// Named alternatives, numbered from 1. Described as an Integer type and not as an Enumeration: libcosim leaves such
@@ -112,26 +116,28 @@ const std::string& guid();
 /// The table as JSON: fmus/description.py makes the descriptions of all versions of FMI from it.
 std::string printed_table();
 
-/// Adds variables bound to a concrete model `M`.
+/// Adds variables bound to a concrete model `M`, whose parameters are the struct `parameters`. What reads an output is
+/// a function of the model or of its numerics, M::body().
 template <class M>
 class TableBuilder {
+  using Parameters = decltype(M::parameters);
+
  public:
   explicit TableBuilder(Table& table) : table_(table) {}
 
-  /// A parameter stored in a field of the model's parameter struct, whose default is the start value. The field is a
-  /// pointer to a member or a function that returns a reference.
-  template <class P, class Field>
-  Variable& parameter(const std::string& name, const std::string& unit, P M::*parameters, Field field,
-                      const std::string& description) {
-    using T = std::decay_t<std::invoke_result_t<Field, P&>>;
+  /// A parameter, whose default is the start value. The field is a pointer to a member or a function that returns a
+  /// reference.
+  template <class Field>
+  Variable& parameter(const std::string& name, const std::string& unit, Field field, const std::string& description) {
+    using T = std::decay_t<std::invoke_result_t<Field, Parameters&>>;
     Variable& v = add(name, unit, description, Causality::parameter);
     v.type = std::is_same_v<T, bool>                      ? Type::boolean
              : std::is_integral_v<T> || std::is_enum_v<T> ? Type::integer
                                                           : Type::real;
-    P defaults;
+    Parameters defaults;
     v.start = static_cast<double>(std::invoke(field, defaults));
-    v.set = [=](Model& m, const Polynomial& value) {
-      std::invoke(field, static_cast<M&>(m).*parameters) = static_cast<T>(value[0]);
+    v.set = [field](Model& m, const Polynomial& value) {
+      std::invoke(field, static_cast<M&>(m).parameters) = static_cast<T>(value[0]);
     };
     return v;
   }
@@ -165,7 +171,7 @@ class TableBuilder {
       Derivative derivative = [](const M&) { return 0.0; }) {
     Variable& v = local(name, unit, description, get);
     v.causality = Causality::output;
-    v.derivative = [derivative](const Model& m) { return static_cast<double>(derivative(static_cast<const M&>(m))); };
+    v.derivative = reading(derivative);
     return v;
   }
 
@@ -173,26 +179,31 @@ class TableBuilder {
   template <class Get>
   Variable& local(const std::string& name, const std::string& unit, const std::string& description, Get get) {
     Variable& v = add(name, unit, description, Causality::local);
-    v.get = [get](const Model& m) { return static_cast<double>(get(static_cast<const M&>(m))); };
+    v.get = reading(get);
     return v;
-  }
-
-  /// Says that the last output follows `input` between steps.
-  void depends(const std::string& input, int order = 0) {
-    table_.variables.back().dependencies.push_back({input, order});
   }
 
   /// Makes the last output's start value settable: it is a field of the parameters.
-  template <class P, class B>
-  Variable& exact_start(P M::*parameters, double B::*field) {
+  template <class Base>
+  void exact_start(double Base::*field) {
     Variable& v = table_.variables.back();
     v.exact = true;
-    v.start = P{}.*field;
-    v.set = [=](Model& m, const Polynomial& value) { static_cast<M&>(m).*parameters.*field = value[0]; };
-    return v;
+    v.start = Parameters{}.*field;
+    v.set = [field](Model& m, const Polynomial& value) { static_cast<M&>(m).parameters.*field = value[0]; };
   }
 
  private:
+  template <class Get>
+  static std::function<double(const Model&)> reading(Get get) {
+    return [get](const Model& model) {
+      const M& m = static_cast<const M&>(model);
+      if constexpr (std::is_invocable_v<Get, const M&>)
+        return static_cast<double>(std::invoke(get, m));
+      else
+        return static_cast<double>(std::invoke(get, m.body()));
+    };
+  }
+
   Variable& add(const std::string& name, const std::string& unit, const std::string& description, Causality causality) {
     Variable& v = table_.variables.emplace_back();
     v.name = name;

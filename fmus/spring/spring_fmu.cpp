@@ -1,5 +1,4 @@
 // The spring FMU: its table of variables, bound to SpringModel.
-#include <initializer_list>
 #include <limits>
 #include <string>
 #include <vector>
@@ -11,11 +10,6 @@ namespace {
 
 using spring::Parameters;
 using spring::Spring;
-
-template <class Value>
-auto of(Value (Spring::*value)() const) {
-  return [value](const SpringModel& m) { return (m.top().*value)(); };
-}
 
 }  // namespace
 
@@ -35,48 +29,49 @@ fmi::Table fmi::make_table() {
         "kelvin_voigt, a unilateral spring and damper, computed here as well"}});
 
   fmi::TableBuilder<SpringModel> add(t);
-  const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {
-    return add.parameter(name, unit, &SpringModel::parameters, field, text);
-  };
-  parameter("mass", "kg", &Parameters::mass, "mass m").positive();
-  parameter("damping", "N.s/m", &Parameters::damping, "viscous damping alpha_s").at_least(0);
-  parameter("linear_stiffness", "N/m", &Parameters::linear_stiffness, "linear stiffness k1");
-  parameter("cubic_stiffness", "N/m3", &Parameters::cubic_stiffness,
-            "cubic stiffness k2; negative for a softening spring");
-  parameter("unloaded", "m", &Parameters::unloaded,
-            "position of the top at which the spring force is 0: the force is k1 x + k2 x^3 with x = y - unloaded");
-  parameter("equilibrium", "m", &FmuParameters::equilibrium,
-            "rest position Psi of the top, for information only: the motion begins at the start value of displacement, "
-            "and the spring force is 0 at unloaded");
-  parameter("gravity", "m/s2", &FmuParameters::gravity,
-            "gravitational acceleration g, downward: adds the force -mass*g, whose work is part of load_work");
-  parameter(
-      "contact_law", "", &Parameters::contact_law,
-      "1 = external (input contact_force), 2 = normal compliance, 3 = unilateral spring and damper, both computed "
-      "by this FMU")
+  add.parameter("mass", "kg", &Parameters::mass, "mass m").positive();
+  add.parameter("damping", "N.s/m", &Parameters::damping, "viscous damping alpha_s").at_least(0);
+  add.parameter("linear_stiffness", "N/m", &Parameters::linear_stiffness, "linear stiffness k1");
+  add.parameter("cubic_stiffness", "N/m3", &Parameters::cubic_stiffness,
+                "cubic stiffness k2; negative for a softening spring");
+  add.parameter("unloaded", "m", &Parameters::unloaded,
+                "position of the top at which the spring force is 0: the force is k1 x + k2 x^3 with x = y - unloaded");
+  add.parameter(
+      "equilibrium", "m", &FmuParameters::equilibrium,
+      "rest position Psi of the top, for information only: the motion begins at the start value of displacement, "
+      "and the spring force is 0 at unloaded");
+  add.parameter("gravity", "m/s2", &FmuParameters::gravity,
+                "gravitational acceleration g, downward: adds the force -mass*g, whose work is part of load_work");
+  add.parameter(
+         "contact_law", "", &Parameters::contact_law,
+         "1 = external (input contact_force), 2 = normal compliance, 3 = unilateral spring and damper, both computed "
+         "by this FMU")
       .range(1, 3)
       .choice = "ContactLaw";
-  parameter("compliance_stiffness", "", &Parameters::compliance_stiffness,
-            "lambda in C = lambda*max(0, d)^p*max(0, 1 + chi*d') [N/m^p], d = y - u_tip, of contact_law = 2; in "
-            "max(0, lambda*d^p + c*d') for d > 0 of contact_law = 3")
+  add.parameter("compliance_stiffness", "", &Parameters::compliance_stiffness,
+                "lambda in C = lambda*max(0, d)^p*max(0, 1 + chi*d') [N/m^p], d = y - u_tip, of contact_law = 2; in "
+                "max(0, lambda*d^p + c*d') for d > 0 of contact_law = 3")
       .at_least(0)
       .typical(1e4);
-  parameter("compliance_exponent", "", &Parameters::compliance_exponent, "exponent p in the contact law").range(1, 100);
-  parameter(
-      "compliance_damping", "s/m", &Parameters::compliance_damping,
-      "damping chi of contact_law = 2 (Hunt and Crossley); the energy that it dissipates is part of dissipated_energy")
+  add.parameter("compliance_exponent", "", &Parameters::compliance_exponent, "exponent p in the contact law")
+      .range(1, 100);
+  add.parameter("compliance_damping", "s/m", &Parameters::compliance_damping,
+                "damping chi of contact_law = 2 (Hunt and Crossley); the energy that it dissipates is part of "
+                "dissipated_energy")
       .at_least(0);
-  parameter("contact_damping", "N.s/m", &Parameters::contact_damping,
-            "damping c of contact_law = 3, as compliance_damping")
+  add.parameter("contact_damping", "N.s/m", &Parameters::contact_damping,
+                "damping c of contact_law = 3, as compliance_damping")
       .at_least(0);
-  parameter("stop_enabled", "", &Parameters::stop_enabled, "whether this FMU has the rigid foundation, with impacts");
-  parameter("stop_position", "m", &Parameters::stop_position, "position phi of the foundation");
-  parameter("restitution", "", &Parameters::restitution, "coefficient of restitution at the foundation").range(0, 1);
-  parameter("relative_tolerance", "", &Parameters::relative_tolerance,
-            "relative tolerance of the motion; an importer's tolerance can tighten, never loosen it")
+  add.parameter("stop_enabled", "", &Parameters::stop_enabled,
+                "whether this FMU has the rigid foundation, with impacts");
+  add.parameter("stop_position", "m", &Parameters::stop_position, "position phi of the foundation");
+  add.parameter("restitution", "", &Parameters::restitution, "coefficient of restitution at the foundation")
+      .range(0, 1);
+  add.parameter("relative_tolerance", "", &Parameters::relative_tolerance,
+                "relative tolerance of the motion; an importer's tolerance can tighten, never loosen it")
       .range(std::numeric_limits<double>::min(), 1e-2)
       .typical(1e-12);
-  parameter("absolute_tolerance", "", &Parameters::absolute_tolerance, "absolute tolerance of the motion")
+  add.parameter("absolute_tolerance", "", &Parameters::absolute_tolerance, "absolute tolerance of the motion")
       .range(std::numeric_limits<double>::min(), 1e-2)
       .typical(1e-14);
 
@@ -124,10 +119,10 @@ fmi::Table fmi::make_table() {
       .typical(1e-4)
       .value_only();
 
-  add.output("displacement", "m", "position y of the top", of(&Spring::displacement), of(&Spring::velocity));
-  add.exact_start(&SpringModel::parameters, &FmuParameters::displacement);
-  add.output("velocity", "m/s", "velocity z of the top", of(&Spring::velocity), of(&Spring::acceleration));
-  add.exact_start(&SpringModel::parameters, &FmuParameters::velocity);
+  add.output("displacement", "m", "position y of the top", &Spring::displacement, &Spring::velocity);
+  add.exact_start(&FmuParameters::displacement);
+  add.output("velocity", "m/s", "velocity z of the top", &Spring::velocity, &Spring::acceleration);
+  add.exact_start(&FmuParameters::velocity);
   const std::vector<std::string> motion{
       "contact_law", "compliance_stiffness", "compliance_exponent", "compliance_damping", "contact_damping",
       "displacement", "tip_displacement", "tip_velocity",
@@ -135,71 +130,65 @@ fmi::Table fmi::make_table() {
       "tip_response", "tip_velocity_forecast", "velocity", "mass", "damping", "linear_stiffness", "cubic_stiffness",
       "unloaded", "external_force", "base_acceleration", "foundation_force", "stop_enabled", "stop_position",
       "restitution", "gravity"};
-  using M = const SpringModel&;
+  // What force and contact force follow at once, with a derivative of one.
+  const std::vector<std::string> at_once{"tip_displacement", "tip_velocity",   "tip_velocity_forecast", "tip_response",
+                                         "foundation_force", "external_force", "base_acceleration"};
+  std::vector<std::string> pressing = at_once, accelerated = motion;
+  pressing.insert(pressing.begin(), "contact_force");
+  accelerated.emplace_back("contact_force");
   add.output("displacement_integral", "m.s", "integral of displacement over the last step",
-             of(&Spring::displacement_integral), of(&Spring::displacement));
+             &Spring::displacement_integral, &Spring::displacement);
   add.output("displacement_integral_2", "m.s2", "double integral of displacement over the last step",
-             of(&Spring::displacement_integral_2), of(&Spring::displacement_integral));
-  add.output(
-         "reaction", "N", "contact force computed by this FMU; 0 when contact_law = 1",
-         [](const SpringModel& m) { return m.reaction(); }, [](const SpringModel& m) { return m.reaction_rate(); })
-      .from(motion);
-  // What force and contact force follow at once: inputs, and a derivative of one.
-  const auto follows = [&add](std::initializer_list<const char*> inputs) {
-    for (const char* input : inputs) add.depends(input);
-    add.depends("tip_displacement", 1);
-  };
-  follows({"tip_displacement", "tip_velocity", "tip_velocity_forecast", "tip_response", "foundation_force",
-           "external_force", "base_acceleration"});
-  add.output("acceleration", "m/s2", "acceleration of the top", of(&Spring::acceleration), [](M m) { return m.jerk(); })
-      .from(motion);
-  t.variables.back().initial_dependencies->emplace_back("contact_force");
-  const std::initializer_list<const char*> pressing{"contact_force",         "tip_displacement", "tip_velocity",
-                                                    "tip_velocity_forecast", "tip_response",     "foundation_force",
-                                                    "external_force",        "base_acceleration"};
-  follows(pressing);
+             &Spring::displacement_integral_2, &Spring::displacement_integral);
+  add.output("reaction", "N", "contact force computed by this FMU; 0 when contact_law = 1", &SpringModel::reaction,
+             &SpringModel::reaction_rate)
+      .from(motion)
+      .follows(at_once)
+      .follows({"tip_displacement"}, 1);
+  add.output("acceleration", "m/s2", "acceleration of the top", &Spring::acceleration, &SpringModel::jerk)
+      .from(accelerated)
+      .follows(pressing)
+      .follows({"tip_displacement"}, 1);
   add.output("seated", "",
              "1 while the top rests on the foundation inside, otherwise 0: the sign of the force that holds it there, "
              "under the present inputs, decides",
-             of(&Spring::seated))
+             &Spring::seated)
       .steps_only()
-      .from(motion);
-  t.variables.back().initial_dependencies->emplace_back("contact_force");
-  follows(pressing);
-  add.output("number_of_impacts", "", "number of impacts on the foundation since the start", of(&Spring::impacts))
+      .from(accelerated)
+      .follows(pressing)
+      .follows({"tip_displacement"}, 1);
+  add.output("number_of_impacts", "", "number of impacts on the foundation since the start", &Spring::impacts)
       .steps_only();
-  add.output("last_impact_time", "s", "time of the last impact; -1 if there was none", of(&Spring::last_impact));
+  add.output("last_impact_time", "s", "time of the last impact; -1 if there was none", &Spring::last_impact);
   add.output("stop_force", "N", "mean force of the foundation on the top over the last step, without impacts",
-             of(&Spring::stop_force));
+             &Spring::stop_force);
   add.output("stop_impulse", "N.s", "sum of the impulses of the foundation on the top over the last step",
-             of(&Spring::stop_impulse));
-  add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy),
-             [](M m) { return m.kinetic_power(); })
+             &Spring::stop_impulse);
+  add.output("kinetic_energy", "J", "kinetic energy", &Spring::kinetic_energy, &SpringModel::kinetic_power)
       .from({"mass", "velocity"});
-  add.output("potential_energy", "J", "potential energy of the spring", of(&Spring::potential_energy),
-             [](M m) { return m.potential_power(); })
+  add.output("potential_energy", "J", "potential energy of the spring", &Spring::potential_energy,
+             &SpringModel::potential_power)
       .from({"linear_stiffness", "cubic_stiffness", "unloaded", "displacement"});
-  add.output(
-         "contact_energy", "J", "energy stored in the contact", [](M m) { return m.contact_energy(); },
-         [](M m) { return m.contact_power(); })
-      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement"});
-  add.depends("tip_displacement");
-  add.output(
-      "dissipated_energy", "J", "energy dissipated since the start by the damping of the spring and of the contact",
-      [](M m) { return m.dissipated_energy(); }, [](M m) { return m.dissipated_power(); });
+  add.output("contact_energy", "J", "energy stored in the contact", &SpringModel::contact_energy,
+             &SpringModel::contact_power)
+      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement"})
+      .follows({"tip_displacement"});
+  add.output("dissipated_energy", "J",
+             "energy dissipated since the start by the damping of the spring and of the contact",
+             &SpringModel::dissipated_energy, &SpringModel::dissipated_power);
   add.output("load_work", "J",
              "work of external_force, gravity and base_acceleration since the start, also across impacts and while the "
              "top rests on the foundation",
-             of(&Spring::load_work), [](M m) { return m.load_power(); });
-  add.local("impact_loss", "J", "energy lost in impacts on the foundation since the start", of(&Spring::impact_loss));
+             &Spring::load_work, &SpringModel::load_power);
+  add.local("impact_loss", "J", "energy lost in impacts on the foundation since the start", &Spring::impact_loss);
   add.output("warnings", "",
              "number of steps with a warning: the FMUs are connected wrongly, or a step was discarded. Many tools hide "
              "the messages that say which; restoring a state does not lower the number",
-             [](M m) { return m.warnings(); })
+             &SpringModel::warnings)
       .steps_only();
   add.local("internal_steps", "",
             "internal steps since the start: parts with a Taylor series of their own, and steps of IDA",
-            of(&Spring::internal_steps));
+            &Spring::internal_steps);
   return t;
 }
 

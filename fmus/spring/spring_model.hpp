@@ -88,35 +88,35 @@ class SpringModel final : public fmi::Model {
     forget_what_was_set();  // what was observed of the inputs is part of the state
   }
 
-  const spring::Spring& top() const { return *spring_; }
+  const spring::Spring& body() const { return *spring_; }
   int warnings() const { return refused + wiring_.warnings(); }
 
-  double reaction() const { return held() ? held_->force() : top().reaction(); }
-  double elastic_reaction() const { return held() ? held_->elastic(top().displacement()) : top().elastic_reaction(); }
+  double reaction() const { return held() ? held_->force() : body().reaction(); }
+  double elastic_reaction() const { return held() ? held_->elastic(body().displacement()) : body().elastic_reaction(); }
   double contact_energy() const {
-    if (!held()) return top().contact_energy();
-    return held_->energy(top().displacement(), top().extrapolated() ? held_->state().tip : top().tip()[0]);
+    if (!held()) return body().contact_energy();
+    return held_->energy(body().displacement(), body().extrapolated() ? held_->state().tip : body().tip()[0]);
   }
-  double dissipated_energy() const { return top().dissipated_energy() + held_->dissipated(); }
+  double dissipated_energy() const { return body().dissipated_energy() + held_->dissipated(); }
 
   // Rates of outputs, under the inputs that are set.
-  double approach() const { return top().velocity() - (held() ? tip_velocity[0] : top().tip()[1]); }  ///< δ̇
+  double approach() const { return body().velocity() - (held() ? tip_velocity[0] : body().tip()[1]); }  ///< δ̇
   double reaction_rate() const {
-    const auto slopes = top().reaction_slopes();
-    return slopes.force_by_depth * approach() + slopes.force_by_rate * (top().acceleration() - top().tip()[2]);
+    const auto slopes = body().reaction_slopes();
+    return slopes.force_by_depth * approach() + slopes.force_by_rate * (body().acceleration() - body().tip()[2]);
   }
 
   double dissipated_power() const {
-    const double by_contact = held() ? 0.0 : (top().reaction() - top().elastic_reaction()) * approach();
-    return parameters.damping * top().velocity() * top().velocity() + by_contact;
+    const double by_contact = held() ? 0.0 : (body().reaction() - body().elastic_reaction()) * approach();
+    return parameters.damping * body().velocity() * body().velocity() + by_contact;
   }
 
-  double kinetic_power() const { return parameters.mass * top().velocity() * top().acceleration(); }
-  double potential_power() const { return top().spring_force() * top().velocity(); }
+  double kinetic_power() const { return parameters.mass * body().velocity() * body().acceleration(); }
+  double potential_power() const { return body().spring_force() * body().velocity(); }
   double contact_power() const { return elastic_reaction() * approach(); }
-  double load_power() const { return spring::load_of(parameters, acting())[0] * top().velocity(); }
+  double load_power() const { return spring::load_of(parameters, acting())[0] * body().velocity(); }
   double jerk() const {
-    return top().jerk(spring::Loads::from(parameters, acting()).force[1], held() ? 0.0 : reaction_rate());
+    return body().jerk(spring::Loads::from(parameters, acting()).force[1], held() ? 0.0 : reaction_rate());
   }
 
  private:
@@ -147,11 +147,11 @@ class SpringModel final : public fmi::Model {
     if (!parameters.compliant() || held_->started()) return;
     if (rhythm_.stepped != 0.0) {
       if (held() || !arrived.predicts()) return;
-      held_->take_over(top().tip()[0], rhythm_.size, top().displacement(), top().reaction());
-      if (top().displacement() > arrived.displacement) wiring_.count(spring::Wiring::no_first_exchange);
+      held_->take_over(body().tip()[0], rhythm_.size, body().displacement(), body().reaction());
+      if (body().displacement() > arrived.displacement) wiring_.count(spring::Wiring::no_first_exchange);
     } else if (arrived.predicts()) {
       spring_->set_contact_law(spring::ContactLaw::external);
-      held_->begin(arrived, rhythm_.size, top().displacement(), trials(rhythm_.size));
+      held_->begin(arrived, rhythm_.size, body().displacement(), trials(rhythm_.size));
     } else {
       held_->restore({});
     }
@@ -180,10 +180,10 @@ class SpringModel final : public fmi::Model {
   /// To what outputs refer. A tip that was not set since the last step is where that one left it.
   void observe() {
     spring::Inputs present = acting();
-    const bool extrapolated = top().extrapolated() && !tip_is_set;
-    present.tip_displacement = extrapolated ? top().tip() : tip();
+    const bool extrapolated = body().extrapolated() && !tip_is_set;
+    present.tip_displacement = extrapolated ? body().tip() : tip();
     if (extrapolated && tip_velocity_is_set)
-      present.tip_displacement = {top().tip()[0], tip_velocity[0], tip_velocity[1]};
+      present.tip_displacement = {body().tip()[0], tip_velocity[0], tip_velocity[1]};
     forget_what_was_set();
     spring_->observe(present, extrapolated);
   }
@@ -196,7 +196,7 @@ class SpringModel final : public fmi::Model {
     if (!trials_->adopt(size, acting())) spring_->step(size, acting(), time);
     if (!fmi::is_rest(expected, time, size)) {  // else the force is held on
       wiring_.check_step(*held_, message());
-      held_->advance(message(), expected, top().displacement(), trials(expected));
+      held_->advance(message(), expected, body().displacement(), trials(expected));
       require_held_force();
     }
     observe();
@@ -223,7 +223,7 @@ class SpringModel final : public fmi::Model {
   void check_wiring() {
     const spring::TipMessage m = message();
     const bool arrives = m.displacement != 0.0 || m.velocity != 0.0 || m.forecast != 0.0 || m.predicts();
-    const double stiffness = top().reaction_slopes().force_by_depth;
+    const double stiffness = body().reaction_slopes().force_by_depth;
     if (!parameters.compliant() && arrives) wiring_.count(spring::Wiring::no_law);
     if (m.forecast != 0.0 && stiffness > 0.0) wiring_.check_resolved(rhythm_.size, stiffness, parameters.mass);
     if (!wiring_.news.empty()) warning = std::exchange(wiring_.news, {});
