@@ -56,12 +56,13 @@ class MidpointBeam final : public Beam {
       matrix.factors = mesh_.factors(1.0, matrix.k);
     });
     // w without tip force, in which it is linear: a coupling that repeats a step from one state with other forces
-    // solves once. What `now_` still holds is the state that the last step began with.
-    if (h != free_size_ || loads != free_loads_ || start_.q != now_.q || start_.v != now_.v) {
+    // solves once.
+    if (h != free_size_ || loads != free_loads_ || start_.q != free_start_.q || start_.v != free_start_.v) {
       rhs_ = 0.5 * h * force(loads);
       mesh_.add_products(1.0, start_.v, -0.5 * h, start_.q, rhs_);
       solve(S, free_);
       free_loads_ = loads;
+      free_start_ = start_;
     }
     if (h != free_size_) {
       rhs_ = 0.5 * h * mesh_.load(Loads::tip);
@@ -94,8 +95,9 @@ class MidpointBeam final : public Beam {
 
   const Timoshenko& mesh_;
   double shear_modulus_;    // [Pa]
-  double free_size_ = 0.0;  // of the step that the next three are of; 0: none
+  double free_size_ = 0.0;  // of the step that the next four are of; 0: none
   Loads::Values free_loads_{};
+  State free_start_;
   VectorXd free_, response_;       // w without tip force, and of a unit tip force
   VectorXd rhs_, correction_, w_;  // work space
   StepCache<StepMatrix> cache_;

@@ -141,26 +141,26 @@ double HeldContact::repaying(const Found& law) const {
 /// so each trial tells where it would be under others; without a contact one trial does, in one two. Where the top
 /// strikes the foundation brackets close.
 HeldContact::Found HeldContact::solve(double start, double free, const Top& top) {
-  double low = 0.0, high = infinite, last = 0.0, end = 0.0, last_end = 0.0, last_missing = infinite;
-  double force = std::max(0.0, 2.0 * now_.last - now_.before);
+  struct Trial {
+    double force, end, missing;
+  } last{0.0, 0.0, infinite};
+  double low = 0.0, high = infinite, force = std::max(0.0, 2.0 * now_.last - now_.before);
   for (int trial = 0; trial < most_trials; ++trial) {
     const double place = top(force);
     double next = 0.0;
     if (std::isfinite(place)) {
-      end = place - free - response_ * force;
+      const double end = place - free - response_ * force;
       const Mean wanted = mean(start, end);
       if (!std::isfinite(wanted.force)) break;
       const double missing = wanted.force - force;
       const double depths = std::abs(place) + std::abs(free) + response_ * force;
-      const double accuracy = std::abs(missing) < 0.5 * last_missing ? 4.0 * epsilon : top_error;
+      const double accuracy = std::abs(missing) < 0.5 * last.missing ? 4.0 * epsilon : top_error;
       if (std::abs(missing) <= force_rounding * force + wanted.rounding + wanted.by_end * accuracy * depths)
         return {force, end};
       (missing > 0.0 ? low : high) = force;
-      const bool known = last_missing < infinite && std::abs(end - last_end) > secant_rounding * depths;
-      if (known) now_.yielding = std::max(response_, (last_end - end) / (force - last));
-      last_missing = std::abs(missing);
-      last = force;
-      last_end = end;
+      if (last.missing < infinite && std::abs(end - last.end) > secant_rounding * depths)
+        now_.yielding = std::max(response_, (last.end - end) / (force - last.force));
+      last = {force, end, std::abs(missing)};
       next = solve_affine(start, end, force);
     } else if (force > low) {
       high = force;  // pressed so hard, the top runs away
@@ -169,10 +169,10 @@ HeldContact::Found HeldContact::solve(double start, double free, const Top& top)
     }
     if (high < infinite && (!(low <= next && next < high) || trial > most_trials / 6)) next = low + (high - low) / 2;
     const bool closed = high < infinite && high - low <= 4.0 * epsilon * high;
-    if (closed || next == force) return {std::isfinite(place) ? force : infinite, end};
+    if (closed || next == force) return {std::isfinite(place) ? force : infinite, last.end};
     force = next;
   }
-  return {infinite, end};
+  return {infinite, last.end};
 }
 
 /// C with C = mean(start, end(C)), end(C) = `end` − yielding (C − `force`): Newton's method, which asks for no trial.

@@ -19,33 +19,34 @@ bool same_start(const Spring::State& a, const Spring::State& b) {
 void TrialSteps::begin(double size, const Inputs& inputs) {
   start_ = spring_.state();
   inputs_ = inputs;
-  begun_size_ = size;
+  size_ = size;
+  end_.reset();
   work_ = 0.0;
   failure_.clear();
 }
 
 double TrialSteps::displacement_under(double contact_force) {
   constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-  size_ = 0.0;
+  end_.reset();
   if (work_ > most_work) return unknown;
   inputs_.contact_force = {contact_force, 0.0, 0.0};
   try {
-    spring_.step(begun_size_, inputs_);
+    spring_.step(size_, inputs_);
   } catch (const StepFailure& e) {
     failure_ = e.what();
     return unknown;
   }
   end_ = spring_.state();
-  size_ = begun_size_;
-  work_ += end_.steps - start_.steps;
+  work_ += end_->steps - start_.steps;
   spring_.restore(start_);
-  return end_.y;
+  return end_->y;
 }
 
 bool TrialSteps::adopt(double size, const Inputs& inputs) {
-  if (size != size_ || !(inputs == inputs_) || end_.impacts != start_.impacts || !same_start(spring_.state(), start_))
+  if (!end_ || size != size_ || !(inputs == inputs_) || end_->impacts != start_.impacts ||
+      !same_start(spring_.state(), start_))
     return false;
-  spring_.restore(end_);
+  spring_.restore(*end_);
   return true;
 }
 

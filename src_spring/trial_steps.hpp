@@ -2,6 +2,7 @@
 // (held_contact.hpp). The trial under the force that is found is then the next step.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "spring.hpp"
@@ -26,10 +27,11 @@ class TrialSteps {
 
  private:
   Spring& spring_;
-  Spring::State start_{}, end_{};
-  double size_ = 0.0;  ///< of a trial that was made; 0: of none
+  Spring::State start_{};
+  double size_ = 0.0;
   Inputs inputs_;
-  double begun_size_ = 0.0, work_ = 0.0;
+  std::optional<Spring::State> end_;  ///< of the last trial, if there was such a step
+  double work_ = 0.0;
   std::string failure_;
 };
 

@@ -1,8 +1,8 @@
 #include "wiring.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+#include <cstdio>
 
 namespace spring {
 namespace {
@@ -37,6 +37,10 @@ constexpr std::array<Description, Wiring::faults> descriptions{
 
 }  // namespace
 
+/// The tip was predicted (held_contact.hpp) at u + 2H w + C₂ r₂ + C₁ r₁, C₁ the force of the step before this one and
+/// C₂ that of the step before that. Where forces act a step early, as values are exchanged within the steps, it is at
+///     … + C₁ r₂ + C r₁, C that of this step: off by r₂ (C₁ − C₂) + r₁ (C − C₁);
+/// with the responses swapped it is at … + C₂ r₁ + C₁ r₂, off by (r₂ − r₁) (C₁ − C₂).
 void Wiring::check_step(const HeldContact& contact, const TipMessage& arrived) {
   // Parts of the tip's path in a step: more than rounding, and more than loads within a step cause. Part of the error
   // that no cause explains.
@@ -64,8 +68,8 @@ void Wiring::check_resolved(double size, double stiffness, double mass) {
   constexpr double resolved = 1e-3;
   const double needed = resolved / std::sqrt(stiffness / mass);
   char text[16];
-  const char* const end = std::to_chars(text, text + sizeof text, needed, std::chars_format::scientific, 0).ptr;
-  if (size > needed) count(unresolved, std::string(static_cast<const char*>(text), end) + " s");
+  std::snprintf(text, sizeof text, "%.0e s", needed);
+  if (size > needed) count(unresolved, text);
 }
 
 void Wiring::count(Fault fault, const std::string& detail) {

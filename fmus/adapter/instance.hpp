@@ -66,8 +66,17 @@ class Instance {
   const TypeNames type_names_;
   const Table& table_;
   std::unique_ptr<Model> model_;
-  bool built_ = false;                     ///< it is, with the present settings
-  bool dirty_ = false;                     ///< the model is not evaluated
+  // What the model has of what was called (–: as before). Whoever reads it has it evaluated: built, then up to date
+  // with Model::Acting at_start before the end of initialization mode, later as_set or as_stepped, by inputs_set_.
+  //                              built_   dirty_   inputs_set_
+  //     new, set up, a setting   no       –        –
+  //     built                    yes      yes      yes           all inputs are handed to it
+  //     an input                 –        yes      yes
+  //     start, step, restored    –        yes      no            derivatives are used up
+  //     updated at an event      –        yes      –
+  //     evaluated                yes      no       –
+  bool built_ = false;                     ///< with the present settings
+  bool dirty_ = false;                     ///< not evaluated since something was set or done
   bool inputs_set_ = false;                ///< since the last step
   std::vector<const Variable*> settable_;  ///< what is set before the start, then the inputs
   std::size_t n_settings_ = 0;             ///< the former

@@ -177,7 +177,11 @@ class SpringModel final : public fmi::Model {
   spring::TipMessage message() const {
     return {tip_displacement[0], tip_velocity[0], forecast[0], response[0], response_2[0]};
   }
-  /// To what outputs refer. A tip that was not set since the last step is where that one left it.
+  /// To what outputs refer:
+  ///     set since the last step    the tip is                   its rates are
+  ///     tip_displacement           as set                       as set
+  ///     tip_velocity alone         where the step has left it   as set
+  ///     neither                    where the step has left it   those that the step has left
   void observe() {
     spring::Inputs present = acting();
     const bool extrapolated = body().extrapolated() && !tip_is_set;
