@@ -200,7 +200,7 @@ Reached Spring::step_to_event(double size, const Inputs& inputs, double time, bo
   const Reached reached = step.run(to_event);
   state_ = step.state();
   const double done = reached.size;
-  observe(loads.from_time(done), true);
+  observe(loads.from_time(done));
   // Impacts turn the velocity around, y goes on: the step's integrals know the work through all of its events.
   state_.load_work += work(load_of(parameters_, inputs), done, state_.y - before.y, state_.integral - before.y * done,
                            state_.integral_2 - before.y * done * done / 2);
@@ -225,10 +225,6 @@ bool Spring::finite() const {
   return std::isfinite(s.y + s.z + s.integral + s.integral_2 + s.dissipated + s.impact_loss + s.load_work +
                        s.stop_force + s.stop_impulse + s.observed.force + tip()[0] + tip()[1] + tip()[2] +
                        acceleration() + reaction() + kinetic_energy() + potential_energy() + contact_energy());
-}
-
-void Spring::observe(const Loads& loads, bool extrapolated) {
-  state_.observed = {loads.force[0], loads.tip, extrapolated ? 1.0 : 0.0};
 }
 
 void Spring::apply_impulse(double impulse) {

@@ -48,11 +48,8 @@ class Spring {
   void strike(double time);
 
   /// Take `inputs` as acting at the present instant, for acceleration(), reaction() and contact_energy() before the
-  /// first step or after an input has jumped. The motion does not depend on it. `extrapolated`:
-  /// the value of extrapolated() from then on.
-  void observe(const Inputs& inputs, bool extrapolated = false) {
-    observe(Loads::from(parameters_, inputs), extrapolated);
-  }
+  /// first step or after an input has jumped. The motion does not depend on it.
+  void observe(const Inputs& inputs) { observe(Loads::from(parameters_, inputs)); }
 
   /// Instantaneous upward impulse J [N·s]: z += J/m.
   void apply_impulse(double impulse);
@@ -83,8 +80,6 @@ class Spring {
   double elastic_reaction() const { return equation_.compliance().elastic(depth()); }  ///< λ_nc (y − u_tip)₊^p [N]
   double contact_energy() const;  ///< λ_nc (y − u_tip)₊^{p+1}/(p+1) of the law inside [J]
   const Polynomial& tip() const { return state_.observed.tip; }  ///< u_tip [m], its rates
-  /// Whether the tip is where the last step left it, and none has been observed since.
-  bool extrapolated() const { return state_.observed.extrapolated != 0.0; }
 
   /// The whole dynamic state: all that a step changes, in doubles.
   struct State {
@@ -98,9 +93,8 @@ class Spring {
     double meeting = 0.0;  ///< 1: the last step ended early where contact begins or ends
     /// What acts at the present instant, where the step ended or as observed. No step depends on it.
     struct Observed {
-      double force;         ///< F [N]
-      Polynomial tip;       ///< u_tip [m], its rates
-      double extrapolated;  ///< 1: by a step, not observed
+      double force;    ///< F [N]
+      Polynomial tip;  ///< u_tip [m], its rates
     } observed{};
   };
   const State& state() const { return state_; }
@@ -109,7 +103,7 @@ class Spring {
 
  private:
   class Step;
-  void observe(const Loads& loads, bool extrapolated);
+  void observe(const Loads& loads) { state_.observed = {loads.force[0], loads.tip}; }
   bool can_rest() const { return parameters_.stop_enabled && state_.y == parameters_.stop_position && state_.z == 0.0; }
   double depth() const { return parameters_.compliant() ? state_.y - tip()[0] : -1.0; }
   bool finite() const;

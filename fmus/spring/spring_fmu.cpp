@@ -95,7 +95,7 @@ fmi::Table fmi::make_table() {
             "derivatives or, where the first is 0, with tip_velocity",
             [](SpringModel& m, const fmi::Polynomial& value) {
               m.tip_displacement = value;
-              m.tip_is_set = true;
+              m.extrapolated = false;
             });
   add.input("tip_velocity", "m/s",
             "velocity of the beam's tip, used when contact_law > 1 and the derivative of tip_displacement is 0; its "

@@ -33,7 +33,8 @@ class SpringModel final : public fmi::Model {
   spring::Inputs inputs;  ///< but for the tip
   double impulse = 0.0;
   fmi::Polynomial tip_displacement{}, tip_velocity{}, forecast{}, response{}, response_2{};
-  bool tip_is_set = false, tip_velocity_is_set = false;  ///< since the last step
+  bool extrapolated = false;         ///< tip_displacement has not been set since the last step
+  bool tip_velocity_is_set = false;  ///< since the last step
 
   void build(double tolerance) override {
     FmuParameters p = parameters;
@@ -42,6 +43,7 @@ class SpringModel final : public fmi::Model {
     trials_.emplace(*spring_);
     held_.emplace(spring::contact_of(p), p.mass);
     rhythm_ = {};
+    extrapolated = false;
   }
 
   void evaluate(Acting acting) override {
@@ -79,13 +81,15 @@ class SpringModel final : public fmi::Model {
     observe();
   }
 
-  void forget_what_was_set() override { tip_is_set = tip_velocity_is_set = false; }
+  void forget_what_was_set() override {
+    extrapolated = true;
+    tip_velocity_is_set = false;
+  }
   void save(std::vector<double>& flat) const override { fmi::flatten(flat, state()); }
   void restore(const std::vector<double>& flat) override {
     State saved;
     fmi::restore(flat, saved);
     restore(saved);
-    forget_what_was_set();  // what was observed of the inputs is part of the state
   }
 
   const spring::Spring& body() const { return *spring_; }
@@ -95,7 +99,7 @@ class SpringModel final : public fmi::Model {
   double elastic_reaction() const { return held() ? held_->elastic(body().displacement()) : body().elastic_reaction(); }
   double contact_energy() const {
     if (!held()) return body().contact_energy();
-    return held_->energy(body().displacement(), body().extrapolated() ? held_->state().tip : body().tip()[0]);
+    return held_->energy(body().displacement(), extrapolated ? held_->state().tip : body().tip()[0]);
   }
   double dissipated_energy() const { return body().dissipated_energy() + held_->dissipated(); }
 
@@ -126,12 +130,15 @@ class SpringModel final : public fmi::Model {
   };
   struct State {
     spring::Spring::State top;
+    double extrapolated;
     spring::HeldContact::State contact;  ///< all 0 where no force is held
     Rhythm rhythm;
   };
-  State state() const { return {spring_->state(), held_->state(), rhythm_}; }
+  State state() const { return {spring_->state(), extrapolated ? 1.0 : 0.0, held_->state(), rhythm_}; }
   void restore(const State& state) {
     spring_->restore(state.top);
+    extrapolated = state.extrapolated != 0.0;
+    tip_velocity_is_set = false;  // what was observed of it is part of the state
     held_->restore(state.contact);
     rhythm_ = state.rhythm;
     choose_law();
@@ -184,12 +191,10 @@ class SpringModel final : public fmi::Model {
   ///     neither                    where the step has left it   those that the step has left
   void observe() {
     spring::Inputs present = acting();
-    const bool extrapolated = body().extrapolated() && !tip_is_set;
     present.tip_displacement = extrapolated ? body().tip() : tip();
     if (extrapolated && tip_velocity_is_set)
       present.tip_displacement = {body().tip()[0], tip_velocity[0], tip_velocity[1]};
-    forget_what_was_set();
-    spring_->observe(present, extrapolated);
+    spring_->observe(present);
   }
 
   void step_held(double time, double size) {
@@ -203,6 +208,7 @@ class SpringModel final : public fmi::Model {
       held_->advance(message(), expected, body().displacement(), trials(expected));
       require_held_force();
     }
+    forget_what_was_set();
     observe();
   }
 
