@@ -51,19 +51,13 @@ void Component::start() {
 
 void Component::reset() {
   instance.reset();
-  terminated = false;
+  terminate_simulation = false;
   report(Status::ok, "reset");
 }
 
 Reached Component::step(double time, double size, bool to_event) {
-  terminated = false;
-  Reached reached{};
-  try {
-    reached = instance.step(time, size, to_event);
-  } catch (const Discarded& e) {
-    terminated = e.remedy == Discarded::Remedy::none;
-    throw;
-  }
+  terminate_simulation = false;
+  const Reached reached = instance.step(time, size, to_event);
   const std::string warning = instance.take_warning();
   if (!warning.empty()) report(Status::warning, warning);
   return reached;
@@ -98,7 +92,7 @@ void Component::get_state(void** state) {
 
 void Component::set_state(void* state) {
   instance.restore(found(state));
-  terminated = false;
+  terminate_simulation = false;
   // A state of an instance that has an event mode: here updates follow from steps.
   Phase& phase = instance.progress.phase;
   if (phase == event_mode && !event_mode_used) phase = step_complete;

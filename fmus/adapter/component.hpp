@@ -49,7 +49,7 @@ class Component {
   Instance instance;
   bool event_mode_used = false, early_return_allowed = false;  ///< what the importer can do (FMI 3.0)
   const char* function = "";                                   ///< of FMI, that is being called
-  bool terminated = false;                                     ///< no step of any size can follow the last one
+  bool terminate_simulation = false;                           ///< no step of any size can follow the last one
 
   /// Sends a message. Events, with Status::ok, are sent if debugging is on for them; the rest always, with the
   /// function's name. After an error the instance is in the phase `error`.
@@ -104,6 +104,7 @@ Status guard(void* c, const char* function, unsigned legal, const Body& body) no
       body(component);
       return Status::ok;
     } catch (const Discarded& e) {
+      if (e.remedy == Discarded::Remedy::none) component.terminate_simulation = true;
       return component.report(Status::discard, e.what());
     } catch (const std::exception& e) {
       return component.report(Status::error, e.what());

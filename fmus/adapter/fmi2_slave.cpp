@@ -158,7 +158,7 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind, fmi2Integ
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean* value) {
   return get_status(c, __func__, s == fmi2Terminated, value,
-                    [](const Component& k) { return k.terminated ? fmi2True : fmi2False; });
+                    [](const Component& k) { return k.terminate_simulation ? fmi2True : fmi2False; });
 }
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind, fmi2String* value) {

@@ -166,26 +166,21 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean* discreteStatesN
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
                       fmi3Boolean, fmi3Boolean* eventHandlingNeeded, fmi3Boolean* terminateSimulation,
                       fmi3Boolean* earlyReturn, fmi3Float64* lastSuccessfulTime) {
-  return call(c, __func__, step_complete, [&](Component& k) {
+  const fmi3Status status = call(c, __func__, step_complete, [&](Component& k) {
     require_arrays(1, {{eventHandlingNeeded, "eventHandlingNeeded"},
                        {terminateSimulation, "terminateSimulation"},
                        {earlyReturn, "earlyReturn"},
                        {lastSuccessfulTime, "lastSuccessfulTime"}});
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = k.instance.progress.time;
-    Reached reached{};
-    try {
-      reached = k.step(currentCommunicationPoint, communicationStepSize, k.early_return_allowed);
-    } catch (const Discarded&) {
-      *terminateSimulation = k.terminated;
-      throw;
-    }
-    const auto [size, event] = reached;
+    const auto [size, event] = k.step(currentCommunicationPoint, communicationStepSize, k.early_return_allowed);
     *lastSuccessfulTime = k.instance.progress.time;
     *earlyReturn = size != communicationStepSize;
     *eventHandlingNeeded = event && k.event_mode_used;
     if (event && !k.event_mode_used) k.instance.update();
   });
+  if (status == fmi3Discard) *terminateSimulation = static_cast<Component*>(c)->terminate_simulation;
+  return status;
 }
 
 // Values: of the types that variables have, and of those that none has.

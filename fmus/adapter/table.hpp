@@ -157,8 +157,7 @@ class TableBuilder {
   /// An input that acts at the start of the next step and is then 0 again.
   Variable& impulse(const std::string& name, const std::string& unit, const std::string& description,
                     double M::*field) {
-    Variable& v = add(name, unit, description, Causality::input);
-    v.set = [field](Model& m, const Polynomial& value) { static_cast<M&>(m).*field = value[0]; };
+    Variable& v = input(name, unit, description, [field](M& m, const Polynomial& value) { m.*field = value[0]; });
     v.consumed = true;
     return v;
   }
