@@ -52,8 +52,8 @@ Places sign_changes(const Series& c, int degree);
 /// The last place, to rounding, before Σ c_k sᵏ, k ≤ degree, is below 0 for the first time; nothing if it never is.
 std::optional<double> first_fall(const Series& c, int degree);
 
-/// How a flight ends: at the stop, or where contact with the tip begins or ends.
-enum class Event { none, stop, contact };
+/// How a part of a step ends: at the stop, where contact with the tip begins or ends, where a seated top is released.
+enum class Event { none, stop, contact, release };
 struct Occurrence {
   Event event;
   double s;  ///< 1 for none

@@ -29,7 +29,8 @@ class Spring::Step {
         state_(spring.state_),
         size_(size),
         loads_(loads),
-        meeting_(state_.meeting != 0.0 && std::abs(state_.y - loads.tip[0]) <= tolerance()) {}
+        last_(state_.meeting != 0.0 && std::abs(state_.y - loads.tip[0]) <= tolerance() ? Event::contact
+                                                                                        : Event::none) {}
 
   Reached run(bool to_event) {
     state_.integral = state_.integral_2 = state_.stop_force = state_.stop_impulse = 0.0;
@@ -37,27 +38,21 @@ class Spring::Step {
     try {
       while (remaining() > 0.0 && !(to_event && ends())) {
         arrive();
-        happened_ = false;
-        if (state_.seated != 0.0)
-          stay();
-        else if (rests())
-          rest();
-        else
-          fly();
+        last_ = state_.seated != 0.0 ? stay() : rests() ? rest() : fly();
       }
     } catch (const SolverError& error) {
       fail(error.what(), spring_.flight_.end().y, t_ + spring_.flight_.end().elapsed);
     }
     const Reached reached{remaining() > 0.0 ? t_ : size_, to_event && ends()};
     state_.stop_force = seated_impulse_ / reached.size;
-    if (reached.event && meeting_) state_.meeting = 1.0;
+    if (reached.event && last_ == Event::contact) state_.meeting = 1.0;
     return reached;
   }
 
   /// Where the segment at t_ starts, with what happens there.
   void arrive() {
     now_ = loads_.from_time(t_);
-    depth_ = !parameters_.compliant() ? -1.0 : meeting_ ? 0.0 : state_.y - now_.tip[0];
+    depth_ = !parameters_.compliant() ? -1.0 : last_ == Event::contact ? 0.0 : state_.y - now_.tip[0];
     if (parameters_.stop_enabled) land();
   }
 
@@ -65,7 +60,7 @@ class Spring::Step {
 
  private:
   /// Whether an event lies at t_, later than the start by more than rounding.
-  bool ends() const { return happened_ && t_ > 4.0 * epsilon * size_ && start_ + t_ > start_; }
+  bool ends() const { return last_ != Event::none && t_ > 4.0 * epsilon * size_ && start_ + t_ > start_; }
 
   /// To which y is known [m].
   double tolerance() const {
@@ -102,7 +97,7 @@ class Spring::Step {
       state_.stop_impulse += parameters_.mass * (state_.z - before);
       state_.impact_loss += parameters_.mass / 2 * (before * before - state_.z * state_.z);
     }
-    state_.seated = state_.z == 0.0 && pressed && !released_ ? 1.0 : 0.0;
+    state_.seated = state_.z == 0.0 && pressed && last_ != Event::release ? 1.0 : 0.0;
   }
 
   /// Keeps y over `size` [s].
@@ -111,16 +106,16 @@ class Spring::Step {
     state_.integral += state_.y * size;
   }
 
-  void stay() {
+  Event stay() {
     const SeatedEnd stayed =
         stay_seated(spring_.equation_, state_.y, depth_, parameters_.compliant(), now_, remaining());
     hold(stayed.size);
     state_.dissipated += stayed.dissipated;
     seated_impulse_ += stayed.impulse;
     t_ = stayed.released ? t_ + stayed.size : size_;
-    released_ = happened_ = stayed.released;
-    if (released_) state_.seated = 0.0;
-    meeting_ = false;
+    if (!stayed.released) return Event::none;
+    state_.seated = 0.0;
+    return Event::release;
   }
 
   /// Whether nothing moves the top, out of reach of a tip, for the rest of the step: for as long as that may be.
@@ -132,17 +127,18 @@ class Spring::Step {
            std::abs(force - held) <= 4.0 * epsilon * (std::abs(force) + std::abs(held));
   }
 
-  void rest() {
+  Event rest() {
     hold(size_ - t_);
     t_ = size_;
-    released_ = meeting_ = happened_ = false;
+    return Event::none;
   }
 
-  void fly() {
+  Event fly() {
     const double gap = parameters_.stop_enabled ? state_.y - parameters_.stop_position : 1.0;
     if (work_ >= most_work) fail("it spans too much of the motion", state_.y, t_);
+    const bool released = last_ == Event::release;
     const FlightEnd came =
-        spring_.flight_.run({state_.y, state_.z, now_, remaining(), gap, depth_, released_, most_work - work_});
+        spring_.flight_.run({state_.y, state_.z, now_, remaining(), gap, depth_, released, most_work - work_});
     state_.steps += static_cast<double>(came.steps);
     work_ += came.steps;
     state_.integral_2 += state_.integral * came.elapsed + came.integral_2;
@@ -155,9 +151,7 @@ class Spring::Step {
     // Rounding must not put the top below the stop. Not from the gap: a distant stop would quantise y.
     if (parameters_.stop_enabled)
       state_.y = came.event == Event::stop ? parameters_.stop_position : std::max(came.y, parameters_.stop_position);
-    released_ = false;
-    meeting_ = came.event == Event::contact;
-    happened_ = came.event != Event::none;
+    return came.event;
   }
 
   /// Past the hilltop, a motion that nothing brings back reaches infinity in finite time, where the solver fails.
@@ -179,10 +173,8 @@ class Spring::Step {
   long work_ = 0;                ///< what was done so far
   Loads now_;                    ///< loads_ from t_ on
   double depth_ = -1.0;          ///< y − u_tip at t_
-  bool meeting_;                 ///< tip and top are at a contact event: y = u_tip
+  Event last_;                   ///< with which the part before t_ ended; contact: y = u_tip, release: N = 0
   double seated_impulse_ = 0.0;  ///< ∫N while seated
-  bool released_ = false;        ///< has just left the foundation, N = 0
-  bool happened_ = false;        ///< the last segment ended at an event
 };
 
 Spring::Spring(const Parameters& p)
