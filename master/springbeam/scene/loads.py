@@ -243,10 +243,10 @@ class HalfSineLoad(_Pulse):
         return np.pi / self.duration, 0.0
 
     def curve(self, t: "np.ndarray") -> Any:
-        return np.sin(np.pi / self.duration * t)
+        return np.sin(self.wave[0] * t)
 
     def slope(self, t: "np.ndarray") -> Any:
-        return np.pi / self.duration * np.cos(np.pi / self.duration * t)
+        return self.wave[0] * np.cos(self.wave[0] * t)
 
 
 class SawtoothLoad(_Pulse):

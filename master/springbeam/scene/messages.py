@@ -84,15 +84,15 @@ def keys_of(*models: type[Table]) -> dict[str, dict[str, Any]]:
 def allowed(key: Mapping[str, Any]) -> str:
     """Return in words the allowed values of a key of `keys_of`."""
     if choices := key.get("enum") or [key[name] for name in ("const",) if name in key]:
-        return " or ".join(json.dumps(choice, ensure_ascii=False) for choice in choices)
+        return either(choices)
     bounds = " and ".join(f"{words} {key[name]:.15g}" for name, words in _BOUNDS.items() if name in key)
     kind = "tables" if "oneOf" in key.get("items", ()) else key.get("type", "table")
     return f"{_NOUNS[kind]} {bounds}".strip()
 
 
-def either(texts: Iterable[str]) -> str:
-    """Return a choice of texts for an error: ``"a" or "b"``."""
-    return " or ".join(json.dumps(text, ensure_ascii=False) for text in texts)
+def either(values: Iterable[Any]) -> str:
+    """Return a choice of values for an error: ``"a" or "b"``."""
+    return " or ".join(json.dumps(value, ensure_ascii=False) for value in values)
 
 
 def unit_of(table: str, key: str) -> str:
@@ -139,11 +139,9 @@ def key_kind(table: str, key: str) -> type:
 
 def key_bounds(table: str, key: str) -> tuple[float, float]:
     """Return the lowest and the highest value that ``[table] key`` takes, infinite where there is no bound."""
-    described = keys_of(*models_of(table).values()).get(key, {})
-    parts = [described, *described.get("anyOf", ())]
-    low = (part[name] for part in parts for name in ("minimum", "exclusiveMinimum") if name in part)
-    high = (part[name] for part in parts for name in ("maximum", "exclusiveMaximum") if name in part)
-    return max(low, default=-inf), min(high, default=inf)
+    bounds = keys_of(*models_of(table).values()).get(key, {})
+    low = bounds.get("minimum", bounds.get("exclusiveMinimum", -inf))
+    return low, bounds.get("maximum", bounds.get("exclusiveMaximum", inf))
 
 
 def explain(error: Any) -> str:

@@ -28,7 +28,6 @@ from typing import Any, Literal
 import numpy as np
 
 from ..monolithic import event_driven
-from ..pictures.drawing import present
 from ..results.contact_changes import ContactChange, contact_changes
 from ..results.dense import rows_at
 from ..results.distance import apart
@@ -58,8 +57,6 @@ SHORT_SHARE = 2e-3
 PARTS = 4
 #: Quantities that are more than linear between rows.
 _CURVES = ("u_tip", "v_tip", "y", "z", "contact_force")
-#: Columns of both motions that are kept for a picture.
-_DRAWN = ("time", "u_tip", "y", "v_tip", "z", "contact_force", "foundation_force")
 
 
 def compare(scene: Scene, done: Done = unseen) -> Row:
@@ -72,7 +69,7 @@ def compare(scene: Scene, done: Done = unseen) -> Row:
         perturbation of the reference up to the horizon; ``quantities``: a row each, with the largest error (where a
         bound is broken the furthest out of it), when it occurred, its root mean square, the bound then, and whether it
         has passed; ``events``: a row per change of contact, whose ``time`` is ``None`` where the run lacks it;
-        ``notes``; ``scene``; and ``runs``, what is drawn of both where they were compared.
+        ``notes``; ``scene``; and ``runs``, both where they were compared.
 
     Raises
     ------
@@ -84,10 +81,7 @@ def compare(scene: Scene, done: Done = unseen) -> Row:
     record: Row = {"verdict": "differs", "from": scene.contact_time or 0.0, "t_end": scene.time.t_end, "growth": 1.0}
     record |= {"quantities": [], "events": [], "notes": [], "scene": scene.model_dump(exclude_none=True)}
     runs = _beside_event_driven(scene, record, done)
-    record["runs"] = {
-        name: Trajectory(scene, {column: run[column] for column in present(run, _DRAWN)}, run.events)
-        for name, run in zip(("co-simulation", "reference"), runs, strict=False)
-    }
+    record["runs"] = dict(zip(("co-simulation", "reference"), runs, strict=False))
     if all(row["passed"] for row in (*record["quantities"], *record["events"])):
         whole = record["horizon"] >= scene.time.t_end * (1.0 - 1e-12)
         record["verdict"] = "agrees" if record["quantities"] and whole else "not comparable"
