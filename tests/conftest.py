@@ -23,14 +23,11 @@ from matplotlib.figure import Figure
 import springbeam.api  # attaches what a trajectory can do
 from springbeam.bodies import foreign, probe
 from springbeam.bodies.fmu import release
-from springbeam.monolithic import event_driven
 
 ROOT = Path(__file__).resolve().parents[1]
 
 # The folders of the helper modules: commands.py here, the others beside the tests that use them.
 sys.path[:0] = [str(ROOT / "tests" / folder) for folder in (".", "campaign", "master", "system")]
-
-from references import reference  # noqa: E402
 
 # Every run of the tests draws the same examples, however busy the machine, whatever an earlier run has found.
 hypothesis.settings.register_profile("springbeam", derandomize=True, database=None, deadline=None)
@@ -68,12 +65,6 @@ def none_kept():
     release()
     yield
     release()
-
-
-@pytest.fixture
-def kept_references(monkeypatch):
-    """Commands and studies take the references that an earlier run of the tests has kept, if the code is the same."""
-    monkeypatch.setattr(event_driven, "integrate", reference)
 
 
 @pytest.fixture

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from bodies import pair_of
-from references import reference
 from scenes import scene_from_dict
 
 from springbeam.bodies.quasi_static import QuasiStaticBeam
+from springbeam.monolithic.event_driven import integrate as reference
 from springbeam.monolithic.semi_discrete import assemble, constant_forces
 from springbeam.scene import Beam, load_scene, statics, with_changes
 from springbeam.scene.statics import SHAPE_POINTS

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pyarrow import parquet
-from references import reference
 from runs import PAIR, SCENES, block
 from scenes import group
 
 from springbeam import simulate
+from springbeam.monolithic.event_driven import integrate as reference
 from springbeam.results import recording
 from springbeam.results.columns import first_not_finite
 from springbeam.results.directory import (

@@ -18,7 +18,7 @@ from springbeam import simulate
 from springbeam.cli import app
 from springbeam.scene import load_scene
 
-pytestmark = pytest.mark.usefixtures("unpainted", "kept_references")
+pytestmark = pytest.mark.usefixtures("unpainted")
 
 #: Arguments of each command that make it print its tables within a second or two.
 TABLES = {

@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import scenes
-from references import reference
 
 from springbeam import load_scene, simulate
+from springbeam.monolithic.event_driven import integrate as reference
 from springbeam.results.records import impulse
 from springbeam.results.records import joined as are_joined
 from springbeam.studies.metrics import METRICS

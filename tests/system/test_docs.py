@@ -145,7 +145,7 @@ def shown(text, output):
 
 
 @pytest.mark.parametrize("page", shell_pages(), ids=lambda page: page.name)
-def test_commands_of_the_documentation_run(desk, page, unpainted, kept_references, monkeypatch):
+def test_commands_of_the_documentation_run(desk, page, unpainted, monkeypatch):
     """They end well, complain of nothing, and print what the block ``console`` after them shows."""
     monkeypatch.chdir(desk)
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import scenes
-from references import reference
 
 from springbeam import simulate, with_changes
+from springbeam.monolithic.event_driven import integrate as reference
 from springbeam.studies.metrics import METRICS
 
 #: The rounding of forces that follow from accelerations: ε (ω_max/ω₁)² is 2e-12 of the beam.

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 import scenes
 from judge import Reference, judge
-from references import integrated_anew, reference
+from references import integrated_anew
 
 from springbeam import RunStopped, simulate, with_changes
+from springbeam.monolithic.event_driven import integrate as reference
 from springbeam.results.contact_changes import contact_changes
 from springbeam.studies.comparison import compare
 from springbeam.studies.metrics import METRICS

@@ -1,9 +1,9 @@
 """The trade between error and cost, on the FMUs: what is swept, judged and named."""
 
 import pytest
-from references import reference
 from scenes import kinds, soft
 
+from springbeam.monolithic.event_driven import integrate as reference
 from springbeam.studies import tradeoff
 from springbeam.studies.metrics import costs
 from springbeam.studies.tradeoff import Tradeoff, cheapest, pareto

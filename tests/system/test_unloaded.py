@@ -6,9 +6,9 @@ A linear spring that is unloaded at y₀ is one that is unloaded at 0 under a fu
 import numpy as np
 import pytest
 import scenes
-from references import reference
 
 from springbeam import simulate, with_changes
+from springbeam.monolithic.event_driven import integrate as reference
 from springbeam.scene import scene_from_dict
 
 LOWER = 3.0  # N/m

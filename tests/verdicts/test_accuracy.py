@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from references import reference
 from scenes import scene_from_dict, table
 
 from springbeam import SceneError, load_scene, with_changes
+from springbeam.monolithic.event_driven import integrate as reference
 from springbeam.results.distance import distance
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run import accuracy as search

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import oscillator
 import pytest
-from references import reference
 from scenes import group, named
 
 import springbeam
 from springbeam import PointMass, SpringDamper, load_scene, simulate, with_changes
+from springbeam.monolithic.event_driven import integrate as reference
 from springbeam.results.distance import distance
 from springbeam.run import companion
 from springbeam.run.companion import LIMITS, LONGER, check
