@@ -80,33 +80,6 @@ def test_outputs_follow_between_steps_what_is_declared(case):
     assert found == told
 
 
-def test_what_is_not_declared_at_the_start_has_derivative_0(case):
-    """Every output by all that is real and set then, also derivatives of inputs, which FMI 3.0 has as inputs.
-
-    The spring's reaction and acceleration follow the rate of tip_displacement, by −10 N·s/m at the last base.
-    """
-    told = {
-        unknown.variable.name: {v.name for v in unknown.dependencies} for unknown in case.description.initialUnknowns
-    }
-    reals = [name for name, v in case.variables.items() if v.type in ("Real", "Float64")]
-    knowns = [name for name in reals if case.variables[name].causality in ("parameter", "input") or name not in told]
-    knowns = [name for name in knowns if case.variables[name].start is not None]
-    damped = {"contact_law": 2, "compliance_stiffness": 100.0, "compliance_exponent": 1.0, "compliance_damping": 0.5}
-    rows = [*BASES[case.name], *BASES[f"{case.name} at rest"], *([damped] if case.name == "spring" else [])]
-    derived = 0
-    for base in rows:
-        k = case.instance().enter(**{**COMMON[case.name], **base})
-        if "der(tip_displacement)" in case.variables:
-            k.derive("tip_displacement", 1, 0.1)
-        outputs = [name for name in case.outputs if name in told]
-        for known in knowns:
-            for output, partial in zip(outputs, k.partials(outputs, known), strict=True):
-                assert partial == 0.0 or known in told[output], (output, known)
-                derived += partial != 0.0 and known.startswith("der(")
-        k.free()
-    assert (derived > 0) == (case.name == "spring" and case.version == "3.0")
-
-
 def test_an_impulse_changes_nothing_before_its_step(case):
     for k in (case.running(), case.instance().enter()):
         assert k.partials(case.outputs, case.impulse) == [0.0] * len(case.outputs)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from commands import printed, swept
+from commands import swept
 from runs import a_trajectory
 
 from springbeam.motion.events import Event, EventKind
@@ -78,18 +78,6 @@ def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
         assert rows["y_min"][k] == run.y.min()
         assert rows["energy_residual"][k] == run.summary["max_energy_residual"]
         assert rows["first_stop_impact"][k] == next(e.time for e in run.events if e.kind == "stop_impact")
-
-
-def test_an_accuracy_is_an_option_of_a_sweep_and_a_setting(tmp_path):
-    """Both are the accuracy of the scene: with either the same study is continued."""
-    out = str(tmp_path / "a")
-    line = ["sweep", "duffing", "--vary", "spring.mass=1,2", "--set", "time.t_end=1", "--workers", "1", "--out", out]
-    printed(*line, "--accuracy", "1e-3")
-    records = (tmp_path / "a" / "study.jsonl").read_text()
-    printed(*line, "--set", "accuracy=1e-3")
-    assert (tmp_path / "a" / "study.jsonl").read_text() == records
-    assert records.count("\n") == 3
-    assert load_scene("duffing", ["accuracy=1e-3"]).accuracy == 1e-3
 
 
 def test_a_table_and_a_picture_have_units_that_read_well():
