@@ -10,6 +10,7 @@ from scenes import kinds, soft
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam, with_changes
+from springbeam.scene.frequencies import fastest_frequency
 
 
 def linear(**tables):
@@ -105,3 +106,11 @@ def test_units_do_not_matter(metre, second):
     assert found[:19] == pytest.approx(expected[:19], rel=1e-12)
     # The static shapes lie in the span of the modes but for some 1e-6 of them: what is left has lost so many digits.
     assert found[19:] == pytest.approx(expected[19:], rel=1e-8)
+
+
+@pytest.mark.parametrize("n_modes", [4, 12, 20])
+def test_the_estimated_frequency_of_a_mode_lies_between_its_neighbours(n_modes):
+    given = beam(4.0, 9.0, n_elements=40)
+    omega = modal_beam(given).omega
+    assert fastest_frequency(given) == pytest.approx(omega[-1], rel=1e-3)
+    assert omega[n_modes - 2] < fastest_frequency(given.model_copy(update={"n_modes": n_modes})) < omega[n_modes]
