@@ -23,10 +23,11 @@ def steps_with(force, ends, tip=lambda t: -t, rate=lambda t: -1.0, once=None):
     steps["v_tip"] = [rate(t) for t in ends]
     for k, start in enumerate(ends[:-1], start=1):
         steps["size"][k] = ends[k] - start
-        for name, value in zip(
-            ("contact_force", "contact_force_rate", "contact_force_rate_2"), force(start), strict=True
-        ):
-            steps[name][k] = value
+        C, rate, bend = force(start)
+        steps["contact_force_after"][k - 1] = steps["contact_force"][k] = C
+        steps["contact_force_rate"][k] = rate
+        steps["contact_force_rate_2"][k] = bend
+        steps["contact_force_end"][k] = C + steps["size"][k] * (rate + 0.5 * steps["size"][k] * bend)
         if once is not None:
             steps["u_tip_integral"][k], steps["u_tip_integral_2"][k] = once(start, ends[k])
     for name in ("u_tip", "v_tip"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import nan
+from math import inf, nan
 
 import numpy as np
 
@@ -63,48 +63,45 @@ class _Run:
         self._pair = scene.coupled
         force = "foundation_force" if self._lower else "contact_force"
         self._gained = impulse(steps, force)
-        self._rows = steps["events"]
         self._shared = np.zeros(len(steps))  #: time of a step that contacts by a soft law overlap [s]
         if self._law is not None:
-            for first, last in between_tip_and_spring(events):
-                for row, overlap in self._edges(first, last).items():
-                    self._shared[row] += overlap
+            for each in between_tip_and_spring(events):
+                self._shared[self._rows(*each)] += self._overlap(*each)
 
     def contact(self, first: int, last: int | None) -> Contact:
-        events = self._events[first : None if last is None else last + 1]
-        begin = events[0].time
-        end = float(self._steps["time"][-1]) if last is None else events[-1].time
-        rows = slice(self._row(first), len(self._steps) if last is None else self._row(last) + 1)
+        begin, end = self._times(first, last)
         if self._law is not None:
-            velocities = *_velocities(events[0]), *((None, None) if last is None else _velocities(events[-1]))
-            return Contact(begin, end - begin, *self._soft(first, last, rows), *velocities)
+            after = (None, None) if last is None else _velocities(self._events[last])
+            return Contact(begin, end - begin, *self._soft(first, last), *_velocities(self._events[first]), *after)
+        rows = self._rows(first, last)
+        events = self._events[first : None if last is None else last + 1]
         return Contact(begin, end - begin, *self._rigid(rows, events), *self._velocities(rows, last is None))
 
-    def _row(self, event: int) -> int:
-        """Return the record that has the ``event`` of this number."""
-        return int(np.searchsorted(self._rows, event + 1))
+    def _times(self, first: int, last: int | None) -> tuple[float, float]:
+        """Return when a contact begins and ends [s]."""
+        return self._events[first].time, float(self._steps["time"][-1]) if last is None else self._events[last].time
+
+    def _rows(self, first: int, last: int | None) -> slice:
+        """Return the records of a contact, from that of its first event to that of its last one."""
+        begin, end = np.searchsorted(self._steps["events"], [first + 1, inf if last is None else last + 1])
+        return slice(int(begin), int(end) + (last is not None))
 
     # -- soft ----------------------------------------------------------------------------------------------------------
 
-    def _edges(self, first: int, last: int | None) -> dict[int, float]:
-        """Return the records of the steps in which a contact begins and ends, and how long they are in it [s]."""
-        time = self._steps["time"]
-        begin = self._events[first].time
-        end = float(time[-1]) if last is None else self._events[last].time
-        overlaps = {}
-        for row in {self._row(first), len(time) - 1 if last is None else self._row(last)}:
-            start = float(time[row] - self._steps["size"][row])
-            overlaps[row] = max(min(end, float(time[row])) - max(begin, start), 0.0)
-        return overlaps
+    def _overlap(self, first: int, last: int | None) -> np.ndarray:
+        """Return how long the step of each record of a contact is in it [s]."""
+        begin, end = self._times(first, last)
+        steps = self._steps[self._rows(first, last)]
+        since = np.maximum(begin, steps["time"] - steps["size"])
+        return np.maximum(np.minimum(end, steps["time"]) - since, 0.0)
 
-    def _soft(self, first: int, last: int | None, rows: slice) -> tuple[float, float, float, float, float]:
+    def _soft(self, first: int, last: int | None) -> tuple[float, float, float, float, float]:
         """Return impulse, peak force and its time, depth and loss; contacts share a step by their times in it."""
         assert self._law is not None
+        rows = self._rows(first, last)
         steps = self._steps[max(rows.start - 1, 0) : rows.stop]
-        weights = np.ones(rows.stop - rows.start)
-        for row, overlap in self._edges(first, last).items():
-            if self._shared[row] > 0.0:
-                weights[row - rows.start] = overlap / self._shared[row]
+        shared = self._shared[rows]
+        weights = np.divide(self._overlap(first, last), shared, out=np.ones_like(shared), where=shared > 0.0)
         lost = np.diff(self._steps["law_dissipated"][rows], prepend=steps["law_dissipated"][0])
         deepest = -inside(False, steps, "gap").extremes["gap"].lowest
         return (

@@ -1,4 +1,8 @@
-"""The largest mean of the contact force of a run over windows of a length: the peak force of a rigid contact."""
+"""The largest mean of the contact force of a run over windows of a length: the peak force of a rigid contact.
+
+Over a step the force is the parabola through what it is at both rows with the step's impulse: the polynomial applied
+also turns a mismatch of velocities round, and a window may hold a part of that.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,10 @@ from typing import Literal
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
-from ..motion.curves import EPS
+from ..motion.curves import EPS, Curve
 from ..motion.events import Event
 from .contact_times import kicks
-from .records import FORCE_COLUMNS, impulse
+from .records import impulse
 
 #: Impulses that differ by less than this share of the total are equal: well above rounding.
 _ALIKE = 1e-13
@@ -29,12 +33,15 @@ def peak_force(steps: np.ndarray, events: Iterable[Event], window: float) -> tup
     that makes the mean larger.
     """
     rows = steps["time"]
+    size = np.where(steps["size"] > 0.0, steps["size"], 1.0)[1:]
+    ends = steps["contact_force_end"][1:], None, impulse(steps)[1:], None
+    c, slope, bend = Curve.parabola([steps["contact_force_after"][:-1]], ends, size).powers
     # The impulse up to each row, including impacts there, and the powers of the time since then up to the next row;
     # before the run and after it there is no force.
     begins = np.append(rows[0] - 2.0 * window, rows)
     passed = np.zeros((4, len(begins)))
     passed[0, 1:] = np.cumsum(gained(steps, events))
-    passed[1:, 1:-1] = [steps[name][1:] / power for name, power in zip(FORCE_COLUMNS, (1.0, 2.0, 6.0), strict=True)]
+    passed[1:, 1:-1] = c, slope / size / 2.0, bend / size**2 / 3.0
 
     def upto(times: np.ndarray, side: Literal["left", "right"], *orders: int) -> np.ndarray:
         """Return derivatives of ∫ C dt before the impulses of ``times`` [s] (left) or after them (right)."""

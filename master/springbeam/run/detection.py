@@ -29,6 +29,7 @@ class Position:
     """A guard that is a function of the positions of both ends."""
 
     curve = Curve.quintic
+    stays = staticmethod(no_dip)
     trials = 8  #: steps to the bottom of a dip, at most
 
     def __init__(self, kind: EventKind, function: EventFunction, detector: Detector) -> None:
@@ -43,15 +44,10 @@ class Position:
         return value <= soon and rate < -self._detector.rest(state, start)
 
     def start(self, state: State, step: Step) -> Sample:
-        value, rate, _, _ = self._function(step.start, 0.0)
-        return value, rate, 0.0, 0.0
+        return self._function(step.start, 0.0)
 
     def end(self, state: State, step: Step) -> Sample:
         return self._function(step.end, step.size)
-
-    def stays(self, start: Sample, end: Sample, size: float, fastest: float) -> bool:
-        """Return whether the guard stays positive over a step at sight."""
-        return no_dip(start, end, size, fastest)
 
     def floor(self, state: State, ends: Ends, start: Sample) -> float:
         """Return below which value there is an event.
@@ -104,7 +100,7 @@ class Push:
         return value, -scale / step.size, self._pair.impulse_of(self._force, state.phase, step), 0.0
 
     def stays(self, start: Sample, end: Sample, size: float, fastest: float) -> bool:
-        """See `Position.stays`; the Bézier points of the parabola enclose it."""
+        """Return whether the guard stays positive over a step: the Bézier points of the parabola enclose it."""
         return min(start[0], end[0], 3.0 * end[2] / size - start[0] - end[0]) >= 0.0
 
     def floor(self, state: State, ends: Ends, start: Sample) -> float:
@@ -170,7 +166,10 @@ class Detector:
 
     def at_start(self, state: State, start: Ends) -> EventKind | None:
         """The event that is due before any step."""
-        return next((guard.kind for guard in self.guards(state.phase) if guard.due(state, start)), None)
+        for guard in self.guards(state.phase):
+            if guard.due(state, start):
+                return guard.kind
+        return None
 
     def first_event(self, state: State, step: Step) -> tuple[Step, EventKind | None]:
         """The step, cut to its first event, and the kind of that; ``None`` if nothing happens in it.
@@ -210,7 +209,7 @@ class Detector:
             # Ends that have just parted may close a little first, by the error of the time at which they were released.
             return whole_step
         trials = guard.trials - (whole_step is not None)
-        stretches = [((0.0, start), (step.size, end))]
+        stretches = [((0.0, (*start[:2], 0.0, 0.0)), (step.size, end))]
         while stretches and trials:
             (begin, before), (until, after) = stretches.pop()  # the earliest
             size = until - begin
