@@ -17,12 +17,12 @@ Dynamics, with u = tip·x, y = top·x and p = f(t) − ω² x − c ẋ − k2 (
 from __future__ import annotations
 
 from functools import cache
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..scene import Beam, Scene, Spring, Stop
-from .laws import EndsMotion, ReferencePhase, law_of
+from .laws import EndsMotion, ReferencePhase, Unit, law_of
 from .semi_discrete import ModalBeam, ModalLoads, modal_beam, points
 
 #: What rounding leaves of a sum that is exactly zero, as a share of its terms.
@@ -215,7 +215,7 @@ class HybridSystem:
             "e_load": p.linear_stiffness * p.unloaded * y - x @ self.load - X[..., self.W] - 2.0 * self._hidden,
         }
 
-    def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
+    def noise(self, unit: Unit, X: np.ndarray) -> float:
         """Return what rounding leaves of a displacement, velocity or contact force that is exactly zero.
 
         A place also has the rounding of the time of an event.
@@ -287,7 +287,7 @@ class QuasiStaticSystem(HybridSystem):
             X[..., self.n] = (self._rest - X[..., 0]) / self.alpha_b
         return X
 
-    def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
+    def noise(self, unit: Unit, X: np.ndarray) -> float:
         """Return the noise of any pair; what the rounding of an event's time makes of a place changes the force."""
         of_pair = super().noise(unit, X)
         if unit != "N":

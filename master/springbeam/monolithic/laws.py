@@ -18,6 +18,7 @@ import numpy as np
 from ..scene import Scene, SceneError
 
 ContactState = Literal["free", "touch", "slack", "tied"]
+Unit = Literal["m", "m/s", "N"]
 
 
 class ReferencePhase(NamedTuple):
@@ -50,7 +51,7 @@ class Watch(NamedTuple):
 
     name: str  #: of what happens where it becomes negative
     function: Callable[[EndsMotion], np.ndarray]
-    unit: Literal["m", "m/s", "N"]  #: of its values; it determines the rounding of a zero
+    unit: Unit  #: of its values; it determines the rounding of a zero
     level: float | None = None  #: where the spring's top is when it happens [m]
 
 
@@ -95,8 +96,8 @@ class Law:
         return np.zeros_like(p)
 
     def inside(self, C: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return the part of C that is normal compliance [N], at tip deflections u [m]."""
-        return C
+        """Return the part of C that is normal compliance [N], at tip deflections u [m]; 0 of a rigid law."""
+        return np.zeros_like(C) if self.rigid else C
 
     def watched(self, phase: ReferencePhase) -> list[Watch]:
         """Return what ends a phase, but for the foundation; nothing ends one that the ends are joined in for good."""
@@ -145,10 +146,6 @@ class Unilateral(Law):
 
     rigid = True
 
-    def inside(self, C: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return zeros: nothing is compliant."""
-        return np.zeros_like(C)
-
     def watched(self, phase: ReferencePhase) -> list[Watch]:
         return [Watch("separate", lambda m: m.C, "N")] if phase.contact == "touch" else super().watched(phase)
 
@@ -158,10 +155,6 @@ class Tie(Law):
 
     rigid = True
     start = "tied"
-
-    def inside(self, C: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return zeros: nothing is compliant."""
-        return np.zeros_like(C)
 
     def after(self, happened: str, together: EndsMotion, noise: float) -> tuple[ContactState, str | None]:
         return "tied", "impact"
@@ -188,6 +181,8 @@ class _Pressing(Law):
     Where its `force` would be negative the contact is `slack`, until it would be positive again or p = 0.
     """
 
+    unit: Unit  #: of `pushing`
+
     def _elastic(self, p: np.ndarray) -> np.ndarray:
         """Return F [N]."""
         return self.stiffness * np.maximum(p, 0.0) ** self.exponent
@@ -199,36 +194,41 @@ class _Pressing(Law):
         elastic = self._elastic(p)
         return ((0.0 if contact == "slack" else self.force(p, rate)) - elastic) * rate
 
-
-class Compliance(_Pressing):
-    """Normal compliance with a moving obstacle, C = F (1 + χ ṗ) with F = λ_nc p₊^q (Hunt & Crossley 1975)."""
-
-    def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        return self._elastic(p) * (1.0 + self.damping * rate)
+    def pushing(self, m: EndsMotion) -> np.ndarray:
+        """Return what is negative where `force` would be, in ``unit``."""
+        raise NotImplementedError
 
     def watched(self, phase: ReferencePhase) -> list[Watch]:
         watched = super().watched(phase)
         if self.damping == 0.0 or phase.contact == "free":
             return watched
-        fastest = 1.0 / self.damping
         if phase.contact == "slack":
-            return [*watched, Watch("press", lambda m: m.v - m.z - fastest, "m/s")]
-        return [*watched, Watch("slacken", lambda m: m.z - m.v + fastest, "m/s")]
+            return [*watched, Watch("press", lambda m: -self.pushing(m), self.unit)]
+        return [*watched, Watch("slacken", self.pushing, self.unit)]
+
+
+class Compliance(_Pressing):
+    """Normal compliance with a moving obstacle, C = F (1 + χ ṗ) with F = λ_nc p₊^q (Hunt & Crossley 1975)."""
+
+    unit = "m/s"
+
+    def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        return self._elastic(p) * (1.0 + self.damping * rate)
+
+    def pushing(self, m: EndsMotion) -> np.ndarray:
+        return m.z - m.v + 1.0 / self.damping
 
 
 class KelvinVoigt(_Pressing):
     """A unilateral spring and damper, C = F + c ṗ with F = λ p^q."""
 
+    unit = "N"
+
     def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
         return self._elastic(p) + self.damping * rate
 
-    def watched(self, phase: ReferencePhase) -> list[Watch]:
-        watched = super().watched(phase)
-        if self.damping == 0.0 or phase.contact == "free":
-            return watched
-        if phase.contact == "slack":
-            return [*watched, Watch("press", lambda m: -self.force(m.y - m.u, m.z - m.v), "N")]
-        return [*watched, Watch("slacken", lambda m: self.force(m.y - m.u, m.z - m.v), "N")]
+    def pushing(self, m: EndsMotion) -> np.ndarray:
+        return self.force(m.y - m.u, m.z - m.v)
 
 
 #: By their names in a scene.

@@ -354,11 +354,9 @@ class ModalLoads:
                 self.patterns[i] = beam.basis.T @ assemble(scene.beam).nodal(*unit_forces(scene.beam, load))
             if load.on in ("spring", "base"):
                 self.on_spring[i] = 1.0 if load.on == "spring" else -mass
-        breaks = [load.edges for load in scene.loads]
-        self.kinks = sorted({float(time) for times in breaks for time in times})
-        waves = [load.wave[0] for load in scene.loads if load.wave is not None]
-        fastest = max([*waves, *(load.rate for load in scene.loads)], default=0.0)
-        self.longest_step = _TURN / fastest if fastest > 0.0 else np.inf
+        self.kinks = sorted({time for load in scene.loads for time in load.edges})
+        rates = [load.rate if load.wave is None else load.wave[0] for load in scene.loads]
+        self.longest_step = min((_TURN / rate for rate in rates if rate > 0.0), default=np.inf)
         self._until = np.inf
 
     def __len__(self) -> int:

@@ -280,7 +280,7 @@ def near_levels(scene: Scene, moving: Sequence[np.ndarray]) -> dict[str, float]:
         heights["Ψ"] = scene.spring.equilibrium
     if scene.stop is not None:
         heights["φ"] = scene.stop.position
-    low = min(float(np.min(part)) for part in moving)
-    high = max(float(np.max(part)) for part in moving)
+    low = min(map(np.min, moving))
+    high = max(map(np.max, moving))
     reach = 1.5 * (high - low)
     return {symbol: height for symbol, height in heights.items() if low - reach <= height <= high + reach}

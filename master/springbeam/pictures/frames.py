@@ -118,8 +118,8 @@ def _contact_heights(trajectory: Trajectory, frames: Frames) -> tuple[float, flo
     heights = [trajectory[name][touching] for name in present(trajectory, POSITIONS)]
     if len(heights) < 2 or not touching.any():
         return None
-    low = min(float(part.min()) for part in heights)
-    high = max(float(part.max()) for part in heights)
+    low = float(np.min(heights))
+    high = float(np.max(heights))
     room = _ROOM_AROUND * (high - low)
     return (low - room, high + room) if 0.0 < high - low < _SMALL * (frames.high - frames.low) else None
 
@@ -174,7 +174,7 @@ def frames_of(trajectory: Trajectory) -> Frames | None:
         return None
     some = np.arange(len(known))
     if len(known) > MOST_FRAMES:
-        some = np.array(sorted({*np.searchsorted(known, np.linspace(known[0], known[-1], MOST_FRAMES)).tolist()}))
+        some = np.unique(np.searchsorted(known, np.linspace(known[0], known[-1], MOST_FRAMES)))
     time = time[some]
     deflection = None if deflection is None else deflection[some]
     row = np.searchsorted(rows, time, side="right") - 1

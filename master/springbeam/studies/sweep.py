@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..scene import ArgumentError, Load, Scene
+from ..scene import ArgumentError, Scene
 from ..scene.messages import unit_of
 from .design import Axis, Sampling, design, parse_axis, with_keys
 from .metrics import METRICS, PRINCIPAL, USUAL, Metric, metrics_of
@@ -111,11 +111,9 @@ class Sweep(Study):
         if name not in {axis.name for axis in self.axes}:
             return METRICS[name].unit if name in METRICS else ""
         table, _, key = name.rpartition(".")
-        return self._load(table).unit if key == "amplitude" else unit_of(table, key)
-
-    def _load(self, table: str) -> Load:
-        """Return a load by its table, as loads.0."""
-        return self.scene.loads[int(table.partition(".")[2])]
+        if key != "amplitude":
+            return unit_of(table, key)
+        return self.scene.loads[int(table.partition(".")[2])].unit
 
 
 def _varies(values: np.ndarray) -> bool:

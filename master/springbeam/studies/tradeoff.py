@@ -91,21 +91,16 @@ class Tradeoff(Study):
         return {_label(case): case for cases in families.values() for case in cases[:: 3 if self.quick else 1]}
 
     def measure(self, known: Mapping[str, Row]) -> Measure:
-        """Return what measures a case, unless those before it make that needless."""
+        """Return what measures a case, or leaves it out if a coarser one of its family was too slow."""
+        limit = 0.1 * _LIMIT if self.quick else _LIMIT
 
         def measure(case: Row) -> Row:
-            skipped = self.skipped(case, known)
-            return self.record(case) if skipped is None else skipped
+            for name, record in known.items():
+                if name.rpartition(", ")[0] == case["family"] and record.get("cost_wall_time", 0.0) > limit:
+                    return {"status": "skipped", "error": f"{name} took more than {limit:g} s"}
+            return self.record(case)
 
         return measure
-
-    def skipped(self, case: Row, records: Mapping[str, Row]) -> Row | None:
-        """Leave out what a coarser one of the family was too slow for."""
-        limit = 0.1 * _LIMIT if self.quick else _LIMIT
-        for name, record in records.items():
-            if name.rpartition(", ")[0] == case["family"] and record.get("cost_wall_time", 0.0) > limit:
-                return {"status": "skipped", "error": f"{name} took more than {limit:g} s"}
-        return None
 
     def record(self, case: Row) -> Row:
         """Run, time and judge a configuration: ``cost_wall_time`` [s] is the median of ``times``, without set-up."""
