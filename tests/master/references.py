@@ -5,6 +5,7 @@ from scipy.integrate import solve_ivp
 
 from springbeam.monolithic.event_driven import integrate
 from springbeam.monolithic.exponential import ExponentialPropagator
+from springbeam.scene import with_changes
 
 
 def integrated_anew(scene, patch, t_end):
@@ -23,7 +24,7 @@ def integrated_anew(scene, patch, t_end):
         return segment
 
     patch.setattr(ExponentialPropagator, "_step", noted)
-    run = integrate(scene, sample_times=np.linspace(0.0, t_end, 31), t_end=t_end)
+    run = integrate(with_changes(scene, time={"t_end": t_end}), sample_times=np.linspace(0.0, t_end, 31))
     for propagator, segment in (one for some in kept.values() for one in some):
         s = propagator.form.system
         phase = propagator.form.phase

@@ -27,7 +27,7 @@ EXTENDED_PRECISION = [(0.07122400935981067, 0.298683962257942), (0.1443694562034
 
 def test_soft_agrees_with_extended_precision():
     """The lowest frequencies carry ε·ω_max/ω_min of their own size."""
-    result = event_driven.integrate(soft(50), sample_times=[0.0, 0.05, 0.15], t_end=0.15)
+    result = event_driven.integrate(soft(50, time={"t_end": 0.15}), sample_times=[0.0, 0.05, 0.15])
     assert kinds(result) == ["impact", "stop_impact", "release"]
     assert (result.events[0].z, result.y[1]) == pytest.approx((-0.0057403607, -0.0087444212), abs=5e-11)
     for event, (time, velocity) in zip(result.events[1:], EXTENDED_PRECISION, strict=True):
@@ -53,7 +53,7 @@ def test_the_reference_of_a_bar_on_a_stop_approaches_the_exact_impact(monkeypatc
 
 def test_a_damped_contact_lets_go_where_its_ends_part_fast_and_never_pulls():
     contact = {"law": "compliance", "stiffness": 1e3, "exponent": 1.5, "damping": 5.0}
-    run = event_driven.integrate(linear(contact=contact, stop=None), t_end=0.4)
+    run = event_driven.integrate(linear(contact=contact, stop=None, time={"t_end": 0.4}))
     slack = (run.phase == "touch") & (run.contact_force == 0.0) & (run.y > run.u_tip)
     assert 30 < np.sum(slack) < 50
     assert np.min(run.contact_force) > -1e-14

@@ -61,7 +61,6 @@ def integrate(
     *,
     sample_times: Sequence[float] | np.ndarray | None = None,
     velocity_perturbation: float = 0.0,
-    t_end: float | None = None,
     time_limit: float | None = None,
 ) -> Trajectory:
     """Run a scene by events.
@@ -78,8 +77,6 @@ def integrate(
         initial velocity [m/s] without a beam that has inertia: two runs that differ by it show how long a trajectory
         can be compared at all. All modes in proportion would move no event of a motion without a scale, as that of a
         beam on a stop at its rest.
-    t_end
-        Ends the run earlier than the scene does [s].
     time_limit
         Processor time after which it is given up [s]; what else runs on the machine does not count.
 
@@ -98,9 +95,7 @@ def integrate(
         If no row lies in the run.
     """
     equations = scene if isinstance(scene, Equations) else Equations(scene)
-    last = equations.scene.time.t_end
-    end = last if t_end is None else min(t_end, last)
-    return _Run(equations, velocity_perturbation, end, sample_times, time_limit).execute()
+    return _Run(equations, velocity_perturbation, sample_times, time_limit).execute()
 
 
 def refuse(scene: Scene) -> None:
@@ -113,19 +108,18 @@ def refuse(scene: Scene) -> None:
 
 
 class _Run:
-    """A run to ``t_end`` [s]; see `integrate`."""
+    """A run; see `integrate`."""
 
     def __init__(
         self,
         equations: Equations,
         velocity_perturbation: float,
-        t_end: float,
         sample_times: Sequence[float] | np.ndarray | None,
         time_limit: float | None,
     ) -> None:
         self._form = equations.form
         self.system = equations.system
-        self.t_end = t_end
+        self.t_end = equations.scene.time.t_end
         self.state = HybridState(self.system, *initial(self.system, velocity_perturbation))
         self.rows = Rows(self.state)
         self._every_event = sample_times is None

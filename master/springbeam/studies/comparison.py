@@ -263,10 +263,8 @@ def comparable_until(scene: Scene) -> float:
 
 def macro_points(scene: Scene) -> np.ndarray:
     """Return the times of the macro grid of ``scene`` [s]."""
-    start = scene.contact_time or 0.0
-    H = scene.coupling.H
-    end = scene.time.t_end
-    return np.minimum(start + H * np.arange(np.floor((end - start) / H * (1.0 + 1e-9)) + 1.0), end)
+    whole, _ = scene.equal_steps
+    return np.minimum((scene.contact_time or 0.0) + scene.coupling.H * np.arange(whole + 1), scene.time.t_end)
 
 
 def away_from(times: np.ndarray, events: Iterable[float], size: float) -> np.ndarray:
