@@ -109,7 +109,11 @@ void HeldContact::choose(double free, const Top& top) {
     if (!std::isfinite(top(now_.force))) top(now_.force = law.force);
   }
   now_.next = free + response_ * now_.force;
-  if (!std::isfinite(now_.next + law_.energy(now_.depth))) now_.force = infinite;
+  if (std::isfinite(now_.next + now_.depth + law_.energy(now_.depth))) return;
+  const double tip = now_.tip;
+  now_ = {};  // finite, as what is saved must be
+  now_.held = now_.none = 1.0;
+  now_.tip = tip;
 }
 
 /// With what is owed, [Φ⁺ − Φ − owed]/(δ⁺ − δ): of both forces after which nothing is, that on the law's side; where

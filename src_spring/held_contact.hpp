@@ -13,6 +13,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 
 #include "compliance.hpp"
 
@@ -50,7 +51,7 @@ class HeldContact {
   bool first_force_missed(const TipMessage& arrived) const;
 
   /// C over the next step [N]; not finite if none was found, or where the tip goes leaves the range of numbers.
-  double force() const { return now_.force; }
+  double force() const { return now_.none != 0.0 ? std::numeric_limits<double>::infinity() : now_.force; }
   double elastic(double y) const { return law_.elastic(y - now_.tip); }  ///< Φ' [N]
   /// What the contact's force has stored [J]: Φ, and what it owes.
   double energy(double y) const { return law_.energy(y - now_.tip) + now_.debt; }
@@ -64,6 +65,7 @@ class HeldContact {
   /// The whole state: all that a step changes, in doubles.
   struct State {
     double held = 0.0;                   ///< 1 from the first message on
+    double none = 0.0;                   ///< 1: no force was found, and nothing else but `tip` is known
     double size = 0.0;                   ///< H, of the step that is expected [s]
     double tip = 0.0, next = 0.0;        ///< u_tip now and after the coming step [m]
     double known = 0.0, foreseen = 0.0;  ///< 1 where these are exact, of `next` if the step has the size H

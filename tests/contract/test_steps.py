@@ -236,6 +236,16 @@ def test_a_state_is_refused_whose_numbers_no_instance_has(case):
     assert k.outputs() == before
 
 
+def test_a_state_in_which_no_contact_force_was_found_is_a_state(spring):
+    """Its force was infinite, as what no instance has."""
+    k, other = (spring.running(contact_law=2, tip_response=1e-4) for _ in range(2))
+    k.set("tip_displacement", -1e300)
+    other.restore(other.deserialized(k.serialized()))
+    for one in (k, other):
+        assert one.status(one.get, "reaction") == ERROR
+        assert "'reaction' = inf is not finite" in one.message
+
+
 def test_whether_a_top_rests_on_its_foundation_follows_its_inputs(spring):
     """1 kg under 9.81 N, held by the foundation; 20 N lift it, with 10.19 m/s², as soon as they are set."""
     values = {"mass": 1.0, "linear_stiffness": 0.0, "gravity": 9.81, "stop_enabled": True, "stop_position": 0.0}

@@ -376,10 +376,12 @@ TEST(HeldContact, AForceOutOfRangeIsNoForce) {
   c.contact.begin({-1e300, 0.0, 0.0, 1e-6, 0.0}, c.H, 0.0, c.predict());
   EXPECT_FALSE(std::isfinite(c.contact.force()));
   const auto state = c.contact.state();
+  for (const double number : numbers(state)) EXPECT_TRUE(std::isfinite(number));  // what is saved is finite
   c.contact.begin(c.seen, c.H, 0.0, c.predict());
   EXPECT_NEAR(c.contact.force(), force, 1e-12 * force);
   c.contact.restore(state);
   EXPECT_EQ(numbers(c.contact.state()), numbers(state));
+  EXPECT_FALSE(std::isfinite(c.contact.force()));
 }
 
 TEST(HeldContact, ATipThatLeavesTheRangeIsNoForce) {
