@@ -37,9 +37,6 @@ _Rule = Sequence[tuple[float, float]]
 _STEADY = 0.9
 #: p̃ keeps away from zero if the least of its Bézier points is above this share of the largest.
 _OFF_ZERO = 0.3
-#: Change of a number of the penetration that shows a slope of the force, over the largest; and where all are 0 [m].
-_DIFFERENCE = 2.0**-26
-_LEAST = 1e-150
 #: Relative change of p over a step up to which the quotient ΔΦ/Δp would lose more than two digits.
 _SMALL_CHANGE = 0.01
 
@@ -76,6 +73,10 @@ class Projection:
         self._damped = law.damped
         self._few = _FEW[degree]
         self._is_quotient = degree == 0 and not law.damped
+        units = np.eye(degree + 1).tolist()
+        #: ∂p̃/∂x_j, and the Legendre coefficients of its projection, by rows.
+        self._by_x = [_path(0.0, unit) for unit in units]
+        self._by_x_projected = transposed(penetration_series(0.0, unit)[: degree + 1] for unit in units)
 
     def force(self, start: float, size: float, x: Vector) -> Vector:
         """Return the Legendre coefficients of C [N] over a step of ``size`` [s].
@@ -118,16 +119,32 @@ class Projection:
         return a[: self.degree + 1]
 
     def slope(self, start: float, size: float, x: Vector, a: Vector) -> Matrix:
-        """Return ∂a/∂x [N/m] of `force`, which is ``a``, by differences."""
-        delta = _DIFFERENCE * max(map(abs, (start, *x))) or _LEAST
-        columns = []
-        for j in range(len(x)):
-            moved = x.copy()
-            moved[j] += delta
-            columns.append(
-                [(after - before) / delta for after, before in zip(self.force(start, size, moved), a, strict=True)]
-            )
-        return transposed(columns)
+        """Return ∂a/∂x [N/m] of `force`, which is ``a``; where p keeps its size, with F′ of its mean."""
+        law = self.law
+        if self._is_quotient and _changes(start, x[0]):
+            return [[(law.force(x[0]) - a[0]) / (x[0] - start)]]
+        mean = x[1] if self.degree else (start + 2.0 * x[0]) / 3.0  # at degree 0, weighted by ∂p̃/∂x
+        steady = not law.one_sided or min(start, x[0], mean) > _STEADY * max(start, x[0], mean)
+        if steady and not self._damped:
+            of_mean = law.slope(mean)
+            return [[of_mean * value for value in row] for row in self._by_x_projected]
+        path = _path(start, x)
+        rule = self._quadrature(path, start, x[0], size)
+        rows = [[0.0] * len(x) for _ in x]
+        for s, weight in rule:
+            p, rate = _at(path, s, size)
+            by_p = law.slope(p)
+            by_rate = 0.0
+            if self._damped:
+                _, of_resistance, by_rate = law.resistance(p, rate)
+                by_p += of_resistance
+            legendre = (0.5, 1.5 * s, 3.75 * s * s - 1.25)  # (2k + 1)/2 P_k(s)
+            for j, change in enumerate(self._by_x):
+                of_p, of_rate = _at(change, s, size)
+                moved = weight * (by_p * of_p + by_rate * of_rate)
+                for row, factor in zip(rows, legendre, strict=False):
+                    row[j] += factor * moved
+        return rows
 
     def dissipated(self, start: float, size: float, x: Vector) -> float:
         """Return ∫ D ṗ dτ ≥ 0 [J] over a step of ``size`` [s]."""
@@ -198,6 +215,12 @@ class Projection:
 def _changes(start: float, end: float) -> bool:
     """Whether p changes by so much that ΔΦ/Δp loses few digits to cancellation."""
     return abs(end - start) > _SMALL_CHANGE * max(abs(start), abs(end))
+
+
+def penetration_series(start: float, x: Vector) -> Vector:
+    """Return the Legendre coefficients of p̃ [m], d + 2 of them."""
+    b0, b1, b2, b3 = _path(start, x)
+    return [b0 + b2 / 3.0, b1 + 0.6 * b3, b2 / 1.5, 0.4 * b3][: len(x) + 1]
 
 
 def _path(start: float, x: Vector) -> _Path:
