@@ -6,7 +6,7 @@ state after the event of the row before, the end of the step and its two moments
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from itertools import chain
 from math import nan
 from operator import itemgetter
@@ -157,8 +157,3 @@ def impulse(steps: np.ndarray, name: str = "contact_force") -> np.ndarray:
     turned = steps["v_tip"] - steps["z"] - before["v_tip_after"] + before["z_after"]
     acts = (name == "contact_force") | seated(before)
     return np.asarray(size * (c + size * (dc / 2.0 + size * ddc / 6.0)) - acts * steps["reduced_mass"] * turned)
-
-
-def force(steps: Records | Mapping[str, np.ndarray], tau: np.ndarray, name: str = "contact_force") -> np.ndarray:
-    """Return C [N] of each step ``tau`` [s] after its start, or the force N of the foundation."""
-    return np.asarray(steps[name] + tau * (steps[f"{name}_rate"] + 0.5 * tau * steps[f"{name}_rate_2"]))
