@@ -61,9 +61,10 @@ def at(run: Trajectory, times: Any) -> Trajectory:
     """Return ``run`` at ``times`` [s], in any order, shape (n,): columns and shapes there, events and summary.
 
     Between rows y and u_tip follow the quintic that has the step's ends and moments, the contact force the polynomial
-    applied without what turns a mismatch of velocities round, energies are linear; shapes, moments and shear forces along the beam are linear
-    between those of the run, some 400, and less accurate; before the first shape and after the last one the beam has
-    these. Raises ValueError for times outside of those that are known, and for a run that has no steps.
+    applied without what turns a mismatch of velocities round, energies are linear; shapes, moments and shear forces
+    along the beam are linear between those of the run, some 400, and less accurate; before the first shape and after
+    the last one the beam has these. Raises ValueError for times outside of those that are known, and for a run that
+    has no steps.
     """
     rows = rows_at(run, times)
     table = run.shape_table
