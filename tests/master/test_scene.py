@@ -119,9 +119,7 @@ def test_other_ways_to_give_a_beam_mean_the_same(given, follows):
     kept = scene.model_dump(exclude_none=True)["beam"]
     assert given.items() <= kept.items()
     assert not kept.keys() & without.keys()
-    assert kept["n_elements"] == 50  # defaults are in it
     assert with_changes(scene, title="again").beam == scene.beam
-    assert with_changes(scene, beam={"shear_coefficient": 0.7}).beam.shear_coefficient == 0.7
     back = with_changes(scene, beam={**follows, **{k: 1.0 for k in without if k not in follows}})
     assert back.beam.model_dump(exclude_none=True).keys().isdisjoint(given)
 

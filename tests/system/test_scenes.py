@@ -15,31 +15,37 @@ from springbeam.studies.metrics import METRICS
 CASES = scenes.TABLE["cases"]
 
 
+#: What of events is compared within bounds.
+OF_EVENTS = {"times": ("time",), "velocities": ("z", "v_tip"), "losses": ("energy_loss",)}
+
+
 def beside_reference(scene, bounds, _):
     """Compare events, motion and energy with those of the event-driven reference."""
     run = simulate(scene)
     rows = np.searchsorted(run.time, np.unique(run.time)[:: len(run) // 100 + 1], side="right") - 1
+    rows = rows[run.time[rows] <= bounds.get("until", np.inf)]
     exact = reference(scene, sample_times=run.time[rows])
     starts = bounds.get("starts", [])
-    for found in (scenes.kinds(run), scenes.kinds(exact)):
-        assert found[: len(starts)] == starts
-        if "kinds" in bounds:
-            assert [kind for kind in found if kind != "stop_impact"] == bounds["kinds"]
-    first = bounds.get("first") if "times" in bounds else 0
-    for ours, theirs in zip(run.events[:first], exact.events[:first], strict=True):
-        assert (ours.kind, ours.time) == (theirs.kind, pytest.approx(theirs.time, abs=bounds["times"]))
-        if "velocities" in bounds:
-            assert (ours.z, ours.v_tip) == pytest.approx((theirs.z, theirs.v_tip), abs=bounds["velocities"])
-        assert ours.energy_loss == pytest.approx(theirs.energy_loss, abs=bounds.get("losses", np.inf))
+    found, right = (scenes.kinds(each) for each in (run, exact))
+    first = bounds.get("first") if "times" in bounds else len(starts)
+    assert found[:first] == right[:first]
+    assert found[: len(starts)] == starts
+    if "kinds" in bounds:
+        assert [kind for kind in found if kind != "stop_impact"] == bounds["kinds"]
+    for bound, names in OF_EVENTS.items():
+        if bound in bounds:
+            ours, theirs = (
+                [[getattr(event, name) for name in names] for event in of.events[:first]] for of in (run, exact)
+            )
+            np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=bounds[bound])
     if "contacts" in bounds:
-        changes = [contact_changes(trajectory, 1e-3) for trajectory in (run, exact)]
-        kinds = [[change.kind for change in found] for found in changes]
-        times = [[change.time for change in found] for found in changes]
-        assert (kinds[0], times[0]) == (kinds[1], pytest.approx(times[1], abs=bounds["contacts"]))
+        ours, theirs = (contact_changes(each, 1e-3) for each in (run, exact))
+        assert [change.kind for change in ours] == [change.kind for change in theirs]
+        times = [change.time for change in theirs]
+        assert [change.time for change in ours] == pytest.approx(times, abs=bounds["contacts"])
         assert run.e_impact_loss[-1] == pytest.approx(exact.e_impact_loss[-1], abs=bounds["lost"])
         for name in ("e_beam", "e_load"):  # also what no place of the tip says
             assert run[name][0] == pytest.approx(exact[name][0], rel=1e-12, abs=1e-15)
-    rows = rows[run.time[rows] <= bounds.get("until", np.inf)]
     for column in {"u_tip", "y"} & set(run.columns):
         there = exact[column][np.searchsorted(exact.time, run.time[rows])]
         scale = min(np.ptp(exact[column]), np.abs(exact[column]).max())
