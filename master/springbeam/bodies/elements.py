@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..scene import Load
-from .force import combined, value, work_on
+from .force import combined, quadrature, value, work_on
 from .protocol import NO_FORCE, SIZES_REMEMBERED, Body, Energies, Force, Motion
 
 #: Points of the quadrature of a height over a step, and one more for each radian that it turns.
@@ -248,19 +248,16 @@ class MovingWall(Prescribed):
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         before, _, _, received = self.state
         until = time + size
-        inside = {edge for load in self._loads for edge in load.edges if time < edge < until}
-        edges = np.array([time, *sorted(inside), until])
-        half = 0.5 * np.diff(edges)[:, None]
+        inside = sorted({edge for load in self._loads for edge in load.edges if time < edge < until})
         turns = max((load.rate for load in self._loads), default=0.0) * size
-        nodes, weights = np.polynomial.legendre.leggauss(_WALL_POINTS + int(turns))
-        times = edges[:-1, None] + half * (nodes + 1.0)
-        weighted = half * weights * self._height(times)
+        s, weights = quadrature(time, size, inside, _WALL_POINTS + int(turns))
+        weighted = 0.5 * size * weights * self._height(time + 0.5 * size * (s + 1.0))
         left = until - _BEFORE * size  # at a kink, the speed before it
         end = Motion(
             float(self._height(left) + _BEFORE * size * self._speed(left)),
             float(self._speed(left)),
             float(weighted.sum()),
-            float((weighted * (until - times)).sum()),
+            float((0.5 * size * (1.0 - s) * weighted).sum()),
         )
         received += work_on(combined([self._sign, 1.0], [contact, foundation]), before, end, size)
         self.state = WallState(end, until, size, received)

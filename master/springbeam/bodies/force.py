@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from operator import mul
 
+import numpy as np
 from numpy.polynomial import Legendre
 
 from .protocol import Force, Motion
@@ -74,3 +76,17 @@ def free_mass_response(degree: int, size: float, mass: float) -> list[Motion]:
     """Return the motion of a free mass [kg] from rest under −P_k, k = 0 … degree: any spring's if H is small."""
     scales = [-(size**n) / mass for n in (2, 1, 3, 4)]
     return [Motion(*map(mul, unit, scales)) for unit in _UNIT_RESPONSES[: degree + 1]]
+
+
+_gauss = lru_cache(maxsize=64)(np.polynomial.legendre.leggauss)
+
+
+def quadrature(time: float, size: float, cuts: Iterable[float], points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return Gauss's nodes and weights on [−1, 1] of a step, for a signal that is smooth between ``cuts`` [s].
+
+    Shape (pieces, ``points``) each.
+    """
+    nodes, weights = _gauss(points)
+    edges = np.array([-1.0, *(2.0 * (cut - time) / size - 1.0 for cut in cuts), 1.0])
+    half = 0.5 * np.diff(edges)[:, None]
+    return edges[:-1, None] + half * (nodes + 1.0), half * weights

@@ -56,12 +56,12 @@ COLUMNS = {
 #: Columns after the loads, from our own bodies.
 BODY_COLUMNS = {
     "a_tip": Column(
-        "m/s²", "beam", "acceleration of the tip relative to the base; of the lower end while a law joins them"
+        "m/s²", "own beam", "acceleration of the tip relative to the base; of the lower end while a law joins them"
     ),
-    "clamp_force": Column("N", "beam", "force of the clamp on the beam, upward"),
-    "clamp_moment": Column("N·m", "beam", "moment of the clamp on the beam, counter-clockwise"),
+    "clamp_force": Column("N", "own beam", "force of the clamp on the beam, upward"),
+    "clamp_moment": Column("N·m", "own beam", "moment of the clamp on the beam, counter-clockwise"),
     "bending_stress": Column("Pa", "section", "largest bending stress along the beam, from height or diameter"),
-    "a_y": Column("m/s²", "spring", "acceleration of the spring top relative to the base"),
+    "a_y": Column("m/s²", "own spring", "acceleration of the spring top relative to the base"),
 }
 #: What the column ``phase`` may hold.
 PHASES = ("free", "tied", "touch", "seated")
@@ -89,23 +89,23 @@ def columns_of(scene: Scene) -> dict[str, str]:
     They are `COLUMNS` without those of absent bodies, its loads: ``load_0`` for ``loads.0``, and `BODY_COLUMNS` without
     those of bodies that are not our own. ``gap`` is u_tip − y of a pair, u_tip − φ of a beam above a stop.
     """
-    beam = scene.upper is not None
-    spring = scene.lower is not None
+    own = None if scene.massless else scene.beam
     stop = scene.stop is not None
     there = {
         "": True,
-        "beam": beam,
-        "spring": spring,
+        "beam": scene.upper is not None,
+        "spring": scene.lower is not None,
         "pair": scene.coupled,
         "stop": stop and not scene.elastic_stop,
-        "gap": beam and (spring or stop),
+        "gap": scene.upper is not None and (scene.lower is not None or stop),
+        "own beam": own is not None,
+        "section": own is not None and own.section_height > 0.0,
+        "own spring": scene.spring is not None,
     }
-    units = {name: column.unit for name, column in COLUMNS.items() if there[column.part]}
-    units |= {f"load_{i}": load.unit for i, load in enumerate(scene.loads)}
-    own = scene.beam is not None and not scene.massless
-    section = own and scene.beam is not None and scene.beam.section_height > 0.0
-    there_is = {"beam": own, "section": section, "spring": scene.spring is not None}
-    return units | {name: column.unit for name, column in BODY_COLUMNS.items() if there_is[column.part]}
+    before, after = (
+        {name: column.unit for name, column in table.items() if there[column.part]} for table in (COLUMNS, BODY_COLUMNS)
+    )
+    return before | {f"load_{i}": load.unit for i, load in enumerate(scene.loads)} | after
 
 
 def rounded(value: float, scale: float) -> str:

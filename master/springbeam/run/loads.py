@@ -29,7 +29,6 @@ _OF_TABLE = 3
 _POINTS = 8
 #: (2k + 1)/2, by which a moment against P_k on [−1, 1] becomes the coefficient of P_k.
 _NORMS = np.array([0.5, 1.5, 2.5])
-_gauss = lru_cache(maxsize=64)(np.polynomial.legendre.leggauss)
 
 
 class Signal:
@@ -71,11 +70,9 @@ class Signal:
             return force.derivatives(_wave(load.amplitude, omega, middle - load.since, phase, size), size)
         if isinstance(load, ConstantLoad | StepLoad) and not cuts:
             return (float(load.value(middle)), 0.0, 0.0)
-        nodes, weights = _gauss(_OF_TABLE if isinstance(load, TableLoad) else _POINTS + int(load.rate * size))
-        edges = np.array([-1.0, *(2.0 * (cut - time) / size - 1.0 for cut in cuts), 1.0])
-        half = 0.5 * np.diff(edges)[:, None]
-        s = edges[:-1, None] + half * (nodes + 1.0)
-        weighted = half * weights * load.value(time + 0.5 * size * (s + 1.0))
+        points = _OF_TABLE if isinstance(load, TableLoad) else _POINTS + int(load.rate * size)
+        s, weights = force.quadrature(time, size, cuts, points)
+        weighted = weights * load.value(time + 0.5 * size * (s + 1.0))
         moments = weighted.ravel() @ np.polynomial.legendre.legvander(s.ravel(), 2)
         return force.derivatives((_NORMS * moments).tolist(), size)
 
