@@ -122,6 +122,9 @@ class Copy:
         venv.create(folder / ".venv", with_pip=False)
         (packages,) = (folder / ".venv").glob("lib/python*/site-packages")
         (packages / "here.pth").write_text(f"{folder / 'master'}\n{sysconfig.get_path('purelib')}\n")
+        program = self.python.with_name("springbeam")
+        program.write_text(f"#!{self.python}\nfrom springbeam.cli import main\n\nmain()\n")
+        program.chmod(0o755)
 
     def run(self, *words):
         """Return whether a program ends well; one that hangs does not."""
