@@ -38,8 +38,8 @@ def contact_at_rest(scene: Scene, free: float) -> float:
 
     while too_small(scale) * deep > 0.0:
         scale *= 2.0
-    found: float = brentq(too_small, 0.0, scale, xtol=1e-300, rtol=1e-15)
-    return found
+    contact: float = brentq(too_small, 0.0, scale, xtol=1e-300, rtol=1e-15)
+    return contact
 
 
 def lower_at_rest(scene: Scene, contact_force: float, tip: float | None) -> float:

@@ -48,7 +48,7 @@ def load_bodies(scene: Scene, start_time: float, degree: int) -> Bodies:
     make = partial(_body, scene, start_time, degree, checked)
     contact_force = 0.0
     rest = None
-    with ExitStack() as made:
+    with ExitStack() as failing:
         upper = make("beam", contact_force)
         if scene.static and upper is not None:
             contact_force = contact_at_rest(scene, upper.motion().displacement)
@@ -56,11 +56,11 @@ def load_bodies(scene: Scene, start_time: float, degree: int) -> Bodies:
                 upper.close()
                 upper = make("beam", contact_force)
         if upper is not None:
-            made.callback(upper.close)
+            failing.callback(upper.close)
         if scene.static:
             rest = lower_at_rest(scene, contact_force, None if upper is None else upper.motion().displacement)
         lower = make("spring", contact_force, rest)
-        made.pop_all()
+        failing.pop_all()
     return Bodies(upper, lower, contact_force)
 
 

@@ -92,8 +92,8 @@ class Fmu:
     def _load(self) -> Any:
         if not self.path.is_file():
             remedy = "; ./build.sh fmus builds it, SPRINGBEAM_FMUS names another folder" if self._own else ""
-            found = "a directory; an FMU is a file, its ZIP archive" if self.path.is_dir() else "not found"
-            raise FmuError(f"{self.path}: {found}{remedy}")
+            what = "a directory; an FMU is a file, its ZIP archive" if self.path.is_dir() else "not found"
+            raise FmuError(f"{self.path}: {what}{remedy}")
         description, library = opened(self.path, self.path.stat().st_mtime_ns, _fatal[self.path])
         identifier = description.coSimulation.modelIdentifier
         if self._own and identifier != self._name:

@@ -72,30 +72,30 @@ def _promised(spec: ForeignFmu, says: Any) -> Abilities:
     )
 
 
-def opened(spec: ForeignFmu, times: tuple[float, float], found: Findings | None) -> tuple[Port, Findings]:
-    """Return an FMU at the start of ``times``, and the findings ``found``, by default its description. Raises FmuError.
+def opened(spec: ForeignFmu, times: tuple[float, float], findings: Findings | None) -> tuple[Port, Findings]:
+    """Return an FMU at the start of ``times``, and its ``findings``, by default its description. Raises FmuError.
 
     ``times`` are when its first step begins and when its last one ends [s].
     """
     fmu = Fmu(None, Path(spec.fmu), spec.parameters, *times)
-    found = found or Findings(_promised(spec, fmu.says))
+    findings = findings or Findings(_promised(spec, fmu.says))
     try:
         for key, name in spec.named.items():
             _check(fmu, name, key, "input" if key in spec.INPUTS else "output")
         units = {"time": fmu.time_unit, **{key: fmu.unit(name, key) for key, name in spec.named.items()}}
-        found = replace(found, units=units, **_acceleration(spec, fmu, units))
-        outputs = _outputs(spec, found)
+        findings = replace(findings, units=units, **_acceleration(spec, fmu, units))
+        outputs = _outputs(spec, findings)
         port = Port(
             fmu,
             (spec.force,),
             () if spec.impulse is None else (spec.impulse,),
             tuple(outputs.values()),
-            found.abilities.slopes,
+            findings.abilities.slopes,
             always=True,  # derivatives of one step may act in the next if they are not set again
-            repeats=found.abilities.state,
+            repeats=findings.abilities.state,
             units={name: units[key].factor for key, name in {**spec.named, **outputs}.items()},
         )
-        return port, found
+        return port, findings
     except BaseException:
         fmu.close()
         raise
@@ -127,11 +127,11 @@ def _acceleration(spec: ForeignFmu, fmu: Fmu, units: dict[str, Unit]) -> dict[st
     return {}
 
 
-def _outputs(spec: ForeignFmu, found: Findings) -> dict[str, str]:
+def _outputs(spec: ForeignFmu, findings: Findings) -> dict[str, str]:
     """Return the names of the outputs after a step by their keys: first of the motion, then of the energies."""
-    keys = (*spec.MOTION, *(spec.ENERGIES if found.abilities.energies else ()))
+    keys = (*spec.MOTION, *(spec.ENERGIES if findings.abilities.energies else ()))
     names = {key: name for key, name in spec.named.items() if key in keys}
-    return names if found.acceleration is None else names | {"acceleration": found.acceleration}
+    return names if findings.acceleration is None else names | {"acceleration": findings.acceleration}
 
 
 class ForeignState(NamedTuple):
@@ -157,7 +157,7 @@ class ForeignBody(FmuBody, EndLoaded):
         Its table, and whether it is the upper body.
     times
         When its first step begins and when its last one ends [s].
-    found
+    findings
         Findings about it; by default those of its description.
     """
 
@@ -167,19 +167,19 @@ class ForeignBody(FmuBody, EndLoaded):
     state: ForeignState
     _port: RemotePort
 
-    def __init__(self, spec: ForeignFmu, upper: bool, times: tuple[float, float], found: Findings | None) -> None:
-        self._port = RemotePort(spec.fmu, self.PATIENCE, self.OCCASION, opened, spec, times, found)
-        self.found: Findings = self._port.found
-        self.abilities = self.found.abilities
-        self.warnings = self.found.warnings
+    def __init__(self, spec: ForeignFmu, upper: bool, times: tuple[float, float], findings: Findings | None) -> None:
+        self._port = RemotePort(spec.fmu, self.PATIENCE, self.OCCASION, opened, spec, times, findings)
+        self.findings: Findings = self._port.findings
+        self.abilities = self.findings.abilities
+        self.warnings = self.findings.warnings
         self._lags: dict[float, float] = {}  #: ε by size of step [s]
         self._spec = spec
         self._upward = 1.0 if upper else -1.0
-        self._keys = tuple(_outputs(spec, self.found))
+        self._keys = tuple(_outputs(spec, self.findings))
         self._n_motion = len({*self._keys} & {*spec.MOTION})
         self.state = ForeignState(Motion(0.0, 0.0, 0.0, 0.0), time=times[0])
         try:
-            self._begin(spec.mass or self.found.mass)
+            self._begin(spec.mass or self.findings.mass)
             self.mark()
         except BaseException:
             self.close()
@@ -231,7 +231,7 @@ class ForeignBody(FmuBody, EndLoaded):
 
     def _measure_lag(self, time: float, size: float) -> None:
         """Measure ε of steps of ``size`` [s] once, by two trial steps."""
-        if self.found.lag == 0.0 or size in self._lags:
+        if self.findings.lag == 0.0 or size in self._lags:
             return
         if len(self._lags) == SIZES_REMEMBERED:
             del self._lags[next(iter(self._lags))]
@@ -265,12 +265,12 @@ class ForeignBody(FmuBody, EndLoaded):
         w0, v0, *_ = self.state.motion
         w = by_key["displacement"]
         if "velocity" not in by_key:
-            v0 = by_key["velocity"] = (w - w0) / size if size > 0.0 else self.found.velocity
+            v0 = by_key["velocity"] = (w - w0) / size if size > 0.0 else self.findings.velocity
         v = by_key["velocity"]
         if lag := self._lags.get(size, 0.0):
             x0 = self.state.reported[self._keys.index("displacement")]
             free = self.state.free
-            kept = exp(-0.5 * size * (2.0 * free + size) / (_FORGOTTEN * self.found.H) ** 2) if free > 0.0 else 1.0
+            kept = exp(-0.5 * size * (2.0 * free + size) / (_FORGOTTEN * self.findings.H) ** 2) if free > 0.0 else 1.0
             w += lag * v + kept * (w0 - x0 - lag * v0)
         first, second = moments(w0, v0, w, v, size)
         if self.abilities.integrals:
@@ -296,7 +296,7 @@ class ForeignBody(FmuBody, EndLoaded):
             return self.state.held[1]
         from scipy.optimize import newton  # takes a tenth of a second to load: only for a rest on a foundation
 
-        size = self.state.size or self.found.H
+        size = self.state.size or self.findings.H
         load = self._on_end
         self._on_end = NO_FORCE
 
@@ -309,8 +309,8 @@ class ForeignBody(FmuBody, EndLoaded):
         guess = -self.mass * free.velocity / size or self.mass
         tolerance = _AT_REST * abs(guess)
         root, _ = newton(lambda f: held_by(f).velocity, 0.0, x1=guess, tol=tolerance, full_output=True, disp=False)
-        found = float(root)
-        end = held_by(found)
+        holding = float(root)
+        end = held_by(holding)
         self.rewind()
         self._on_end = load
         moved = abs(free.displacement - displacement)
@@ -319,8 +319,8 @@ class ForeignBody(FmuBody, EndLoaded):
                 f"{self._port.path}: no constant force holds its end at rest on the foundation; use a [stop] "
                 "restitution of 1, with which nothing comes to rest, or leave [stop] out"
             )
-        self.state = self._marked = self.state._replace(held=(displacement, found))
-        return found
+        self.state = self._marked = self.state._replace(held=(displacement, holding))
+        return holding
 
 
 def moments(w0: float, v0: float, w: float, v: float, size: float) -> tuple[float, float]:

@@ -104,10 +104,10 @@ class Slave:
 
         ``verbose`` turns its debug logging on, without which PythonFMU does not log what an exception says.
         """
-        made = copy(self)
-        made.instanceName = name
-        made.make(log, verbose)
-        return made
+        slave = copy(self)
+        slave.instanceName = name
+        slave.make(log, verbose)
+        return slave
 
     def freeLibrary(self) -> None:
         """Keep the library for the next instance."""

@@ -94,8 +94,8 @@ class FmuProcess:
         except KeyboardInterrupt:
             if (waited := monotonic() - began) < LONG:
                 raise
-            said = f"interrupted, for it has not returned within {waited:.3g} s from {doing}"
-            raise FmuError(f"{self._path}: {said}") from None
+            waiting = f"interrupted, for it has not returned within {waited:.3g} s from {doing}"
+            raise FmuError(f"{self._path}: {waiting}") from None
         self.idle = True
         if isinstance(value, FmuError):
             raise FmuError(": ".join([str(value), *self._printed()]))
@@ -190,7 +190,7 @@ class RemotePort(Port):
         self._waiting: list[Request] = []
         self._process: FmuProcess | None = FmuProcess.of(path)
         try:
-            self.found = self._ask("initialisation", "make", make, *arguments)
+            self.findings = self._ask("initialisation", "make", make, *arguments)
         except BaseException:
             self.close()
             raise

@@ -135,12 +135,12 @@ class Bench:
 
     def wrong(self, check: Callable[[float], set[str]]) -> set[str]:
         """Return the faults that ``check`` of a step's size [s] finds at every size that the FMU takes."""
-        found: set[str] | None = None
+        common: set[str] | None = None
         for wrong in self.taken(check, self.sizes):
-            found = wrong if found is None else found & wrong
-            if not found:
+            common = wrong if common is None else common & wrong
+            if not common:
                 break
-        return found or set()
+        return common or set()
 
     def taken(self, tried: Callable[[float], _T], sizes: Iterable[float]) -> Iterator[_T]:
         """Yield the result of ``tried`` for the ``sizes`` [s] at which the FMU steps.
@@ -226,7 +226,9 @@ def _findings(bench: Bench, mass: float = 1.0, velocity: float = 0.0, lag: float
     faults, warnings = (
         tuple(f"{bench.spec.fmu}: {text}" for text in texts) for texts in (bench.faults, bench.warnings)
     )
-    return Findings(bench.body.abilities, mass, velocity, bench.sizes[0], faults, warnings, lag, bench.body.found.units)
+    return Findings(
+        bench.body.abilities, mass, velocity, bench.sizes[0], faults, warnings, lag, bench.body.findings.units
+    )
 
 
 def _velocity(bench: Bench, size: float) -> float:
@@ -269,7 +271,7 @@ def _internal_steps(bench: Bench) -> float | None:
 def _check_grid(bench: Bench, size: float) -> None:
     """Say that the steps of the FMU have one size; it is a fault if internal steps do not end where they do."""
     H = bench.sizes[0]
-    said = (
+    internal = (
         f"it moves in internal steps: a step of {size:.3g} s and half of it do not move its end in proportion, and "
         "canHandleVariableCommunicationStepSize = true is false"
     )
@@ -280,9 +282,9 @@ def _check_grid(bench: Bench, size: float) -> None:
     gained = np.diff(moved - free, n=2 - column)
     # Of an end that swings, differences become smaller by ω H each; of one that is a step ahead in some, larger by 2.
     if np.abs(np.diff(gained, n=6)).max() > _ALIKE * np.abs(gained).max():
-        bench.faults.append(f"{said}, nor do steps of {H:.6g} s; {remedy}")
+        bench.faults.append(f"{internal}, nor do steps of {H:.6g} s; {remedy}")
     else:
-        bench.warnings.append(f"{said}; its steps have one size: {remedy}")
+        bench.warnings.append(f"{internal}; its steps have one size: {remedy}")
 
 
 def _lag(bench: Bench, impetus: float) -> float:
@@ -386,9 +388,9 @@ def _struck_mass(bench: Bench, mass: float, speed: float) -> float:
         _, faster = bench.response(size, NO_FORCE, impulse)
         return impulse / faster if faster else None
 
-    found = bench.extrapolated(inertia)
-    if found is not None and abs(found / mass - 1.0) <= _RESPONSE:
-        return found
+    struck = bench.extrapolated(inertia)
+    if struck is not None and abs(struck / mass - 1.0) <= _RESPONSE:
+        return struck
     bench.faults.append(
         f"an upward impulse of {impulse:.6g} N·s in {bench.spec.impulse!r} does not change the velocity by {speed:.6g} "
         f"m/s; with the mass {mass:.6g} kg it should"

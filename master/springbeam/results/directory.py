@@ -66,8 +66,8 @@ class RunDirectory:
     def results(self) -> list[Path]:
         """Return the result files that exist, and the files made from them."""
         files = (self.summary, self.events, self.shapes, self.steps, self.rows)
-        made = (self.path / name for name in (*TABLES, *PARQUET, *PICTURES.values(), REPORT, *ANIMATIONS))
-        return [file for file in (*files, *made) if file.exists()]
+        derived = (self.path / name for name in (*TABLES, *PARQUET, *PICTURES.values(), REPORT, *ANIMATIONS))
+        return [file for file in (*files, *derived) if file.exists()]
 
     def sizes(self) -> dict[str, int]:
         """Return the sizes of the files that hold the run [bytes], of those that exist."""

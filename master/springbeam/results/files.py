@@ -42,10 +42,10 @@ def lines(rows: Iterable[Sequence[Any]]) -> bytes:
 
 def tables_of(run: Trajectory) -> list[np.ndarray]:
     """Return the tables of a run beside its rows: its events, its contacts and, with a beam, its shapes."""
-    found = [events_as_array(run.events), contacts_as_array(contacts_of(run))]
+    tables = [events_as_array(run.events), contacts_as_array(contacts_of(run))]
     if run.shape_table is not None:
-        found.append(np.ascontiguousarray(run.shape_table).view(SHAPE)[:, 0])
-    return found
+        tables.append(np.ascontiguousarray(run.shape_table).view(SHAPE)[:, 0])
+    return tables
 
 
 def write_tables(run: RunDirectory, tables: Iterable[Iterable[Mapping[str, np.ndarray]]]) -> list[Path]:
@@ -115,12 +115,12 @@ def load_trajectory(directory: str | Path) -> Trajectory:
         If a file is missing, was cut, or is not what a run writes.
     """
     run = RunDirectory(directory)
-    found = run.sizes()
+    sizes = run.sizes()
     for name, size in load_summary(run.path).get("files", {}).items():
-        there = found.get(name, -1)
+        there = sizes.get(name, -1)
         if there < size:
-            said = "missing" if there < 0 else f"{there} bytes"
-            raise ResultsUnreadable(f"{run.path / name}: {said}, {size} bytes were written")
+            present = "missing" if there < 0 else f"{there} bytes"
+            raise ResultsUnreadable(f"{run.path / name}: {present}, {size} bytes were written")
     return read_run(run)
 
 

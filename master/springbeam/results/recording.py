@@ -164,9 +164,9 @@ class FileRecorder(AbstractContextManager["FileRecorder"]):
         self._close_files()
         write_summary(directory, _with_scene({**summary, "files": directory.sizes()}, self.scene))
         shapes = [chunks(mapped(directory.shapes, SHAPE))] * (self.scene.beam is not None)
-        found = contacts(self.scene, steps, self.events(), summary.get("contact_force_window"))
+        table = contacts(self.scene, steps, self.events(), summary.get("contact_force_window"))
         write_tables(
-            directory, [rows, chunks(mapped(directory.events, EVENT)), chunks(contacts_as_array(found)), *shapes]
+            directory, [rows, chunks(mapped(directory.events, EVENT)), chunks(contacts_as_array(table)), *shapes]
         )
 
     def amend(self, entries: Mapping[str, Any]) -> None:

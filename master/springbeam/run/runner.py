@@ -107,9 +107,9 @@ class Simulation(AbstractContextManager["Simulation"]):
         """
         with self._ending():
             self._master.flush()
-        found = self.recorder.trajectory()
-        found.summary = found.summary if self._summary else self._summed_up({"status": "running"})
-        return found
+        run = self.recorder.trajectory()
+        run.summary = run.summary if self._summary else self._summed_up({"status": "running"})
+        return run
 
     def step(self) -> bool:
         """Make one step, to the next macro point or event, and return whether there are more to come.
@@ -207,8 +207,8 @@ class Simulation(AbstractContextManager["Simulation"]):
 
 def abilities(scene: Scene, *, upper: Body | None = None, lower: Body | None = None) -> dict[str, Abilities]:
     """Return the measured abilities of bodies that are not our own, by table. Parameters, errors: `Simulation`."""
-    found = findings(_without_own(scene, upper=upper, lower=lower))
-    able = {table: finding.abilities for table, finding in found.items()}
+    checked = findings(_without_own(scene, upper=upper, lower=lower))
+    able = {table: finding.abilities for table, finding in checked.items()}
     H = scene.coupling.macro_step or 1e-3 * scene.time.t_end
     for table, body in (("beam", upper), ("spring", lower)):
         if body is not None:

@@ -167,16 +167,16 @@ _SAME_PLACE = 1e-12
 
 
 def validate(
-    setup: Setup, upper: Body | None, lower: Body | None, found: Mapping[str, Abilities] | None = None
+    setup: Setup, upper: Body | None, lower: Body | None, measured: Mapping[str, Abilities] | None = None
 ) -> None:
     """Raise SceneError if a run cannot be made with these bodies as they are at its start.
 
     That is if a body lacks a needed ability, or if the contact law, the foundation or an undeformed approach cannot
-    begin from the initial positions and velocities. Abilities ``found``, by table, replace the declared ones.
+    begin from the initial positions and velocities. Abilities ``measured``, by table, replace the declared ones.
     """
     bodies = {name: body for name, body in (("beam", upper), ("spring", lower)) if body is not None}
     able = {table: body.can() for table, body in bodies.items()}
-    lines = refusals(setup, {**able, **(found or {})})
+    lines = refusals(setup, {**able, **(measured or {})})
     lines += [
         f"the body in [{table}]: mass = 0: only an upper end can be without inertia, tied by a rigid law to one that "
         "has some; give it a mass greater than 0 [kg]"
