@@ -75,11 +75,6 @@ def test_the_spectrum_of_a_record_is_that_of_the_polygon_through_its_samples(fre
     fine = np.interp(np.arange(100_001) / 1000.0, np.arange(101), record)
     coarse, dense = (shock_of_record(values, 0.02 / n, frequency) for values, n in ((record, 1), (fine, 1000)))
     assert coarse[1:] == pytest.approx(np.array(dense[1:]), rel=1.3e-3)
-    # A velocity that is linear between samples: a base with a constant acceleration between them.
-    velocity = np.append(0.0, 0.02 * np.cumsum(record))
-    fine = np.interp(np.arange(101_001) / 1000.0, np.arange(102), velocity)
-    coarse, dense = (shock_spectrum(values, 0.02 / n, frequency) for values, n in ((velocity, 1), (fine, 1000)))
-    assert coarse[1:] == pytest.approx(np.array(dense[1:]), rel=1.3e-3)
 
 
 def test_a_base_that_moves_on_steadily_is_no_shock():
