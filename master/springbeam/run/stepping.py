@@ -139,7 +139,8 @@ class Pair:
         self.law = setup.soft
         #: The bodies whose acceleration, or its change by damping, is unknown.
         self.without_acceleration: list[Body] = []
-        self._decays: dict[int, float] = {}  #: `Body.decay` of those that have been asked, by `id`
+        #: `Body.decay` by `id`: a body of the caller's may be a dataclass, which has no hash.
+        self._decays: dict[int, float] = {}
         #: Whether contact opens and closes inside steps, without an event that ends them.
         self.opens_softly = self.law is not None and not setup.lasting
         #: What couples the bodies where the law acts, and where the ends are apart.
