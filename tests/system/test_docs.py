@@ -61,6 +61,12 @@ def module(name):
     return loaded
 
 
+@pytest.mark.parametrize("name", sorted(path.stem for path in DOCS.glob("*.py")))
+def test_a_program_that_writes_tables_can_be_started(name, monkeypatch):
+    monkeypatch.syspath_prepend(DOCS)
+    assert module(name).__doc__
+
+
 def test_every_page_is_in_the_index():
     conf = module("conf")
     named = [name for pages in conf.PAGES.values() for name in pages]
