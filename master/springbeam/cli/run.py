@@ -64,6 +64,8 @@ _OF_CONTACT = {
     "before": "m/s",
     "after": "m/s",
 }
+#: Those that have four digits; others have three, so that a row fits into 80 columns.
+_TIMES = ("begin", "at")
 #: Columns of a contact before its velocities.
 _VELOCITIES = 7
 
@@ -328,17 +330,24 @@ def _event_table(events: list[Event], scene: Scene) -> Table:
 
 def _contact_table(contacts: list[Contact]) -> Table:
     """Return the first contacts as a table, and sums or the largest of the others."""
+    from ..results.trajectory import rounded
     from ..studies.picture import readable
 
-    rows = [(*contact[:_VELOCITIES], -contact.closing, contact.opening) for contact in contacts[:_CONTACTS]]
+    fastest = max(abs(v) for contact in contacts for v in (contact.closing, contact.opening or 0.0))
+
+    def upward(velocity: float | None) -> float | None:
+        return None if velocity is None else float(rounded(velocity, fastest))
+
+    rows = [(*each[:_VELOCITIES], upward(-each.closing), upward(each.opening)) for each in contacts[:_CONTACTS]]
     if others := contacts[_CONTACTS:]:
         highest = max(others, key=lambda contact: contact.peak_force or 0.0)
         length, impulse, loss = (sum(getattr(c, name) for c in others) for name in ("duration", "impulse", "loss"))
         depth = max(contact.depth for contact in others)
         peak = highest.peak_force, highest.peak_time
-        rows.append((others[-1].begin, length, impulse, *peak, depth, loss, None, others[-1].opening))
+        rows.append((others[-1].begin, length, impulse, *peak, depth, loss, None, upward(others[-1].opening)))
     scaled, heads = readable([dict(zip(_OF_CONTACT, row, strict=True)) for row in rows], _OF_CONTACT)
-    columns = ("", *(f"{head.replace(' [', chr(10) + '[')}:.4g" for head in heads.values()))
+    heads = {name: head.replace(" [", "\n[") for name, head in heads.items()}
+    columns = ("", *(f"{head}:.{4 if name in _TIMES else 3}g" for name, head in heads.items()))
     numbers = [*map(str, range(1, min(len(contacts), _CONTACTS) + 1)), *[f"+{len(others)}"] * bool(others)]
     return table(columns, [(number, *row.values()) for number, row in zip(numbers, scaled, strict=True)])
 
