@@ -174,7 +174,7 @@ class Detector:
     def first_event(self, state: State, step: Step) -> tuple[Step, EventKind | None]:
         """The step, cut to its first event, and the kind of that; ``None`` if nothing happens in it.
 
-        Under the force of a shorter step the ends move differently, so all guards are asked again after a cut.
+        Under the force of a shorter step the ends move differently, so all guards are evaluated again after a cut.
         """
         kind: EventKind | None = None
         guards = self.guards(state.phase)
