@@ -13,7 +13,9 @@ import numpy as np
 from pages import IMAGES, shrink, table, write_section  # beside this script
 
 from springbeam import load_scene, simulate, with_changes
+from springbeam.bodies.force import value
 from springbeam.monolithic import event_driven
+from springbeam.results.records import FORCE_COLUMNS
 
 DEGREES = (0, 1, 2)
 STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
@@ -101,10 +103,7 @@ def joined() -> list[list[str]]:
         run = simulate(with_changes(soft, coupling={"degree": degree, "macro_step": H}))
         rows = (run.time > APART) & (run.time < soft.time.t_end - FINE)
         steps, exact = run.steps[rows], fine.at(run.time[rows])
-        size = steps["size"]
-        force = steps["contact_force"] + size * (
-            steps["contact_force_rate"] + 0.5 * size * steps["contact_force_rate_2"]
-        )
+        force = value([steps[name] for name in FORCE_COLUMNS], steps["size"])
         of_ends = steps["v_tip"], run.v_tip[rows], force, run.contact_force[rows]
         beside = exact.v_tip, exact.v_tip, exact.contact_force, exact.contact_force
         off = [np.sqrt(np.mean((a - b) ** 2)) for a, b in zip(of_ends, beside, strict=True)]

@@ -33,8 +33,7 @@ from ..scene import Scene
 from .columns import columns
 from .inner import INNER, MAGNITUDE, curves_of
 from .records import Records, Rows, common, joined, seated
-from .spans import Extremes as Extremes
-from .spans import rounding_of_steps, span
+from .spans import Extremes, rounding_of_steps, span
 from .trajectory import Trajectory
 
 #: Fields that are linear between rows, and do not change with an event.

@@ -14,9 +14,9 @@ import numpy as np
 from ..motion.events import Event
 from ..scene import Scene
 from .contact_times import foundation_contacts, tip_contacts
-from .dense import Extremes
 from .law_peak import peak_of_law
 from .records import impulse, joined
+from .spans import Extremes
 from .window_peak import gained, peak_force
 
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from ..contact.interface import Rigid
 from ..motion.events import Event
-from ..results.dense import Extremes
-from ..results.spans import rounding_of_steps, span
+from ..results.spans import Extremes, rounding_of_steps, span
 from .setup import Setup
 
 #: Columns whose extremes are searched.

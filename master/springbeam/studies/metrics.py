@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from ..motion.events import EventKind
-from ..results.dense import MOTION, Extremes, inside
+from ..results.dense import MOTION, inside
 from ..results.inner import largest
+from ..results.spans import Extremes
 from ..results.totals import LOSS_NAMES, TOTALS
 from ..results.trajectory import BODY_COLUMNS, COLUMNS, Trajectory
 from ..scene import ArgumentError
